@@ -62,14 +62,14 @@ _ZONE = Look(_BROWN, "#e89090", fill=0.14, hatch="////")
 _SECOND = Look(_BLUE, "#7cc0f5", width=1.8)
 _GREY = "#6b6b6b"
 _PALE_GREY = "#a9adb5"
-# The way, by what comes of a return from there, and by what can be reached from there without an engine.
+# Looks of the path by the outcome of a return, and by the destination in reach without an engine.
 _SAFE = Look(_GREEN, "#2fc79a", width=4.4, halo=True)
 _WRONG = Look(_PURPLE, "#e87cc4", width=4.4, dash=(5.0, 1.0), halo=True)
 _SHORT = Look(_ORANGE, "#ffb938", width=4.4, dash=(9.0, 2.0), halo=True)
-_SPARE = 1.8  # width of a line of what is left over
+_SPARE = 1.8  # width of a line of altitude to spare
 _NOT_KNOWN = Look(_GREY, _PALE_GREY, width=4.4, dash=(2.0, 3.0), halo=True)
 
-# What data stands for, by its role.
+# Looks of the data, by role.
 LOOKS = {
     "missile": _MISSILE,
     "missile-reach": Look(_MISSILE.light, _MISSILE.dark, width=0.0, fill=0.3),
@@ -138,7 +138,7 @@ LOOKS = {
     "comes-down": Look("#333333", "#e8e8ea", width=1.0, size=3.4, face="paper"),
 }
 
-# What stands around the data, by its use: light and dark.
+# Colours of axes and page, by use: light and dark.
 PAGE = {
     "paper": ("#ffffff", "#16181c"),
     "plot": ("#ffffff", "#1d2026"),
@@ -162,25 +162,27 @@ PAGE = {
     "on-badge": ("#ffffff", "#16181c"),
 }
 
-# Points of a written name by its rank, and pixels between it and its place.
+# Size of a label by its rank, points, and gap between the label and its position, pixels.
 LABELS = {"fail": (7.0, 16.0), "end": (8.0, 12.0), "number": (7.5, 8.0), "name": (6.2, 4.0)}
 
 # Rises in lightness from valley to summit, so that height reads without colour.
 GROUND = ("#9fbfa5", "#cfd8b0", "#efe7c8", "#f6efe2", "#ffffff")
 GROUND_DARK = ("#2b3a31", "#3f4737", "#565341", "#6d6758", "#8c877f")
 
-# From dark to light, low to high, slow to fast: several lines of one kind.
+# Colours of several lines of one kind, from dark to light.
 SHADES = (_FLOWN.light, _BLUE, _GREEN, _ORANGE, _PURPLE)
-# One for each algorithm of a figure of the paper.
+# Colours of the algorithms in a figure of the paper.
 SERIES = (_BLUE, _PURPLE, "#1d1d1f", _ORANGE, _SKY, "#5c5c61")
-# One for each mode of an aircraft's motion: short period, phugoid, Dutch roll, roll-spiral, roll, spiral.
+# Colours of the modes of an aircraft's motion: short period, phugoid, Dutch roll, roll-spiral, roll, spiral.
 MODES = (_BLUE, _VERMILLION, _GREEN, "#1d1d1f", _PURPLE, _ORANGE)
 # The aircraft's model in 3-D scenes: body, left wing and right wing, with the colours of navigation lights.
 AIRCRAFT_PARTS = ("#ebebe0", "#d91a1a", "#1a9933")
 
 
 def colour(name: str, *, dark: bool = False) -> str:
-    """Return the colour of a role, or of an element of the page around the data.  Raises KeyError.
+    """Return a colour of the theme, "#rrggbb".  Raises KeyError for an unknown name.
+
+    name: role of the data, or element of the page around the data.
 
     >>> colour("flown"), colour("paper", dark=True)
     ('#000000', '#16181c')
@@ -201,7 +203,9 @@ def rgb(text: str) -> tuple[float, float, float]:
 
 
 def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float, float, float, float]:
-    """Return red, green, blue and opacity of a role, 0 to 1.
+    """Return the RGBA components (0 to 1) of a theme colour.
+
+    name: role of the colour, such as "flown".
 
     >>> rgba("flown", 0.5)
     (0.0, 0.0, 0.0, 0.5)
@@ -210,7 +214,7 @@ def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float,
 
 
 def palette_colours() -> tuple[str, ...]:
-    """Return the colours that a picture with a reduced palette keeps: those of all roles, paper and ink.
+    """Return the colours that a picture with a reduced palette keeps: all roles, paper, ink and highlight.
 
     >>> colour("missile") in palette_colours()
     True
@@ -221,7 +225,9 @@ def palette_colours() -> tuple[str, ...]:
 
 
 def css_variables() -> str:
-    """Return the colours as CSS variables (``--missile``): light, and dark for screens that prefer a dark scheme.
+    """Return the theme's colours as CSS variables, such as ``--missile``.
+
+    The light colours are replaced by the dark ones on screens that prefer a dark scheme.
 
     >>> "--missile: #" in css_variables()
     True
@@ -261,7 +267,9 @@ _SYMBOLS = {"circle": "circle", "triangle": "triangle-up", "star": "star", "cros
 
 
 def page_styles() -> dict[str, dict[str, object]]:
-    """Return width, dash, opacity and size of each role for the page's script; colours are in `css_variables`.
+    """Return width, dash, opacity and size of each role for the page's scripts.
+
+    The colours are in `css_variables`.
 
     >>> page_styles()["missile"]["dash"]
     'solid'

@@ -34,13 +34,16 @@ class SteadyClock:
     jumps: tuple[float, ...]
 
 
-def remove_clock_jumps(time: Floats, usual: float = 0.1) -> SteadyClock:
-    """Remove jumps back from the times (s, (n,)) of a log's rows in the order of the file.
+def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
+    """Remove the backward jumps of a log's clock from the times of its rows.
 
-    A clock that goes back and stays back has been reset: the first row after the reset is moved to ``usual`` s after
-    the latest row before it, and all later rows are shifted with it.  A single row out of order keeps its time.
+    A clock that goes back and stays back has been reset: the first row after the reset is moved to ``usual_step`` s
+    after the latest row before it, and all later rows are shifted with it.  A single row out of order keeps its time.
 
-    >>> remove_clock_jumps(np.array([10.0, 11.0, *range(2, 14)]), usual=1.0).time.tolist()
+    time: times of the rows in the order of the file, s, (n,).
+    usual_step: time between the rows before and after a jump, s.
+
+    >>> remove_clock_jumps(np.array([10.0, 11.0, *range(2, 14)]), usual_step=1.0).time.tolist()
     [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0]
     >>> float(remove_clock_jumps(np.array([10.0, 11.0, 5.0, *range(12, 24)])).time[2])
     5.0
@@ -51,19 +54,22 @@ def remove_clock_jumps(time: Floats, usual: float = 0.1) -> SteadyClock:
     while begin < shifted.size:
         latest = np.maximum.accumulate(shifted[begin:])
         late_rows = np.flatnonzero(shifted[begin:] < latest - MAX_CLOCK_LAG_S)
-        jump = _first_late_row(late_rows, shifted[begin:], latest)
+        jump = _find_clock_jump(late_rows, shifted[begin:], latest)
         if jump < 0:
             break
         start_row = begin + jump
         jumps.append(float(latest[jump - 1]))
-        shifted[start_row:] += latest[jump - 1] + usual - shifted[start_row]
+        shifted[start_row:] += latest[jump - 1] + usual_step - shifted[start_row]
         begin = start_row
     return SteadyClock(shifted, tuple(jumps))
 
 
-def _first_late_row(late_rows: Ints, time: Floats, latest: Floats) -> int:
-    """Return the first late row from which enough rows, or all rows to the end, are late to show a jump; -1 if none.
+def _find_clock_jump(late_rows: Ints, time: Floats, latest: Floats) -> int:
+    """Return the row at which the clock goes back and stays back, or -1 if it never does.
 
+    The next `MIN_LATE_ROWS` rows, or all rows to the end, must be late.
+
+    late_rows: rows whose time is late by more than `MAX_CLOCK_LAG_S`.
     latest: latest time up to each row, s.
     """
     for k in late_rows.tolist():
@@ -130,7 +136,7 @@ class CleanPositions:
 
 
 def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> CleanPositions:
-    """Clean and sort rows of latitude, longitude and altitude.
+    """Clean and sort rows of latitude, longitude and altitude, and count the faults.
 
     earlier_jumps: times of clock jumps that the reader has removed already, s.
 
@@ -152,10 +158,10 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     is_new = np.concatenate([[True], np.diff(time) > 0.0]) if time.size else np.zeros(0, bool)
     duplicates = int(is_new.size - is_new.sum())
     time, values = time[is_new], values[is_new]
-    is_glitch = _glitch_rows(time, values)
+    is_glitch = _find_glitches(time, values)
     time, values = time[~is_glitch], values[~is_glitch]
     is_near = _is_in_main_group(time)
-    time, shifts = _without_jumps(time[is_near], values[is_near])
+    time, shifts = _remove_forward_jumps(time[is_near], values[is_near])
     is_in_range = time < MAX_TIME_S
     time, values = time[is_in_range], values[is_near][is_in_range]
     unusable += is_near.size - time.size
@@ -186,7 +192,7 @@ def metres_between(lat: Floats, lon: Floats) -> Floats:
 
 
 def _usable_rows(time: Floats, values: Floats) -> Flags:
-    """Return a mask of rows with a valid time, position and altitude."""
+    """Return a mask (n,): True for rows with a valid time, position and altitude."""
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
         has_position = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
@@ -196,8 +202,11 @@ def _usable_rows(time: Floats, values: Floats) -> Flags:
         return np.asarray((time >= 0.0) & (time < 1e9) & has_position & has_valid_altitude & is_known)
 
 
-def _glitch_rows(time: Floats, values: Floats) -> Flags:
-    """Return a mask of the glitches, (n,): rows that no vehicle can have reached from the row before and left again."""
+def _find_glitches(time: Floats, values: Floats) -> Flags:
+    """Return a mask (n,): True for glitches.
+
+    A glitch is a row that no vehicle can have reached from the row before and left again.
+    """
     is_glitch = np.zeros(time.size, bool)
     if time.size < 5:
         return is_glitch
@@ -237,7 +246,7 @@ def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_spe
 
 
 def _is_in_main_group(time: Floats) -> Flags:
-    """Return a mask that leaves out small groups of rows whose times are far from all others, (n,).
+    """Return a mask (n,): False for small groups of rows whose times are far from all others.
 
     time: sorted times, s, (n,).
     """
@@ -246,8 +255,8 @@ def _is_in_main_group(time: Floats) -> Flags:
     return np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[groups])
 
 
-def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove forward clock jumps: pauses in which a moving vehicle moved no further than in a few usual steps.
+def _remove_forward_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
+    """Remove forward clock jumps: pauses in which a moving vehicle hardly moved.
 
     Returns the shifted times, s, and the shifts as in `CleanPositions.shifts`.
     """

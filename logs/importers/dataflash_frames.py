@@ -46,7 +46,7 @@ class MappedFile:
         self.data: Bytes = np.frombuffer(self._map, np.uint8)
 
     def release_memory(self) -> None:
-        """Release the memory of the mapped file; it is read again when needed."""
+        """Release the memory of the mapped file; its bytes are read from the disk again when needed."""
         # Windows does not have this call, and accounts for mapped pages differently.
         if hasattr(self._map, "madvise"):
             self._map.madvise(mmap.MADV_DONTNEED)
@@ -203,11 +203,11 @@ def index_dataflash(
 ) -> Dataflash:
     """Index the messages of a log that have one of the given names.
 
-    data: bytes of the log, (n,).
-    release_memory: called regularly, to release the memory of the bytes that were read.
-
     The log is read twice, first for the formats and then for the messages with these names, so that the index of a
     large log is small.
+
+    data: bytes of the log, (n,).
+    release_memory: called regularly, to release the memory of the bytes that were read.
     """
     is_format = np.zeros(256, np.bool_)
     is_format[FMT_TYPE] = True
@@ -338,7 +338,9 @@ def _walk_messages(
     trailing: int,
     is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Return the starts and types of requested messages up to byte `stop`: continue from `state`, and update it.
+    """Find the requested messages up to byte `stop`, and return their starts and types.
+
+    The walk continues from `state`, and updates it.
 
     lengths: length of each message type, bytes, (256,), updated by the FMT messages.
     counts: number of messages of each type, (256,), which is updated.

@@ -17,7 +17,7 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Home, MissionItem, round_to_grid
 from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
-from logs.importers.logged_missions import LoggedItem, combine_items, logged_mission, plane_mode
+from logs.importers.logged_missions import LoggedItem, combine_items, make_logged_mission, plane_mode
 from logs.importers.raw_log import (
     HeightSource,
     LoggedMission,
@@ -44,7 +44,7 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
 
     commands: CMD messages.
     time: time of each CMD message, s, (n,).
-    origins: ORGN messages.
+    origins: ORGN messages, which contain home.
     source: name of the log.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
@@ -69,7 +69,7 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         rows.append(LoggedItem(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
     notes = () if has_frames else ("the log states no frames: heights are taken as above home",)
     for logged in combine_items(rows):
-        usable_mission = logged_mission(logged, source, "CMD")
+        usable_mission = make_logged_mission(logged, source, "CMD")
         if usable_mission is not None:
             mission = usable_mission.mission
             home = mission.home if mission.home is not None else logged_home(origins)
@@ -158,7 +158,7 @@ class _Reader:
     def read(self) -> RawLog:
         """Return the log.  Raises LogError for a log without positions."""
         series = {name: values for name, values in self._series() if values is not None and len(values.time)}
-        program, vehicle = self._program()
+        program, vehicle = program_and_vehicle([text for _, text in self._events()], self._messages("VER"))
         if "position" not in series:
             names = ", ".join(sorted(self._index.names)[:12])
             raise LogError(
@@ -183,7 +183,7 @@ class _Reader:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return the messages of a name; of several instances only the first."""
+        """Return the messages of a name; if several sensors or estimators send them, only those of the first."""
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
@@ -195,10 +195,10 @@ class _Reader:
         return self._cache[name]
 
     def _clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
-        """Return the corrections of the log's clock at n messages, and the times of its jumps.
+        """Find the jumps of the log's clock, and the shift that corrects the time of each message.
 
-        Returns the byte at which each message starts, the shift from there on, s, (n,) each, and the times of the jumps
-        back, s.
+        Returns the byte at which each message starts, (n,), the shift to add to its time, s, (n,), and the times of the
+        jumps back, s.
         """
         times, starts = [], []
         for name in ("POS", "ATT", "GPS", "MODE"):
@@ -222,8 +222,8 @@ class _Reader:
             return raw_time
         return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
 
-    def _table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
-        """Return columns of a message, times `scale`; None if the log lacks one of them."""
+    def _message_table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
+        """Return fields of a message as columns, times `scale`; None if the log lacks one of them."""
         columns = tuple(columns)
         messages = self._messages(name)
         if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):
@@ -235,27 +235,33 @@ class _Reader:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         yield "position", self._position()
         yield "velocity", self._velocity()
-        yield "attitude", self._first((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE)
+        yield (
+            "attitude",
+            self._first_table((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE),
+        )
         yield "wind", self._wind()
         yield "airspeed", self._airspeed()
         yield "battery", self._battery()
         yield "throttle", self._throttle()
 
-    def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
-        """Return the columns of the first choice of message and columns that has rows, times `scale`; None if none."""
+    def _first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
+        """Return the first of several tables that has rows, times `scale`; None if none has.
+
+        choices: name of a message and its fields, for each table.
+        """
         for name, columns in choices:
-            table = self._table(name, columns, scale)
+            table = self._message_table(name, columns, scale)
             if table is not None and len(table.time):
                 return table
         return None
 
     def _position(self) -> LogSeries | None:
         """Return the estimated positions, or else the positions of GPS with a 3-D fix."""
-        estimate = self._first((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
+        estimate = self._first_table((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
         if estimate is not None:
             return estimate
         gps = self._messages("GPS")
-        position = self._first((("GPS", ("Lat", "Lng", "Alt")),))
+        position = self._first_table((("GPS", ("Lat", "Lng", "Alt")),))
         if position is None or not gps.has("Status"):
             return position
         # Without a 3-D fix there is no altitude.
@@ -265,10 +271,10 @@ class _Reader:
     def _velocity(self) -> LogSeries | None:
         """Return the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS."""
         for name in ("XKF1", "NKF1", "EKF1"):
-            velocity = self._table(name, ("VE", "VN", "VD"))
+            velocity = self._message_table(name, ("VE", "VN", "VD"))
             if velocity is not None and len(velocity.time):
                 return LogSeries(name, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
-        gps = self._table("GPS", ("Spd", "GCrs", "VZ"))
+        gps = self._message_table("GPS", ("Spd", "GCrs", "VZ"))
         if gps is None:
             return None
         speed, course, down = gps.values.T
@@ -277,19 +283,19 @@ class _Reader:
 
     def _wind(self) -> LogSeries | None:
         """Return the estimated wind velocity to east and north, m/s, (n, 2); None if it is always 0."""
-        wind = self._first([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
+        wind = self._first_table([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
         # Without an estimate the wind stays zero.
         return wind if wind is not None and np.any(wind.values) else None
 
     def _airspeed(self) -> LogSeries | None:
         """Return the true airspeed, m/s, (n, 1), converted from ArduPilot's equivalent airspeed; None if unknown."""
         sensor = self._messages("ARSP")
-        airspeed = self._table("ARSP", ("Airspeed",))
+        airspeed = self._message_table("ARSP", ("Airspeed",))
         if airspeed is not None and sensor.has("U"):
             is_used = sensor.column("U") > 0
             airspeed = LogSeries("ARSP", airspeed.time[is_used], airspeed.values[is_used]) if is_used.any() else None
         if airspeed is None or not len(airspeed.time):
-            airspeed = self._first((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
+            airspeed = self._first_table((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
         if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
             return None
         return LogSeries(
@@ -297,8 +303,11 @@ class _Reader:
         )
 
     def _true_by_equivalent(self, time: Floats) -> Floats:
-        """Return the ratio of true to equivalent airspeed at given times, as logged or else by the altitude, (n,)."""
-        ratio = self._table("CTUN", ("E2T",))
+        """Return the ratio of true to equivalent airspeed at given times, (n,).
+
+        The ratio is the logged one, or else that of the standard atmosphere at the logged altitude.
+        """
+        ratio = self._message_table("CTUN", ("E2T",))
         if ratio is not None and len(ratio.time) > 1:
             order = np.argsort(ratio.time, kind="stable")
             return np.asarray(np.interp(time, ratio.time[order], ratio.values[order, 0]))
@@ -310,14 +319,14 @@ class _Reader:
         return np.array([true_by_equivalent(float(altitude)) for altitude in altitudes])
 
     def _battery(self) -> LogSeries | None:
-        """Return the battery's current, A, and the energy used, Wh, (n, 2); None if neither was measured."""
-        battery = self._table("BAT", ("Curr", "EnrgTot"))
+        """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
+        battery = self._message_table("BAT", ("Curr", "EnrgTot"))
         if battery is None or not len(battery.time):
-            battery = self._table("CURR", ("Curr", "EnrgTot"))
+            battery = self._message_table("CURR", ("Curr", "EnrgTot"))
         if battery is not None and len(battery.time):
             return battery if np.any(battery.values) else None
         for name in ("BAT", "CURR"):
-            battery = self._table(name, ("Volt", "Curr"))
+            battery = self._message_table(name, ("Volt", "Curr"))
             if battery is not None and len(battery.time) and np.any(battery.values[:, 1]):
                 return with_used_energy(battery)
         return None
@@ -325,7 +334,7 @@ class _Reader:
     def _throttle(self) -> LogSeries | None:
         """Return the throttle, 0..1, (n, 1); None if not logged."""
         for column in ("ThO", "ThrOut"):
-            throttle = self._table("CTUN", (column,), 0.01)
+            throttle = self._message_table("CTUN", (column,), 0.01)
             if throttle is not None and len(throttle.time):
                 return throttle
         return None
@@ -333,19 +342,19 @@ class _Reader:
     def _heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes that the log has in addition to the altitude of the position."""
         position = self._position()
-        gps = self._table("GPS", ("Alt",))
+        gps = self._message_table("GPS", ("Alt",))
         if gps is not None and position is not None and position.source != "GPS":
             yield HeightSource("GPS.Alt", "amsl", gps)
-        baro = self._table("BARO", ("AltAMSL",))
+        baro = self._message_table("BARO", ("AltAMSL",))
         if baro is not None:
             yield HeightSource("BARO.AltAMSL", "amsl", baro)
         else:
-            baro = self._table("BARO", ("Alt",))
+            baro = self._message_table("BARO", ("Alt",))
             if baro is not None:
                 yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
 
     def _modes(self) -> Iterable[ModeChange]:
-        """Yield the mode changes; none for logs with modes by name."""
+        """Yield the mode changes; none for a log that states the modes by name instead of by number."""
         messages = self._messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has(column) or messages.rows.dtype[column].kind == "S":
@@ -374,12 +383,8 @@ class _Reader:
         if messages.has("Message"):
             yield from zip(self._time(messages).tolist(), messages.texts("Message"), strict=True)
 
-    def _program(self) -> tuple[str, VehicleKind]:
-        """Return the program and the vehicle."""
-        return program_and_vehicle([text for _, text in self._events()], self._messages("VER"))
-
     def _utc_start(self) -> float:
-        """Return the time 0 of the log's clock, s since 1970, by the first GPS fix; NaN if not logged."""
+        """Return time 0 of the log's clock as given by the first GPS fix, s since 1970; NaN if not logged."""
         messages = self._messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if messages.has(weeks, millis, "TimeUS"):
@@ -422,7 +427,10 @@ _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1
 
 
 def _raw_time(messages: Messages) -> Floats:
-    """Return the times of messages on the log's own clock, s.  Before 2015 they were logged in milliseconds."""
+    """Return the times of messages on the log's own clock, s.
+
+    Before 2015 they were logged in milliseconds.
+    """
     if messages.has("TimeUS"):
         return messages.column("TimeUS") * 1e-6
     return messages.column("TimeMS") * 1e-3

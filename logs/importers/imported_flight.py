@@ -97,7 +97,7 @@ def find_flight_parts(
     missions: Sequence[LoggedMission],
     last: float,
 ) -> list[FlightPart]:
-    """Return one part for each flight and each mission that the flight followed.
+    """Split the flights of a log by the missions that they followed, one part for each flight and mission.
 
     spans: start and end of each flight, from `find_flight_spans`.
     modes: mode changes in the log; without any, each whole flight is assumed to follow its mission.
@@ -143,7 +143,10 @@ def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last:
 
 
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
-    """Return the index of the mission at the start of a stretch, or else of the first mission within it; -1 if none."""
+    """Return the index of the mission that a stretch of a flight followed, or -1 if unknown.
+
+    It is the last mission at the start of the stretch, or else the first mission within the stretch.
+    """
     before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
     if before:
         return before[-1]
@@ -152,7 +155,7 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the part that followed its mission for the longest time; of equal parts, the longest."""
+    """Return the index of the part that followed its mission longest; of equal parts, the longest part."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
@@ -219,7 +222,9 @@ class LoggedFlight:
 
 
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
-    """Return the flight of a log that followed its mission for the longest time, or the flight with a number from 1.
+    """Extract one flight from a log.
+
+    The flight is the one that followed its mission for the longest time, or the one with a number from 1.
 
     Raises LogError for a vehicle other than an aeroplane, a log without a flight, and a number that is not in the log.
 
@@ -257,13 +262,15 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
 
 
 def _reason_without_flight(positions: CleanPositions) -> str:
-    """Describe why a log contains no flight."""
+    """Return the reason why a log contains no flight, for a message."""
     if positions.time.size < 2:
         unusable_count = positions.faults.unusable
         return f"{positions.time.size} usable positions" + (
             f", {unusable_count:,} without a position or a time" if unusable_count else ""
         )
-    return f"in {positions.time[-1] - positions.time[0]:.0f} s it never went faster than a person for long"
+    duration = positions.time[-1] - positions.time[0]
+    limit_text = f"{MIN_FLYING_SPEED_MPS:g} m/s for {MIN_FLIGHT_TIME_S:g} s"
+    return f"in {duration:.0f} s the ground speed never stayed above {limit_text}"
 
 
 def _extract_flight(
@@ -351,7 +358,7 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
 
 
 def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
-    """Return the source of the positions' altitude, and the offsets of other altitudes, m.
+    """Return the source of the positions' altitude, and the offsets of other altitudes from it, m.
 
     The offsets are medians over the first seconds after `start`.
     """
@@ -371,26 +378,26 @@ def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
 # Altitudes for a plan that states none: the altitudes at which the flight passed its items.
 
 
-def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
+def with_flown_altitudes(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
     """Return a mission in which each item with a position has the altitude of the nearest row of a flight.
 
     lat, lon, up: positions of the flight, deg and m, (n,).
 
     >>> from flight.mission.items import MissionItem
     >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
-    >>> flown = with_flown_heights(task, np.array([46.0, 47.0]), np.array([8.0, 8.0]), np.array([900.0, 1500.0]))
+    >>> flown = with_flown_altitudes(task, np.array([46.0, 47.0]), np.array([8.0, 8.0]), np.array([900.0, 1500.0]))
     >>> [item.alt for item in flown.items]
     [900.0, 1500.0]
     """
     is_known = np.isfinite(up)
-    heights = up[is_known] if is_known.any() else np.zeros(len(up))
+    altitudes = up[is_known] if is_known.any() else np.zeros(len(up))
     lat, lon = (lat[is_known], lon[is_known]) if is_known.any() else (lat, lon)
     items = []
     for item in mission.items:
-        if item.has_position and heights.size:
+        if item.has_position and altitudes.size:
             east = ((lon - item.lon_deg + 180.0) % 360.0 - 180.0) * np.cos(np.radians(item.lat_deg))
             distances = np.hypot((lat - item.lat_deg) * DEGREE_LENGTH_M, east * DEGREE_LENGTH_M)
-            items.append(replace(item, alt=round(float(heights[int(np.argmin(distances))]), 2)))
+            items.append(replace(item, alt=round(float(altitudes[int(np.argmin(distances))]), 2)))
         else:
             items.append(item)
     return replace(mission, items=tuple(items))
@@ -447,8 +454,8 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     """Return the flight as a track on the map around ``origin``.
 
-    Velocities that the log lacks are computed from the positions.  A log without altitudes gets the altitude 0, which
-    no rule reads.
+    Velocities that the log lacks are computed from the positions.  In a log without altitudes, the altitude of the
+    track is 0, and no rule judges it.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

@@ -26,7 +26,7 @@ class LoggedItem(NamedTuple):
     begins_mission: bool = False
 
 
-class LoggedItems(NamedTuple):
+class LoggedItemGroup(NamedTuple):
     """Logged items of one mission.
 
     time: time from which they apply, s.
@@ -39,8 +39,8 @@ class LoggedItems(NamedTuple):
     items: tuple[MissionItem, ...]
 
 
-def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
-    """Combine items, in the order of the log, into missions.
+def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
+    """Combine logged items, in the order of the log, into missions.
 
     An item 0 begins a new mission, even if later items are lost.  A single item that equals an item of the mission is
     logged because it is flown; a single item that differs is an edit, which begins a changed mission.  A mission that
@@ -60,7 +60,7 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
         if (
             not missions
             or begins_mission
-            or (item.seq == 0 and len(missions[-1][1]) > 1 and _begins_mission(following, missions[-1][1]))
+            or (item.seq == 0 and len(missions[-1][1]) > 1 and _starts_new_mission(following, missions[-1][1]))
         ):
             missions.append((time, {}))
         elif item.seq in missions[-1][1] and not _is_same_item(missions[-1][1][item.seq], item):
@@ -69,13 +69,13 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
         if len(totals) < len(missions):
             totals.append(0)
         totals[-1] = total or totals[-1]
-    combined: list[LoggedItems] = []
+    combined: list[LoggedItemGroup] = []
     for (start, items), total in zip(missions, totals, strict=True):
-        logged = LoggedItems(start, total, tuple(items[seq] for seq in sorted(items)))
+        logged = LoggedItemGroup(start, total, tuple(items[seq] for seq in sorted(items)))
         if combined and _is_same_mission(combined[-1], logged):
             previous = combined[-1]
             merged = {item.seq: item for item in (*previous.items, *logged.items)}
-            combined[-1] = LoggedItems(
+            combined[-1] = LoggedItemGroup(
                 previous.time, total or previous.total, tuple(merged[seq] for seq in sorted(merged))
             )
         else:
@@ -83,10 +83,10 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
     return combined
 
 
-def _begins_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
-    """Return True if the item that follows an item 0 shows a new mission.
+def _starts_new_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
+    """Return True if an item 0 starts a new mission, judged by the item that follows it.
 
-    It does if it is item 1, or if it is not in the mission or differs from the mission's item.
+    It does if that item is item 1, is not in the mission so far, or differs from the mission's item.
 
     items: items of the mission so far, by number.
     """
@@ -95,10 +95,11 @@ def _begins_mission(following: MissionItem | None, items: Mapping[int, MissionIt
     return following.seq == 1 or following.seq not in items or not _is_same_item(items[following.seq], following)
 
 
-def _is_same_mission(first: LoggedItems, second: LoggedItems) -> bool:
-    """Return True if two missions are the same: all items are equal, or the announced number and all common items are.
+def _is_same_mission(first: LoggedItemGroup, second: LoggedItemGroup) -> bool:
+    """Return True if two groups of items are the same mission.
 
-    A common item 0, which is home, is not evidence, because it is the same in all missions flown from a place.
+    Either all items are equal, or the announced numbers of items and all common items are.  A common item 0, which is
+    home, is not evidence, because it is the same in all missions flown from a place.
     """
     first_items = {item.seq: item for item in first.items}
     common = [item for item in second.items if item.seq in first_items]
@@ -109,27 +110,31 @@ def _is_same_mission(first: LoggedItems, second: LoggedItems) -> bool:
 
 def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
     """Return True if two items have the same number, command, parameters and position, regardless of their frames."""
-    return _content(first) == _content(second)
+    return _comparison_key(first) == _comparison_key(second)
 
 
-def _content(item: MissionItem) -> tuple[object, ...]:
-    """Return the content by which items are compared; numbers are texts, because an unset number is NaN."""
+def _comparison_key(item: MissionItem) -> tuple[object, ...]:
+    """Return the values by which items are compared.
+
+    Numbers become texts, so that unset numbers (NaN) are equal.
+    """
     return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 
-def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """Make the mission of logged items, with item 0 as home; return None if fewer than two other items remain.
+def make_logged_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
+    """Make a mission from its logged items, with item 0 as home.
 
     An invalid item is left out with a warning.  If items are missing, the mission is the longest run without a gap.
+    Return None for a complete mission with fewer than two items besides home.
 
     source: name of the log.
     origin: name of the log messages with the items.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
-    >>> made = logged_mission(LoggedItems(1.0, 5, tuple(way)), "a.BIN", "CMD").mission
+    >>> made = make_logged_mission(LoggedItemGroup(1.0, 5, tuple(way)), "a.BIN", "CMD").mission
     >>> made.home.lat_deg, [item.seq for item in made.items]
     (46.0, [1, 2])
-    >>> logged_mission(LoggedItems(1.0, 5, tuple(way)), "a.BIN", "CMD").missing.numbers
+    >>> make_logged_mission(LoggedItemGroup(1.0, 5, tuple(way)), "a.BIN", "CMD").missing.numbers
     (3, 4)
     """
     home: Home | None = None
@@ -169,12 +174,13 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
-    """Return a complete mission unchanged, and an incomplete one with only its longest run of items without a gap.
+    """Reduce an incomplete mission to its longest run of items without a gap.
+
+    A complete mission is returned unchanged, or as None if it has fewer than two items; an incomplete mission may have
+    no items left.
 
     total: announced number of items, 0 if unknown.
     end: largest known number of an item; items are numbered from 1.
-
-    Return None for a complete mission of fewer than two items; an incomplete mission may have no items left.
     """
     numbers = {item.seq for item in logged.mission.items}
     missing = tuple(sorted(set(range(1, end + 1)) - numbers))

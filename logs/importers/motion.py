@@ -25,7 +25,7 @@ class Samples:
     """Rows of one kind.
 
     time: increasing times on the log's clock, s, (n,).
-    values: (n, k).
+    values: columns of the rows, (n, k).
     """
 
     time: Floats
@@ -100,12 +100,10 @@ class MotionLog:
 
 
 def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return the first position at which a vehicle stood still; None if it never did.
+    """Return the latitude, longitude and altitude at which a vehicle first stood still, or None.
 
     position: latitude and longitude (deg) and altitude (m), (n, 3).
     velocity: ground velocity, m/s, (n, 3).
-
-    Returns latitude, longitude and altitude.
 
     >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
     >>> first_ground_position(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
@@ -124,7 +122,7 @@ def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, 
 
 
 def sort_samples(time: Floats, values: Floats) -> Samples:
-    """Return rows sorted by time, without rows of a repeated time or with values that are not finite."""
+    """Sort rows by time, and discard rows with a repeated time or with values that are not finite."""
     is_finite = np.isfinite(time) & np.isfinite(values).all(axis=1)
     time, values = time[is_finite], values[is_finite]
     order = np.argsort(time, kind="stable")

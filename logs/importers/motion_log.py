@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.columns.file_names import DATA_SUFFIXES, is_table
+from logs.importers.columns.file_names import DATA_SUFFIXES, is_column_table_name
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.dataflash_log import logged_home, program_and_vehicle
 from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_ground_position, sort_samples
@@ -45,7 +45,7 @@ def read_motion(path: Path) -> MotionLog:
     try:
         if not path.is_file():
             raise LogError(f"{path}: no such file; expected a log (.BIN, .tlog, .ulg or a table of columns)", file=path)
-        if is_table(path) or path.suffix.lower() in DATA_SUFFIXES:
+        if is_column_table_name(path) or path.suffix.lower() in DATA_SUFFIXES:
             require_extra("data-logs", f"{path}: reading {path.suffix.lower()} needs")
             from logs.importers.columns.column_motion import read_column_motion
 
@@ -73,10 +73,12 @@ def read_motion(path: Path) -> MotionLog:
         )
     mapped = MappedFile(path)
     with np.errstate(all="ignore"):
-        return _Dataflash(index_dataflash(mapped.data, _NAMES, mapped.release_memory), str(path), digest).read()
+        return _DataflashMotionReader(
+            index_dataflash(mapped.data, _NAMES, mapped.release_memory), str(path), digest
+        ).read()
 
 
-class _Dataflash:
+class _DataflashMotionReader:
     """Reader of the motion in one ArduPilot dataflash log."""
 
     def __init__(self, index: Dataflash, source: str, digest: str) -> None:
@@ -87,29 +89,29 @@ class _Dataflash:
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
         program, vehicle = program_and_vehicle(texts, self._index.messages("VER"))
-        velocity = self._first((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
-        inertial = self._first((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
+        velocity = self._first_samples((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
+        inertial = self._first_samples((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
         return MotionLog(
             source=self._source,
             sha256=self._digest,
             program=program,
             vehicle=vehicle,
             inertial=inertial,
-            outputs=self._first((("RCOU", tuple(f"C{k}" for k in range(1, OUTPUTS + 1))),)),
-            attitude=self._first((("ATT", ("Roll", "Pitch", "Yaw")),), _DEGREE),
+            outputs=self._first_samples((("RCOU", tuple(f"C{k}" for k in range(1, OUTPUTS + 1))),)),
+            attitude=self._first_samples((("ATT", ("Roll", "Pitch", "Yaw")),), _DEGREE),
             velocity=velocity,
-            wind=self._first((name, ("VWN", "VWE")) for name in ("XKF2", "NKF2")),
+            wind=self._first_samples((name, ("VWN", "VWE")) for name in ("XKF2", "NKF2")),
             airspeed=self._airspeed(),
-            ratio=self._first((("CTUN", ("E2T",)),)),
-            height=self._first((("POS", ("Alt",)),)),
-            battery=self._first((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
+            ratio=self._first_samples((("CTUN", ("E2T",)),)),
+            height=self._first_samples((("POS", ("Alt",)),)),
+            battery=self._first_samples((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
             modes=tuple(self._modes()),
             parameters=self._parameters(),
             home=self._home(velocity),
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return the messages of a name; of several sensors or estimators only the first."""
+        """Return the messages of a name; if several sensors or estimators send them, only those of the first."""
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
@@ -117,10 +119,12 @@ class _Dataflash:
                 messages = messages.select(number == number.min()) if number.dtype.kind in "ui" else messages
         return messages
 
-    def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
-        """Return the columns of the first choice of message and columns that the log has, times `scale`.
+    def _first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
+        """Return the fields of the first of several messages that the log has, times `scale`.
 
-        There are no rows if the log has none of them.  Missing outputs of RCOU are 0.
+        There are no rows if the log has none of the messages.  Servo outputs that RCOU lacks are 0.
+
+        choices: name of a message and its fields.
         """
         for name, columns in choices:
             messages = self._messages(name)
@@ -144,7 +148,7 @@ class _Dataflash:
         return sort_samples(messages.column("TimeUS")[is_used] * 1e-6, messages.column("Airspeed")[is_used, np.newaxis])
 
     def _modes(self) -> list[tuple[float, int]]:
-        """Return the time (s) and the number of each mode change; [] for logs with modes by name."""
+        """Return the time (s) and the number of each mode change; [] for a log that states modes by name."""
         messages = self._messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has("TimeUS", column) or messages.rows.dtype[column].kind == "S":
@@ -162,8 +166,8 @@ class _Dataflash:
         return {name: value for name, value in values if math.isfinite(value)}
 
     def _home(self, velocity: Samples) -> tuple[float, float, float] | None:
-        """Return latitude, longitude (deg) and altitude (m) of home: as logged, or else the first position at rest."""
+        """Return latitude (deg), longitude (deg) and altitude (m) of home, or of the first position at rest."""
         home = logged_home(self._index.messages("ORGN"))
         if home is not None:
             return home.lat_deg, home.lon_deg, home.alt
-        return first_ground_position(self._first((("POS", ("Lat", "Lng", "Alt")),)), velocity)
+        return first_ground_position(self._first_samples((("POS", ("Lat", "Lng", "Alt")),)), velocity)

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from logs.importers.columns.file_names import DATA_SUFFIXES, TABLE_SUFFIX, is_table
+from logs.importers.columns.file_names import DATA_SUFFIXES, TABLE_SUFFIX, is_column_table_name
 from world.address_space import AddressSpaceError
 from world.errors import LogError
 from world.extras import require_extra
@@ -73,7 +73,7 @@ def is_imported_log(path: Path) -> bool:
 
 def _suffix(path: Path) -> str:
     """Return the suffix of a file in lower case, or `TABLE_SUFFIX` for a table of columns."""
-    return TABLE_SUFFIX if is_table(path) else path.suffix.lower()
+    return TABLE_SUFFIX if is_column_table_name(path) else path.suffix.lower()
 
 
 def open_log(path: Path) -> "RawLog":
@@ -95,7 +95,7 @@ def open_log(path: Path) -> "RawLog":
             head = file.read(_HEAD)
         if not head:
             raise LogError(f"{path}: empty; expected a log", file=path)
-        log_type = log_format(path, head)
+        log_type = detect_log_format(path, head)
         if log_type.extra:
             require_extra(log_type.extra, f"{path}: reading {_suffix(path)} needs")
         module, function = log_type.reader.rsplit(".", 1)
@@ -111,12 +111,13 @@ def open_log(path: Path) -> "RawLog":
         raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
 
 
-def log_format(path: Path, head: bytes) -> LogFormat:
-    """Return the format that fits a file's first bytes and suffix, or else the first bytes, or else the suffix.
+def detect_log_format(path: Path, head: bytes) -> LogFormat:
+    """Return the format of a log, detected by the first bytes and the suffix of its file.
 
-    Raises LogError if neither is known, and for a dataflash log that was converted to text.
+    If both contradict each other, the first bytes decide.  Raises LogError if neither is known, and for a dataflash log
+    that was converted to text.
 
-    >>> log_format(Path("flight.igc"), b"<gpx>").name, log_format(Path("a.BIN"), bytes(9)).name
+    >>> detect_log_format(Path("flight.igc"), b"<gpx>").name, detect_log_format(Path("a.BIN"), bytes(9)).name
     ('.gpx', 'ArduPilot .BIN')
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):

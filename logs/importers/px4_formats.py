@@ -42,18 +42,24 @@ class MessageFormats:
         4
         """
         name, _, fields = text.partition(":")
-        self._formats[name] = list(_types(fields))
+        self._formats[name] = list(_field_types(fields))
         self._counts.clear()
 
     def add_topic(self, name: str) -> None:
-        """Add a topic with the format of this name.  Raises LogError if the log then has too many fields."""
+        """Add a topic with the format of this name.
+
+        Raises LogError if the topics of the log then have more than `MAX_FIELDS` fields.
+        """
         self._total += self.count_fields(name)
         if self._total > MAX_FIELDS:
             reason = f"the formats of its messages have more than {MAX_FIELDS:,} fields"
             raise LogError(f"{self._source}: not a readable PX4 log: {reason}", file=self._source)
 
     def count_fields(self, name: str) -> int:
-        """Return the number of fields of a format, including nested formats; above `MAX_FIELDS` if it is recursive."""
+        """Return the number of fields of a format, including nested formats.
+
+        The number is above `MAX_FIELDS` for a format that contains itself.
+        """
         return self._count(name, frozenset())
 
     def _count(self, name: str, outer_names: frozenset[str]) -> int:
@@ -72,7 +78,7 @@ class MessageFormats:
         return self._counts[name]
 
 
-def _types(fields: str) -> Iterator[tuple[str, int]]:
+def _field_types(fields: str) -> Iterator[tuple[str, int]]:
     """Yield the type of each field, and its number of elements: 1, or the length of an array."""
     for field in fields.split(";"):
         if match := _FIELD.match(field):

@@ -74,7 +74,7 @@ _MAX_ITEMS = 65_535
 
 def read_px4(path: Path) -> RawLog:
     """Read a PX4 log.  Raises LogError for a log that pyulog cannot read, and for a log without positions."""
-    return open_topics(path, _TOPICS).log()
+    return open_topics(path, _TOPICS).to_raw_log()
 
 
 def open_topics(path: Path, names: list[str]) -> "Topics":
@@ -82,17 +82,17 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     try:
         # pyulog prints errors on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            log = ULog(_CountingFile(file, str(path)), names, disable_str_exceptions=True)
+            log = ULog(_FormatCheckingFile(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
         raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
-        raise LogError(f"{path}: not a readable PX4 log: {_one_line(error)}", file=path) from error
+        raise LogError(f"{path}: not a readable PX4 log: {_short_message(error)}", file=path) from error
     return Topics(log, str(path), _damage_of(path))
 
 
-class _CountingFile:
+class _FormatCheckingFile:
     """File for pyulog that checks the formats, and that corrects pyulog's backward seeks after short reads.
 
     pyulog steps back by the stated length of a record even if fewer bytes were read, and would read the end of a
@@ -130,7 +130,9 @@ class _CountingFile:
 
 
 def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) -> Damage:
-    """Find the damage of a log: bytes at which no record with a known letter begins, and a cut last record.
+    """Find the damage of a PX4 log.
+
+    Bytes at which no record with a known letter begins are damaged, and the last record may be cut.
 
     data: bytes of the log, (n,).
 
@@ -146,6 +148,7 @@ def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) 
 
 
 def _damage_of(path: Path) -> Damage:
+    """Return the damage of a log file."""
     file = MappedFile(path)
     return find_damage(file.data, file.release_memory)
 
@@ -165,7 +168,9 @@ _IS_CUT = 4
 
 @compiled
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
-    """Walk over the records up to byte ``stop``: continue from ``state``, and update it.
+    """Walk over the records up to byte ``stop``, and count damaged places and lost bytes.
+
+    The walk continues from ``state``, and updates it.
 
     letters: letters of all kinds of records.
     """
@@ -204,13 +209,17 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
     )
 
 
-def _one_line(error: Exception) -> str:
+def _short_message(error: Exception) -> str:
     """Return the first 120 characters of an error's message in one line, or the name of its type."""
     return " ".join(str(error).split())[:120] or type(error).__name__
 
 
-def _table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """Return the first choice of fields that one instance of a topic has, as columns; None if it has none."""
+def _instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
+    """Return fields of one instance of a topic as columns; None if it lacks them.
+
+    data: values of the instance by field.
+    choices: alternative groups of fields; the first group that the instance has is returned.
+    """
     for columns in choices:
         if data and all(column in data for column in columns):
             values = np.stack([np.asarray(data[column], dtype=np.float64) for column in columns], axis=1)
@@ -229,7 +238,7 @@ class Topics:
                 self._instances.setdefault(data.name, []).append(data.data)
         self._data = {name: instances[0] for name, instances in self._instances.items()}
 
-    def log(self) -> RawLog:
+    def to_raw_log(self) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
         series = {name: values for name, values in self._series() if values is not None and len(values.time)}
         if "position" not in series:
@@ -258,8 +267,11 @@ class Topics:
         return self._source
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
-        """Return the first choice of fields that a topic has, as columns; None if it has none."""
-        return _table(topic, self._data.get(topic, {}), choices)
+        """Return fields of a topic as columns; None if the log lacks them.
+
+        choices: alternative groups of fields; the first group that the topic has is returned.
+        """
+        return _instance_table(topic, self._data.get(topic, {}), choices)
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
@@ -270,11 +282,11 @@ class Topics:
         yield "airspeed", self._airspeed()
         winds = (self.table(topic, ("windspeed_east", "windspeed_north")) for topic in WIND_TOPICS)
         yield "wind", next((wind for wind in winds if wind is not None and np.any(wind.values)), None)
-        yield "battery", self._battery()
+        yield "battery", self._battery_with_energy()
         yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
     def _gps(self) -> LogSeries | None:
-        """Return the positions of GPS: latitude, longitude (deg) and altitude (m AMSL), (n, 3); None if not logged."""
+        """Return latitude (deg), longitude (deg) and altitude (m AMSL) of GPS, (n, 3); None if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             position = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
             if position is not None:
@@ -317,7 +329,7 @@ class Topics:
         return None
 
     def battery(self) -> LogSeries | None:
-        """Return the mean voltage, V, of all connected batteries, and the sum of their currents, A; (n, 2).
+        """Return the mean voltage (V) of all connected batteries and the sum of their currents (A), (n, 2).
 
         Return None for a log without batteries, or if the current of a connected battery was not measured.  Only
         measurements of the same kind (`source`) as for the first battery are used, because another kind, such as by
@@ -325,7 +337,7 @@ class Topics:
         """
         connected_batteries = []
         for data in self._instances.get("battery_status", []):
-            status = _table("battery_status", data, (("voltage_v", "current_a"),))
+            status = _instance_table("battery_status", data, (("voltage_v", "current_a"),))
             if status is None or ("connected" in data and not np.any(data["connected"])):
                 continue
             kind = float(data["source"][0]) if "source" in data else 0.0
@@ -343,8 +355,8 @@ class Topics:
         )
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
 
-    def _battery(self) -> LogSeries | None:
-        """Return the current, A, and the energy used, Wh, (n, 2); None if the current is unknown."""
+    def _battery_with_energy(self) -> LogSeries | None:
+        """Return the battery current (A) and the energy used (Wh), (n, 2); None if the current is unknown."""
         battery = self.battery()
         return None if battery is None else with_used_energy(battery)
 
@@ -382,7 +394,10 @@ class Topics:
         return "unknown"
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Yield the mission of the items that became current, if any; mission_result states the number of all items."""
+        """Yield the mission, made of the items that became current; its length is from mission_result.
+
+        None is yielded if the log has neither.
+        """
         items = self._items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
         total = self._mission_length(float(stamps[-1]) if items else math.inf)
@@ -396,7 +411,7 @@ class Topics:
             yield gapless_mission
 
     def _items(self) -> dict[int, MissionItem]:
-        """Return the valid items by their number from 0; items that were never current are not in the log."""
+        """Return the valid items that became current, by their number from 0; other items are not in the log."""
         data = self._data.get("navigator_mission_item", {})
         columns = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
         items: dict[int, MissionItem] = {}
@@ -457,7 +472,7 @@ class Topics:
         return name
 
     def _utc_start(self) -> float:
-        """Return the time 0 of the log's clock, s since 1970, by the first GPS time; NaN if not logged."""
+        """Return time 0 of the log's clock as given by the first GPS time, s since 1970; NaN if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             data = self._data.get(topic, {})
             if "time_utc_usec" in data:

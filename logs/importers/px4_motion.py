@@ -121,16 +121,19 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
-    """Return the fields of a topic, sorted by time: the first of several choices that the topic has.
+    """Return fields of a topic, sorted by time: the first of several choices that the topic has.
 
-    There are no rows if the topic has none of them.
+    There are no rows if the topic has none of the choices.
     """
     table = topics.table(topic, *choices)
     return NO_SAMPLES if table is None else sort_samples(table.time, table.values)
 
 
 def _inertial(topics: Topics) -> Samples:
-    """Return specific force (m/s²) and angular rates (rad/s), (n, 6), from the sensors or from two filtered topics."""
+    """Return specific force (m/s²) and angular rates (rad/s), (n, 6).
+
+    They come from the inertial sensors, or else from the two topics with filtered values.
+    """
     force, rates = tuple(f"accelerometer_m_s2[{k}]" for k in range(3)), tuple(f"gyro_rad[{k}]" for k in range(3))
     samples = _samples(topics, "sensor_combined", force + rates)
     if len(samples.time):
@@ -196,7 +199,7 @@ def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
 
 
 def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
-    """Return pitch, roll and yaw as fractions of travel, and throttle, (n, 4), and True if there are elevons.
+    """Return pitch, roll, yaw (fractions of travel) and throttle, (n, 4), and True if there are elevons.
 
     The deflection of a surface is positive up or to the right.  The torque scales of a surface (CA_SV_CSn_TRQ_*) state
     its effect on each axis; the deflection of an axis is the mean of the surfaces, weighted by these scales.  Raises
@@ -214,7 +217,9 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
         return Samples(mixer_inputs.time, mixer_inputs.values[:, [1, 0, 2, 3]]), False
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
     if airframe not in (_WING, _STANDARD_VTOL):
-        raise _refusal(topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}: expected a plane")
+        raise _parameter_error(
+            topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}; expected a plane"
+        )
     scales = np.zeros((3, _SERVOS))
     has_elevons = False
     for k in range(int(np.clip(parameters.get("CA_SV_CS_COUNT", 0.0), 0.0, _SERVOS))):
@@ -227,10 +232,10 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
             has_elevons = has_elevons or kind in _ELEVONS
             servos.values[:, k] -= parameters.get(f"CA_SV_CS{k}_TRIM", 0.0)
         elif kind in _MIXED:
-            raise _refusal(topics, f"CA_SV_CS{k}_TYPE", kind, f"{_MIXED[kind]}: its mix is not modelled")
+            raise _parameter_error(topics, f"CA_SV_CS{k}_TYPE", kind, f"{_MIXED[kind]}, whose mix is not modelled")
         elif kind in _FLAPS and moves:
-            message = f"{_FLAPS[kind]} moves in flight, and no model is estimated for that"
-            raise _refusal(topics, f"CA_SV_CS{k}_TYPE", kind, message)
+            message = f"the {_FLAPS[kind]} moves in flight, which the model does not represent"
+            raise _parameter_error(topics, f"CA_SV_CS{k}_TYPE", kind, message)
     for axis, row in zip(("elevator", "aileron"), scales, strict=False):
         if not row.any():
             allowed = "expected CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R"
@@ -256,7 +261,7 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
         ahead = [k for k, (x, z) in enumerate(axes) if x > z]
         if not ahead:
             allowed = "expected one with |CA_ROTORn_AX| above |CA_ROTORn_AZ|"
-            raise _refusal(topics, "CA_ROTOR_COUNT", count, f"of rotors of which none pushes forward; {allowed}")
+            raise _parameter_error(topics, "CA_ROTOR_COUNT", count, f"no rotor pushes forward; {allowed}")
         return ahead
     return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
 
@@ -267,8 +272,8 @@ def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: in
         deflection_ratio = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
         setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
         if len(setpoints) and abs(deflection_ratio) * float(np.ptp(setpoints)) > _FLAP_MOVE_TOLERANCE:
-            message = f"of a surface that {title} move in flight, and no model is estimated for that"
-            raise _refusal(topics, f"CA_SV_CS{surface}_{name}", deflection_ratio, message)
+            message = f"{title} deflect this surface in flight, which the model does not represent"
+            raise _parameter_error(topics, f"CA_SV_CS{surface}_{name}", deflection_ratio, message)
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
@@ -282,7 +287,7 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 
 def _is_armed(topics: Topics, time: Floats) -> Flags:
-    """Return for each time whether the vehicle was armed, (n,); all True if the log does not say."""
+    """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not say."""
     states = _samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)
@@ -290,6 +295,9 @@ def _is_armed(topics: Topics, time: Floats) -> Flags:
     return np.asarray(states.values[rows, 0] == _ARMED)
 
 
-def _refusal(topics: Topics, field: str, value: float, message: str) -> LogError:
-    """Return the error for a parameter of surfaces that cannot be modelled.  message: clause after "NAME VALUE is"."""
-    return LogError(f"{topics.source}: {field} {value:g} is {message}", file=topics.source, field=field, value=value)
+def _parameter_error(topics: Topics, field: str, value: float, message: str) -> LogError:
+    """Return the error for a parameter of surfaces or motors that cannot be modelled.
+
+    message: reason, shown after name and value.
+    """
+    return LogError(f"{topics.source}: {field} {value:g}: {message}", file=topics.source, field=field, value=value)

@@ -46,9 +46,9 @@ class LogSeries:
 
 
 def with_used_energy(battery: LogSeries) -> LogSeries:
-    """Return the current, A, and the energy used, Wh, (n, 2), computed from the battery's voltage and current.
+    """Return the battery's current (A) and the energy used (Wh), (n, 2).
 
-    battery: voltage, V, and current, A, (n, 2).
+    battery: voltage (V) and current (A), (n, 2), from which the energy is computed.
 
     >>> battery = LogSeries("BAT", np.array([0.0, 1.0, 2.0]), np.array([[36.0, 0.0], [36.0, 100.0], [36.0, 100.0]]))
     >>> with_used_energy(battery).values.tolist()
@@ -163,7 +163,7 @@ EXAMPLE_TAIL_S = 2.0
 
 
 def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALTITUDE_M) -> RawLog:
-    """Make a log of a flight that leads 1 km north and then 1 km east, with a sharp corner.
+    """Make a log of a flight that leads 1 km north and then 1 km east, with a sharp corner, for examples.
 
     lat, lon, up: start of the flight, deg and m AMSL.
 

@@ -22,9 +22,9 @@ from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile
 from logs.importers.logged_missions import (
     LoggedItem,
-    LoggedItems,
+    LoggedItemGroup,
     combine_items,
-    logged_mission,
+    make_logged_mission,
     plane_mode,
     px4_items,
     px4_mode,
@@ -218,10 +218,10 @@ class SystemMessages:
         return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
 
     def named(self, name: str) -> list[tuple[int, Any]]:
-        """Return the messages of a kind that is not in `NUMBERS`, each with its number among all messages."""
+        """Return the messages of a kind that is not in `NUMBERS`, each with its index among all messages."""
         return self._named.get(name, [])
 
-    def boot_times(self) -> BootClock:
+    def boot_clock(self) -> BootClock:
         """Return the clock of the vehicle, with the time of each message.
 
         A message without its own time gets the time of the message before it, plus the time between their receptions.
@@ -285,7 +285,7 @@ _MISSION_TYPE = 0
 def read_telemetry(path: Path) -> RawLog:
     """Read a telemetry log.  Raises LogError for a log without positions or without a vehicle."""
     messages, damage = vehicle_messages(path)
-    return messages.log(damage)
+    return messages.to_raw_log(damage)
 
 
 def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
@@ -323,7 +323,7 @@ class VehicleMessages:
     def __init__(self, messages: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
         """Take the vehicle's messages, and the messages on missions with their times of reception, s since 1970."""
         self._source, self._found = source, messages
-        clock = messages.boot_times()
+        clock = messages.boot_clock()
         self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
         # Missions are sent to the vehicle: their messages come from the station.
         self._items = [(stamp - self._offset, message) for stamp, message in items]
@@ -331,7 +331,7 @@ class VehicleMessages:
             name: [(float(self._times[k]), message) for k, message in messages.named(name)] for name in _KEPT_MESSAGES
         }
 
-    def log(self, damage: Damage) -> RawLog:
+    def to_raw_log(self, damage: Damage) -> RawLog:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
         series = {name: log_series for name, log_series in self._series() if log_series is not None}
         heartbeats = [message for _, message in self._own.get("HEARTBEAT", []) if _is_vehicle(message)]
@@ -382,21 +382,25 @@ class VehicleMessages:
             yield "position", LogSeries(positions.source, positions.time, scaled[:, :3])
             yield "velocity", LogSeries(positions.source, positions.time, scaled[:, 3:])
         else:
-            yield "position", self._gps_place()
+            yield "position", self._gps_position()
         yield "attitude", self.table("ATTITUDE", ("roll", "pitch", "yaw"))
         yield "wind", self._wind()
         hud = self.table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
         if hud is not None:
-            # Where there is no sensor some send the ground speed.
+            # Some vehicles without an airspeed sensor send the ground speed instead.
             sensed = np.any(hud.values[:, 0] > 0.0) and not np.array_equal(hud.values[:, 0], hud.values[:, 3])
             if sensed:
                 up = np.clip(hud.values[:, 1], -500.0, 20_000.0)
                 ratio = np.array([true_by_equivalent(float(height)) for height in up])
                 yield "airspeed", LogSeries("VFR_HUD", hud.time, hud.values[:, :1] * ratio[:, None])
             yield "throttle", LogSeries("VFR_HUD", hud.time, hud.values[:, 2:3] * 0.01)
-        yield "battery", self._battery()
+        yield "battery", self._battery_with_energy()
 
-    def _gps_place(self) -> LogSeries | None:
+    def _gps_position(self) -> LogSeries | None:
+        """Return the positions of GPS with a 3-D fix; None without a fix.
+
+        They are latitude (deg), longitude (deg) and altitude (m), (n, 3).
+        """
         table = self.table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
         if table is None:
             return None
@@ -416,9 +420,9 @@ class VehicleMessages:
         wind = self.table("WIND_COV", ("wind_y", "wind_x"))
         return wind if wind is not None and np.any(wind.values) else None
 
-    def _battery(self) -> LogSeries | None:
-        """Return the battery's current, A, and the energy used, Wh, (n, 2); None if neither was measured."""
-        table = self._measured("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+    def _battery_with_energy(self) -> LogSeries | None:
+        """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""
+        table = self._measured_table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
         if table is not None and np.any(table.values[:, 1] > 0.0):
             current = np.maximum(table.values[:, 0] * 0.01, 0.0)
             return LogSeries(table.source, table.time, np.stack([current, table.values[:, 1] / 36.0], axis=1))
@@ -426,14 +430,14 @@ class VehicleMessages:
         return None if battery is None else with_used_energy(battery)
 
     def battery(self) -> LogSeries | None:
-        """Return the battery's voltage, V, and current, A, (n, 2); None if the current was not measured."""
-        table = self._measured("SYS_STATUS", ("voltage_battery", "current_battery"))
+        """Return the battery's voltage (V) and current (A), (n, 2); None if the current was not measured."""
+        table = self._measured_table("SYS_STATUS", ("voltage_battery", "current_battery"))
         if table is None or not np.any(table.values[:, 1] > 0.0):
             return None
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
-    def _measured(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return columns of a battery message, without rows that have a value marked as not measured."""
+    def _measured_table(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
+        """Return columns of a battery message, only with measured values; None if no row has them."""
         table = self.table(name, columns)
         if table is None:
             return None
@@ -442,7 +446,7 @@ class VehicleMessages:
 
     def _heights(self) -> Iterable[HeightSource]:
         """Yield the altitudes that the log has in addition to the altitude of the position."""
-        gps = self._gps_place()
+        gps = self._gps_position()
         if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         hud = self.table("VFR_HUD", ("alt",))
@@ -471,15 +475,17 @@ class VehicleMessages:
             if kind == "MISSION_COUNT":
                 total, begins_mission = message.count, True
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-                rows.append(LoggedItem(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
+                rows.append(
+                    LoggedItem(time, total, _parse_item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission)
+                )
                 begins_mission = False
         for logged in combine_items(rows):
-            mission = (_px4_mission if self.is_px4 else logged_mission)(logged, self._source, "mission items")
+            mission = (_px4_mission if self.is_px4 else make_logged_mission)(logged, self._source, "mission items")
             if mission is not None:
                 yield replace(mission, mission=self._with_home(mission.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
-        """Return a mission with the home that the vehicle last reported; unchanged if it reported none.
+        """Return a mission with the home that the vehicle reported last; unchanged if it reported none.
 
         The home of an uploaded mission is only the station's assumption.
         """
@@ -502,7 +508,7 @@ class VehicleMessages:
         return any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"] if _is_vehicle(heartbeat))
 
     def _parameters(self) -> dict[str, float]:
-        """Return the last value of each parameter that the vehicle sent."""
+        """Return the last finite value of each parameter that the vehicle sent."""
         values: dict[str, float] = {}
         for _, message in self._own.get("PARAM_VALUE", []):
             name = _text(message.param_id)
@@ -525,8 +531,11 @@ def _text(value: str | bytes) -> str:
     return text.partition("\0")[0].strip()
 
 
-def _item(message: Any, *, scaled: bool) -> MissionItem:
-    """Return the item of a mission message.  scaled: True if its coordinates are integers of 1e-7 degrees."""
+def _parse_item(message: Any, *, scaled: bool) -> MissionItem:
+    """Return the item of a mission message.
+
+    scaled: True if its coordinates are integers of 1e-7 degrees.
+    """
     command, frame = int(message.command), int(message.frame)
     lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
     params = (float(message.param1), float(message.param2), float(message.param3), float(message.param4))
@@ -535,8 +544,8 @@ def _item(message: Any, *, scaled: bool) -> MissionItem:
     )
 
 
-def _px4_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission of PX4 items, which are numbered from 0 and contain no home; None if it cannot be used."""
+def _px4_mission(logged: LoggedItemGroup, source: str, origin: str) -> LoggedMission | None:
+    """Make a mission of PX4 items, which are numbered from 0 and contain no home; None if it is too short."""
     mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

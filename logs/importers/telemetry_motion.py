@@ -31,14 +31,14 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     if messages.is_px4:
         advice = "a .ulg of the same flight does"
         raise LogError(f"{path}: telemetry of PX4 does not state what its outputs move; {advice}", file=path)
-    raw = messages.log(damage)
-    velocity = _reordered(raw.series.get("velocity"), [1, 0, 2], [1.0, 1.0, -1.0])
-    attitude = _reordered(raw.series.get("attitude"), [0, 1, 2])
+    raw = messages.to_raw_log(damage)
+    velocity = _select_columns(raw.series.get("velocity"), [1, 0, 2], [1.0, 1.0, -1.0])
+    attitude = _select_columns(raw.series.get("attitude"), [0, 1, 2])
     position = raw.series["position"]
     true_airspeed = raw.series.get("airspeed")
-    wind = _reordered(raw.series.get("wind"), [1, 0])
+    wind = _select_columns(raw.series.get("wind"), [1, 0])
     if not len(wind.time):
-        wind = estimate_wind(velocity, attitude, _reordered(true_airspeed, [0]))
+        wind = estimate_wind(velocity, attitude, _select_columns(true_airspeed, [0]))
     return MotionLog(
         source=str(path),
         sha256=digest,
@@ -49,25 +49,27 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
         attitude=attitude,
         velocity=velocity,
         wind=wind,
-        airspeed=NO_SAMPLES if true_airspeed is None else _reordered(messages.table("VFR_HUD", ("airspeed",)), [0]),
+        airspeed=NO_SAMPLES
+        if true_airspeed is None
+        else _select_columns(messages.table("VFR_HUD", ("airspeed",)), [0]),
         ratio=NO_SAMPLES,
-        height=_reordered(position, [2]),
-        battery=_reordered(messages.battery(), [0, 1]),
+        height=_select_columns(position, [2]),
+        battery=_select_columns(messages.battery(), [0, 1]),
         modes=tuple(messages.mode_numbers()),
         parameters=raw.parameters,
-        home=first_ground_position(_reordered(position, [0, 1, 2]), velocity),
+        home=first_ground_position(_select_columns(position, [0, 1, 2]), velocity),
         program_kind="telemetry",
     )
 
 
-def _reordered(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
-    """Return columns of a series in the given order, times their factors; no rows without a series."""
+def _select_columns(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
+    """Return columns of a series, sorted by time, each times its factor; no rows without a series."""
     if series is None:
         return NO_SAMPLES
     return sort_samples(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
 
 
-def _own_times(time: Floats, microseconds: Floats) -> Floats:
+def _message_times(time: Floats, microseconds: Floats) -> Floats:
     """Return the times at which messages were made, instead of the times of their reception, s, (n,).
 
     time: times of reception on the vehicle's clock, s, (n,).
@@ -75,7 +77,7 @@ def _own_times(time: Floats, microseconds: Floats) -> Floats:
 
     The time of reception remains if both times differ too much.
 
-    >>> _own_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
+    >>> _message_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
     [4300.067, 4300.167]
     """
     own_time = microseconds * 1e-6
@@ -89,7 +91,7 @@ def _inertial(messages: VehicleMessages) -> Samples:
     if table is None:
         return NO_SAMPLES
     units = np.repeat([_STANDARD_GRAVITY_MPS2 * 1e-3, 1e-3], 3)
-    return sort_samples(_own_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
+    return sort_samples(_message_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
 
 
 def _outputs(messages: VehicleMessages) -> Samples:
@@ -99,5 +101,5 @@ def _outputs(messages: VehicleMessages) -> Samples:
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
     is_first_port = table.values[:, 1] == 0.0
-    times = _own_times(table.time[is_first_port], table.values[is_first_port, 0])
+    times = _message_times(table.time[is_first_port], table.values[is_first_port, 0])
     return sort_samples(times, table.values[is_first_port, 2:])

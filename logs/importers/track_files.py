@@ -37,7 +37,7 @@ _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 def track_text(path: Path, *, xml: bool) -> str:
-    """Return the text of a track file; bytes that are not UTF-8 are replaced.
+    """Read the text of a track file; bytes that are not UTF-8 are replaced.
 
     In a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
     XML with a document type.
@@ -56,7 +56,10 @@ def track_text(path: Path, *, xml: bool) -> str:
 
 
 def _read_bytes(path: Path) -> bytes:
-    """Return the bytes of a file, or of the first `.kml` in an archive.  Raises LogError for an unreadable archive."""
+    """Return the bytes of a file, or of the first `.kml` in a zipped file.
+
+    Raises LogError for a zipped file that cannot be read, or that contains no `.kml`.
+    """
     if not zipfile.is_zipfile(path):
         return path.read_bytes()
     try:
@@ -78,8 +81,11 @@ def _read_bytes(path: Path) -> bytes:
     return data
 
 
-def _earliest(stamps: NDArray[np.float64]) -> float:
-    """Return the earliest of a track's times, s, without damaged times far from the median.  stamps: s, (n,)."""
+def _earliest_time(stamps: NDArray[np.float64]) -> float:
+    """Return the earliest of a track's times, s, ignoring damaged times far from the median.
+
+    stamps: times, s, (n,).
+    """
     # Take a time of the track as the median: the mean of two times may be near neither.
     middle = np.sort(stamps)[stamps.size // 2]
     return float(stamps[np.abs(stamps - middle) < MAX_TIME_S].min())
@@ -107,7 +113,7 @@ def read_gpx(path: Path) -> RawLog:
     # Times without a zone are UTC, the zone of all times in the format.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])
-    start = _earliest(stamps)
+    start = _earliest_time(stamps)
     up = [math.nan if point.elevation is None else point.elevation for point in timed]
     values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
     return RawLog(
@@ -129,7 +135,7 @@ def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
     """Return the routes of a GPX file with at least two points as missions."""
     missions = []
     for route in gpx.routes:
-        heights = all(point.elevation is not None for point in route.points)
+        has_altitudes = all(point.elevation is not None for point in route.points)
         items = tuple(
             MissionItem(
                 number,
@@ -144,7 +150,7 @@ def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
         )
         if len(items) > 1:
             mission = Mission(None, items, source=f"{source}: route {route.name or ''}".rstrip())
-            missions.append(LoggedMission(0.0, mission, "route", heights))
+            missions.append(LoggedMission(0.0, mission, "route", has_altitudes))
     return missions
 
 
@@ -259,7 +265,10 @@ def _recorder(lines: list[str]) -> str:
 
 
 def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
-    """Return the declared task as a mission, without take-off and landing; () for fewer than two turn points."""
+    """Return the declared task as a mission, or () if it has fewer than two turn points.
+
+    If it has more than three points, the first and the last, the take-off and the landing, are left out.
+    """
     points = []
     for line in lines:
         match = _TASK_POINT.match(line)
@@ -293,32 +302,35 @@ KML = "KML track"
 
 
 def read_kml(path: Path) -> RawLog:
-    """Read all tracks of a KML file as one.  Raises LogError for a file with fewer than two positions with a time."""
+    """Read all tracks of a KML file as one flight.
+
+    Raises LogError for a file with fewer than two positions with a time.
+    """
     try:
         root = ElementTree.fromstring(track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
         raise LogError(f"{path}: not a readable KML file: {' '.join(str(error).split())[:120]}", file=path) from error
     rows, unreadable, mode = [], 0, "clampToGround"
     for track in root.iter():
-        if _name(track) != "Track":
+        if _local_name(track) != "Track":
             continue
-        mode = next((str(child.text).strip() for child in track if _name(child) == "altitudeMode"), mode)
-        pairs, unpaired_count = _pairs(track, path)
+        mode = next((str(child.text).strip() for child in track if _local_name(child) == "altitudeMode"), mode)
+        pairs, unpaired_count = _time_position_pairs(track, path)
         unreadable += unpaired_count
         for when, coord in pairs:
-            row = _row(when, coord)
+            row = _parse_position(when, coord)
             if row is None:
                 unreadable += 1
             else:
                 rows.append(row)
     if len(rows) < 2:
-        lines = sum(_name(element) == "LineString" for element in root.iter())
+        lines = sum(_local_name(element) == "LineString" for element in root.iter())
         reason = f"; its {lines} lines have no times" if lines else ""
         raise LogError(
             f"{path}: only {len(rows)} position(s) with a time (gx:Track); at least 2 are needed{reason}", file=path
         )
     table = np.array(rows)
-    start = _earliest(table[:, 0])
+    start = _earliest_time(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
     return RawLog(
         source=str(path),
@@ -334,18 +346,18 @@ def read_kml(path: Path) -> RawLog:
     )
 
 
-def _name(element: ElementTree.Element) -> str:
+def _local_name(element: ElementTree.Element) -> str:
     """Return the name of an element without its namespace, which may be Google's, OGC's or none."""
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
-def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Return pairs of a time and a position as texts, and the number of unpaired elements.
+def _time_position_pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
+    """Return the pairs of time and position of a track as texts, and the number of unpaired elements.
 
     Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
     of times and positions differ in the first case.
     """
-    elements = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
+    elements = [(_local_name(child), child.text or "") for child in track if _local_name(child) in ("when", "coord")]
     times = [text for name, text in elements if name == "when"]
     positions = [text for name, text in elements if name == "coord"]
     last_time = max((k for k, (name, _) in enumerate(elements) if name == "when"), default=-1)
@@ -365,8 +377,13 @@ def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]
     return pairs, len(elements) - 2 * len(pairs)
 
 
-def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
-    """Return time since 1970 (s), latitude and longitude (deg) and altitude (m; NaN if missing); None if invalid."""
+def _parse_position(when: str, coord: str) -> tuple[float, float, float, float] | None:
+    """Return time since 1970 (s), latitude (deg), longitude (deg) and altitude (m); None if invalid.
+
+    The altitude is NaN if it is missing.
+
+    when, coord: texts of the time and of the position in a KML track.
+    """
     parts = coord.replace(",", " ").split()
     try:
         time = datetime.fromisoformat(when.strip().replace("Z", "+00:00"))

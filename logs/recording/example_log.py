@@ -35,7 +35,7 @@ _SCENARIO = {
 def example_log() -> FlightLog:
     """Return a log of two legs over level ground in calm air, flown exactly along them at 25 m/s.
 
-    The log has 10 rows a second; the range of one missile covers part of the path. The envelope is simplified, not
+    The log has 10 rows a second; the range of one missile covers part of the path.  The envelope is simplified, not
     computed from a model.
 
     >>> log = example_log()

@@ -79,15 +79,17 @@ MAX_POSTS = 24
 
 
 def timestamp(time_ns: int) -> Timestamp:
-    """Convert a log_time to a protobuf timestamp."""
+    """Convert a log_time, ns since 1970, to a protobuf timestamp."""
     return Timestamp(seconds=time_ns // 1_000_000_000, nanos=time_ns % 1_000_000_000)
 
 
 def body_rotation(attitude: ArrayLike) -> Floats:
-    """Return the quaternion (..., 4) x, y, z, w of the rotation from forward-left-up to east-north-up.
+    """Convert roll, pitch and yaw to quaternions (..., 4): x, y, z, w.
 
-    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north. After the change of axes from north-east-down
-    the angles are roll, -pitch and pi/2 - yaw about forward, left and up.
+    The quaternion rotates from forward, left, up to east, north, up.  After the change of axes from north-east-down the
+    angles are roll, -pitch and pi/2 - yaw about forward, left and up.
+
+    attitude: roll, pitch and yaw (clockwise from north), rad, (..., 3).
     """
     roll, pitch, yaw = np.moveaxis(np.asarray(attitude, dtype=np.float64), -1, 0)
     half_angles = (0.5 * roll, -0.5 * pitch, 0.5 * (0.5 * math.pi - yaw))
@@ -104,19 +106,26 @@ def body_rotation(attitude: ArrayLike) -> Floats:
 
 
 def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
-    """Return one event as a message.  level: a key of `LOG_LEVELS`.  name: source of the message."""
+    """Return one event as a Foxglove log message.
+
+    level: a key of `LOG_LEVELS`.
+    name: source of the message.
+    """
     return Log(timestamp=timestamp(time_ns), level=LOG_LEVELS[level], message=text, name=name)
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Draw the ground of the area as a coloured mesh of at most `MAX_VERTICES` vertices a side."""
+    """Encode the ground of the area as a coloured mesh of at most `MAX_VERTICES` vertices a side."""
     entity = _entity(time_ns, "terrain")
     mesh = b"" if scenario.terrain is None else _encode_mesh(scenario.terrain, scenario.bounds)
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
 def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Return corners (n, m, 3) of the mesh, colours (n, m, 3), and flags (n, m) of known corners."""
+    """Return the corners of the ground's mesh, m, (n, m, 3), their colours, (n, m, 3), and a mask (n, m).
+
+    The mask is True at corners whose height is known.
+    """
 
     def axis(min_value: float, max_value: float) -> Floats:
         """Return the coordinates of the mesh's vertices along one axis, m."""
@@ -146,7 +155,7 @@ def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
 
 
 def _encode_mesh(terrain: Terrain, bounds: Floats) -> bytes:
-    """Return the encoded triangles field of the ground's entity; empty if no ground is known."""
+    """Encode the ground as the triangles field of its entity; b"" if no ground is known."""
     corner_points, colours, is_known = _terrain_mesh(terrain, bounds)
     if not is_known.any():
         return b""
@@ -167,7 +176,7 @@ def _encode_mesh(terrain: Terrain, bounds: Floats) -> bytes:
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
-    """Draw the spheres of missiles and radars, and their names above the ground around them."""
+    """Encode the spheres of missiles and radars, and their names above the ground around them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         center = threats.position[k]
@@ -208,9 +217,13 @@ def _make_label(position: Floats, name: str) -> TextPrimitive:
 
 
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
-    """Draw legs between waypoints (w, 3) as a line, and waypoints as dots with numbers and mission items."""
+    """Encode the plan as a scene: legs as a line, waypoints as dots with numbers and mission items.
+
+    waypoints: (w, 3), m.
+    items: number of each waypoint's mission item, negative for none, (w,).
+    """
     entity = _entity(time_ns, "plan")
-    legs = _line(_PLAN_COLOUR)
+    legs = _empty_line(_PLAN_COLOUR)
     legs.points.extend(_points(waypoints))
     entity.lines.append(legs)
     for point in waypoints:
@@ -222,14 +235,14 @@ def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
 
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
-    """Draw the track (n, 3) flown up to now."""
+    """Encode the track (n, 3) flown so far as a line."""
     line = _TRACK_LINE + repeated_submessages(_LINE_POINTS, _XYZ, positions)
     entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
     return length_delimited(2, entity + length_delimited(_ENTITY_LINES, line))
 
 
 def _encode_update(entity: SceneEntity) -> bytes:
-    """Encode a scene of one entity."""
+    """Encode a SceneUpdate with one entity."""
     return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 
@@ -250,7 +263,7 @@ def _pose(position: ArrayLike) -> Pose:
     return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
 
 
-def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
+def _empty_line(colour: tuple[float, float, float, float]) -> LinePrimitive:
     """Return a line primitive without points."""
     return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
@@ -261,7 +274,7 @@ def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
     )
 
 
-_TRACK_LINE = _line(_TRACK_COLOUR).SerializeToString(deterministic=True)
+_TRACK_LINE = _empty_line(_TRACK_COLOUR).SerializeToString(deterministic=True)
 
 
 def _points(points: Floats) -> Iterable[Point3]:
@@ -270,7 +283,7 @@ def _points(points: Floats) -> Iterable[Point3]:
 
 
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
-    """Draw names and edges of zones, from ground or floor to the ceiling or to above the path."""
+    """Encode the names and edges of zones, from ground or floor to the ceiling or to above the path."""
     entity = _entity(time_ns, "zones")
     min_altitude, max_altitude = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
     for zone in scenario.zones:
@@ -278,7 +291,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
         for wall in walls:
             step = max(1, (len(wall) - 1) // MAX_POSTS)
             for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
-                edge = _line(_EXCLUSION_COLOUR if zone.kind == "exclusion" else _INCLUSION_COLOUR)
+                edge = _empty_line(_EXCLUSION_COLOUR if zone.kind == "exclusion" else _INCLUSION_COLOUR)
                 edge.points.extend(_points(path))
                 entity.lines.append(edge)
         entity.texts.append(_make_label(_label_position(walls[0][0, 1], scenario.terrain), zone.name))
@@ -286,7 +299,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
 
 
 def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
-    """Draw the path coloured by outcome of returns, the worst returns, and the glide's footprint.
+    """Encode the path coloured by the outcome of a return, the worst returns, and the glide footprint.
 
     The coloured line lies below the path, so that plan and track stay visible.
     """
@@ -302,13 +315,16 @@ def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | 
     footprint = drawn_returns.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():
-            _add_parts(entity, BAND_ROLES[band.max_height], band.parts, terrain)
-        _add_parts(entity, "landable", footprint.landings(), terrain)
+            _add_outlines(entity, BAND_ROLES[band.max_height], band.parts, terrain)
+        _add_outlines(entity, "landable", footprint.landings(), terrain)
     return _encode_update(entity)
 
 
-def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: Terrain) -> None:
-    """Add outlines on the ground."""
+def _add_outlines(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: Terrain) -> None:
+    """Add the outlines of areas to an entity, `_OUTLINE_HEIGHT_M` above the ground.
+
+    role: role of the colour.
+    """
     for part in parts:
         for ring in part:
             up = terrain.height(ring[:, 0], ring[:, 1])
@@ -317,8 +333,11 @@ def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: T
 
 
 def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float = 3.0) -> None:
-    """Add a line in the colour of a role to an entity; thickness in pixels."""
-    line = _line(theme.rgba(role, dark=True))
+    """Add a line in the colour of a role to an entity.
+
+    thickness: width of the line, pixels.
+    """
+    line = _empty_line(theme.rgba(role, dark=True))
     line.thickness = thickness
     line.points.extend(_points(points))
     entity.lines.append(line)
@@ -362,19 +381,22 @@ _VERTICES = 34962
 
 
 def model_corners() -> Singles:
-    """Return the corners of the triangles (t, 3, 3), m forward, left and up; the model is `MODEL_SPAN_M` wide."""
+    """Return the corners of the aircraft model's triangles, forward, left and up, m, (t, 3, 3).
+
+    The model is `MODEL_SPAN_M` wide.
+    """
     return (
         np.array([triangle for triangles, _ in _MODEL_PARTS for triangle in triangles], dtype=np.float32) * MODEL_SPAN_M
     )
 
 
 def model_colours() -> Singles:
-    """Return the colours of the triangles (t, 4): red, green, blue, opacity, 0 to 1."""
+    """Return the colours of the aircraft model's triangles: red, green, blue, opacity, 0 to 1, (t, 4)."""
     return np.array([colour for triangles, colour in _MODEL_PARTS for _ in triangles], dtype=np.float32)
 
 
 def aircraft_glb() -> bytes:
-    """Return the model as a coloured `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
+    """Encode the aircraft model as a `.glb` file, one unit wide, in glTF's axes (right-handed, y up)."""
     pieces = b""
     views: list[dict[str, Any]] = []
     accessors, primitives, materials = [], [], []
@@ -416,7 +438,7 @@ def aircraft_glb() -> bytes:
 
 
 def aircraft_scene(time_ns: int) -> bytes:
-    """Return the model as a SceneUpdate in the frame of the aircraft, so that the transforms move it."""
+    """Encode the aircraft model as a SceneUpdate in the aircraft's frame, so that the transforms move it."""
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=MODEL_SPAN_M, y=MODEL_SPAN_M, z=MODEL_SPAN_M),
@@ -435,7 +457,7 @@ def aircraft_scene(time_ns: int) -> bytes:
 
 
 def layout_text() -> str:
-    """Return the layout file that ships with the package, as JSON text.
+    """Return the layout file for Foxglove that ships with the package, as JSON text.
 
     >>> import json
     >>> sorted(json.loads(layout_text()))

@@ -60,7 +60,9 @@ class GrowingTrack:
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
-        """Add a position (3,) `TRACK_INTERVAL_S` s after the last; return the track (n, 3), valid until the next call.
+        """Add the position (3,) that follows the last by `TRACK_INTERVAL_S` s, and return the track so far.
+
+        The track, (n, 3), is thinned to at most `MAX_POINTS` points, and valid until the next call.
 
         >>> track = GrowingTrack()
         >>> for k in range(500):
@@ -120,7 +122,12 @@ class FlightEvents:
         }
 
     def event_records(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
-        """Yield messages of rows.  log_times: (n,) ns.  position: (n, 3) m.  leg: (n,) the active leg."""
+        """Yield the event messages of rows: changes of leg, and entries into and exits from threats' ranges.
+
+        log_times: log time of each row, ns, (n,).
+        position: (n, 3) m.
+        leg: active leg of each row, (n,).
+        """
         if not len(log_times):
             return
         for k in np.flatnonzero(np.diff(leg, prepend=self._leg) != 0).tolist():
@@ -143,7 +150,7 @@ class FlightEvents:
             self._inside[kind] = is_inside[-1]
 
     def _leg_text(self, leg: int) -> str:
-        """Name a leg, the waypoint to which it leads, and that waypoint's mission item."""
+        """Return the text of a leg's event: leg, waypoint to which it leads, and that waypoint's mission item."""
         items = self._route.items
         waypoint = leg + 1
         if not 0 <= waypoint < len(items):
@@ -151,13 +158,16 @@ class FlightEvents:
         return f"leg {leg}, to waypoint {waypoint}" + (f" (item {items[waypoint]})" if items[waypoint] >= 0 else "")
 
     def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
-        """Make the event that the aircraft has entered or left the range of a threat."""
+        """Make the record of the event that the aircraft enters or leaves the range of a threat."""
         name, level = self._threats.names[threat], "warning" if kind == "missile range" else "info"
         text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
         return self._event_record(time, text, level if has_entered else "info")
 
     def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
-        """Make the message of one event.  time: log time, ns."""
+        """Make the message record of one event.
+
+        time: log time, ns.
+        """
         message = log_message(time, text, level, EVENT_SOURCE).SerializeToString(deterministic=True)
         return single_record(self._channel, time, message)
 
@@ -196,9 +206,9 @@ _SIDE_INTERVALS = 7
 
 
 def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
-    """Encode points (n, 3), m, in a frame as a PointCloud, rounded to 1/16 m.
+    """Encode points (n, 3), m, as a PointCloud in a frame, rounded to 1/16 m.
 
-    colours: (n, 4) red, green, blue, alpha, or one for all.
+    colours: red, green, blue and opacity, 0 to 255, (n, 4), or one colour for all points.
     """
     packed = np.zeros(len(points), dtype=_POINT_DTYPE)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -225,24 +235,24 @@ def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.ui
 
 
 def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
-    """Return the corners of the mesh of the ground as points."""
+    """Encode the corners of the ground's mesh as a point cloud."""
     points, colours = terrain_points(scenario)
     shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
     return point_cloud(time_ns, MAP_FRAME, points, shades)
 
 
 def plan_cloud(time_ns: int, waypoints: Floats) -> bytes:
-    """Return the legs between waypoints (w, 3) as points."""
+    """Encode the legs between waypoints (w, 3) as a point cloud."""
     return point_cloud(time_ns, MAP_FRAME, points_along_legs(waypoints), _PLAN_COLOUR)
 
 
 def track_cloud(time_ns: int, positions: Floats) -> bytes:
-    """Return the flown positions (n, 3) as points."""
+    """Encode the flown positions (n, 3) as a point cloud."""
     return point_cloud(time_ns, MAP_FRAME, positions, _TRACK_COLOUR)
 
 
 def aircraft_cloud(time_ns: int) -> bytes:
-    """Return the model of the aircraft as points, in its own frame."""
+    """Encode the aircraft model as a point cloud in the aircraft's frame."""
     first, second, third = (corner[:, None, :] for corner in np.moveaxis(model_corners().astype(np.float64), 1, 0))
     weights = [
         (i / _SIDE_INTERVALS, j / _SIDE_INTERVALS)
@@ -257,7 +267,7 @@ def aircraft_cloud(time_ns: int) -> bytes:
 
 
 def threats_cloud(time_ns: int, threats: Threats) -> bytes:
-    """Return the spheres of missiles and radars as evenly distributed points."""
+    """Encode the spheres of missiles and radars as evenly distributed points."""
     k = np.arange(_SPHERE_POINTS) + 0.5
     height, angle = 1.0 - 2.0 * k / _SPHERE_POINTS, math.pi * (1.0 + math.sqrt(5.0)) * k
     sphere = np.stack(
@@ -316,10 +326,13 @@ _FIX_DTYPE = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(
 
 
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
-    """Encode position and attitude of the aircraft: a FrameTransform for each of n rows.
+    """Encode position and attitude of the aircraft as a FrameTransform for each of n rows.
 
-    position, attitude: (n, 3). Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and
-    halves their size in the log; the state message is exact.
+    Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and halves their size in the log; the
+    state message is exact.
+
+    log_times: ns, (n,).
+    position, attitude: m and rad, (n, 3).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         translation = np.round(position * 1024.0) / 1024.0
@@ -332,9 +345,10 @@ def transform_messages(channel: int, log_times: Ints, position: Floats, attitude
 
 
 def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Floats) -> MessageRecords:
-    """Encode latitude, longitude and altitude AMSL: a LocationFix for each of n rows.
+    """Encode latitude, longitude and altitude AMSL as a LocationFix for each of n rows.
 
-    position: (n, 3).
+    log_times: ns, (n,).
+    position: m, (n, 3).
     """
     east, north, up = position.T
     lat, lon = to_geo(origin, east, north)
@@ -357,9 +371,12 @@ class Poses:
         self._next_cloud = 0.0  # s
 
     def pose_records(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
-        """Yield a transform for each slot, a fix each second, and the track every `TRACK_INTERVAL_S` s.
+        """Yield the messages of rows: a transform every 0.2 s, a fix each second, and the track.
 
-        log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
+        The track follows every `TRACK_INTERVAL_S` s; as points it follows more and more rarely.
+
+        log_times: log time of each row, ns, (n,).
+        position, attitude: m and rad, (n, 3).
         """
         good_rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
         slots = log_times[good_rows] // _SLOT_NS
@@ -390,7 +407,10 @@ class Poses:
                 yield self._track_cloud_record(log_time, [*self._path[:-1], start_positions[: k + 1]])
 
     def whole_track_records(self, log_time: int) -> Iterator[MessageRecords]:
-        """Yield the track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
+        """Yield the track up to the newest row, with a point each second, as a line and as points.
+
+        log_time: log time of the messages, ns.
+        """
         parts = [*self._path, self._newest_position]
         path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         yield single_record(self._channels[TRACK_TOPIC], log_time, path)
@@ -403,5 +423,8 @@ class Poses:
 
 
 def _change_indices(values: Ints, previous: int) -> Ints:
-    """Return the indices at which non-decreasing values change, starting from ``previous``."""
+    """Return the indices at which non-decreasing values exceed the value before.
+
+    previous: value before the first.
+    """
     return np.flatnonzero(np.diff(values, prepend=previous) > 0)

@@ -58,9 +58,11 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
-    """Yield the records in each whole chunk and outside chunks, as bytes, and fill ``container`` meanwhile.
+    """Yield the records of each whole chunk, and those outside chunks, as bytes, and fill ``container``.
 
-    file: file positioned after the magic at its start. Damage raises no error; `Container.problem` describes it.
+    Damage raises no error; `Container.problem` describes it.
+
+    file: file positioned after the magic at its start.
     """
     try:
         yield from _read_sections(file, container)
@@ -112,7 +114,10 @@ def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
-    """Check that the data section has its end and its CRC; the part from byte ``start`` on is read again."""
+    """Check the data section by its CRC, before its records outside chunks are used; raise _Damage.
+
+    crc: CRC of the section up to byte ``start``; the rest is read again.
+    """
     resume_position = file.tell()
     file.seek(start)
     try:
@@ -130,7 +135,7 @@ def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
 
 
 def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
-    """Read one record: its opcode and length, and its content.  Raises _Damage."""
+    """Read one record; return its frame (opcode and length) and its content.  Raises _Damage."""
     frame = file.read(FRAME.size)
     if len(frame) < FRAME.size:
         raise _Damage(f"the file ends at byte {position + len(frame):,}, before its end record")
@@ -144,7 +149,7 @@ def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield opcode, offset and content of each record in a chunk. Raises ValueError if one does not fit."""
+    """Yield opcode, offset and content of each record in a chunk.  Raises ValueError if a record is cut."""
     position = 0
     while position < len(data):
         if position + FRAME.size > len(data):
@@ -187,7 +192,10 @@ def _read_chunk(content: bytes, position: int) -> bytes:
 
 
 def _decompress(chunk: Chunk, size: int) -> bytes:
-    """Decompress at most ``size`` + 1 bytes of a chunk; decompress() would trust the size in the frame."""
+    """Decompress at most ``size`` + 1 bytes of a chunk.
+
+    The library's decompress() would trust the size that the compressed data state.
+    """
     if chunk.compression == "zstd":
         reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
         return reader.read(size + 1)
@@ -198,7 +206,7 @@ def _decompress(chunk: Chunk, size: int) -> bytes:
 
 
 def _read_attachment(content: bytes, position: int, container: Container) -> None:
-    """Add an attachment to the container, checked by its CRC.  Raises _Damage."""
+    """Check an attachment by its CRC, and add the attachment to the container.  Raises _Damage."""
     try:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
@@ -226,7 +234,7 @@ def _check_data_end(content: bytes, position: int, crc: int) -> None:
 
 
 def _check_summary(file: BinaryIO) -> None:
-    """Check the CRC of the summary, which is only an index, and the magic at the end of the file."""
+    """Check the CRC of the summary and the magic at the end of the file.  Raises _Damage."""
     crc = 0
     while True:
         position = file.tell()

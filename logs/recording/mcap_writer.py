@@ -92,7 +92,7 @@ class _ChunkIndex(NamedTuple):
     size: int
 
     def record(self) -> bytes:
-        """Return its chunk index record."""
+        """Encode the chunk index record of the chunk."""
         offsets = b"".join(_INDEX_OFFSET.pack(channel, position) for channel, position in self.offsets)
         times = _CHUNK_INDEX_HEADER.pack(self.content_start, self.content_end, self.position, self.length, len(offsets))
         sizes = _CHUNK_SIZES.pack(self.compressed, self.size)
@@ -106,7 +106,8 @@ class ContainerWriter:
     def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
         """Begin a container in an empty file open for writing.
 
-        profile: name of profile and library for the header.  level: compression level of zstd.
+        profile: name of profile and library for the header.
+        level: compression level of zstd.
         """
         self._file = file
         self._compressor = zstandard.ZstdCompressor(level=level)
@@ -132,7 +133,8 @@ class ContainerWriter:
     def add_channel(self, topic: str, schema: str, data: bytes) -> int:
         """Add a protobuf channel to the next chunk, and return its number.
 
-        schema: full name of the message.  data: its FileDescriptorSet.
+        schema: full name of the message.
+        data: FileDescriptorSet of the message.
         """
         if schema not in self._schemas:
             self._schemas[schema] = Schema(id=len(self._schemas) + 1, data=data, encoding="protobuf", name=schema)
@@ -143,7 +145,10 @@ class ContainerWriter:
         return channel.id
 
     def pop_new_records(self) -> bytes:
-        """Return and forget the records of schemas and channels that are not in any chunk yet, for the next chunk."""
+        """Return the records of schemas and channels that no chunk contains yet, for the next chunk.
+
+        The records are returned only once.
+        """
         new_records = b"".join(_record_bytes(record) for record in self._unwritten_records)
         self._unwritten_records.clear()
         return new_records
@@ -151,9 +156,8 @@ class ContainerWriter:
     def copy_chunk(self, data: bytes) -> None:
         """Write the records of another file's chunk as a chunk.
 
-        Raises ValueError and the errors of mcap's classes.
-
-        Its schemas and channels become schemas and channels of this file.
+        Its schemas and channels become schemas and channels of this file.  Raises ValueError and the errors of mcap's
+        classes.
         """
         index: dict[int, list[tuple[int, int]]] = {}
         for opcode, position, content in records(data):
@@ -177,7 +181,7 @@ class ContainerWriter:
         self.write_chunk(ChunkContent(data, b"".join(parts), tuple(channels), start, end))
 
     def write_chunk(self, content: ChunkContent) -> None:
-        """Write a chunk."""
+        """Compress and write a chunk, and the message indexes that follow it."""
         data = self._compressor.compress(content.records)
         size = len(content.records)
         header = _CHUNK_HEADER.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
@@ -197,7 +201,7 @@ class ContainerWriter:
 
     @property
     def last_time(self) -> int:
-        """Return the log_time of the newest message, ns; 0 before the first chunk."""
+        """Log time of the newest message, ns; 0 before the first chunk."""
         return max((chunk.content_end for chunk in self._chunks), default=0)
 
     def write_end(self) -> None:
@@ -224,7 +228,7 @@ class ContainerWriter:
         self._write_bytes(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
 
     def _statistics(self) -> Statistics:
-        """Return the counts and times of the log's summary."""
+        """Return the statistics record of the summary: counts and times of the log."""
         return Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
@@ -255,7 +259,7 @@ class ContainerWriter:
 
 
 def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
-    """Add the file's name to an error while writing, such as a full disk, which has none."""
+    """Return a copy of an error while writing, such as of a full disk, with the name of the file."""
     return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
@@ -374,7 +378,10 @@ def _write_message_header(buffer: Bytes, position: int, size: int, channel: int,
 
 @compiled
 def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
-    """Encode messages with their log times in front of their bodies; return all bytes and each message's offset."""
+    """Encode messages with their log times before their bodies; return all bytes, and the offset of each message.
+
+    The last offset is the end of the bytes.
+    """
     count, body_size = bodies.shape
     # The timestamp takes at most 2 + 12 bytes: tag and length, then two tags and two varints of five bytes.
     buffer = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)
@@ -399,10 +406,11 @@ def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> t
 
 
 def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
-    """Return the records of messages with a timestamp and a body of constant size.
+    """Encode messages with a timestamp and a body of constant size as message records.
 
-    log_times: (n,) ns since 1970.  timestamp_field: field number of the timestamp.  bodies: (n, size) bytes after the
-    timestamp, in protobuf's encoding.
+    log_times: (n,) ns since 1970.
+    timestamp_field: field number of the timestamp.
+    bodies: (n, size) bytes after the timestamp, in protobuf's encoding.
     """
     tag = timestamp_field << 3 | 2  # length-delimited
     blob, offsets = _stamp_messages(np.ascontiguousarray(log_times), channel, tag, bodies)
@@ -410,7 +418,7 @@ def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies:
 
 
 def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
-    """Return the record of one message with the bytes ``data``."""
+    """Encode one message with the bytes ``data`` as a message record."""
     record = np.empty(FRAME_SIZE + MESSAGE_HEADER + len(data), dtype=np.uint8)
     position = _write_message_header(record, 0, len(data), channel, log_time)
     record[position:] = np.frombuffer(data, np.uint8)
@@ -421,9 +429,13 @@ def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
 def _merge_by_time(
     row_times: Ints, row_length: int, row_channel: int, other_messages: Entries, prefix_size: int, limit: int
 ) -> tuple[Entries, Ints]:
-    """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
+    """Merge rows and other messages by time, and cut them into chunks.
 
-    At equal times a row comes last. The array of first messages ends with n.
+    Return all messages (n,), and the index of each chunk's first message, followed by n.  At equal times a row comes
+    last.
+
+    prefix_size: size of the bytes before the first message.
+    limit: largest size of a chunk of several messages, bytes.
     """
     count = len(row_times) + len(other_messages)
     merged = np.empty(count, dtype=ENTRY)
@@ -459,7 +471,7 @@ def _merge_by_time(
 
 @compiled
 def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) -> Bytes:
-    """Return the bytes of ``prefix`` and of all messages, one after the other."""
+    """Return the bytes of all chunks: ``prefix`` and all messages, one after the other."""
     total_size = len(prefix)
     for k in range(len(entries)):
         total_size += entries[k].length
@@ -481,7 +493,7 @@ def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) ->
 def _index_messages(
     entries: Entries, firsts: Ints, prefix_size: int, max_channel: int
 ) -> tuple[Bytes, Chunks, ChannelIndexes]:
-    """Return the message index records of each chunk by channel, and the tables of `Layout`.
+    """Encode the message index records of each chunk by channel; return them and the tables of `Layout`.
 
     max_channel: highest channel number.
     """
@@ -521,10 +533,12 @@ def _index_messages(
 def lay_out_chunks(
     rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], prefix: bytes, limit: int
 ) -> Layout:
-    """Order message records by time, and index them in chunks of at most one second and ``limit`` bytes.
+    """Order message records by time, and index them in chunks of at most a second and ``limit`` bytes.
+
+    A message of more than ``limit`` bytes gets its own chunk.
 
     rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
-    prefix: bytes before the first message. A message of more than ``limit`` bytes gets its own chunk.
+    prefix: bytes before the first message.
     """
     max_channel = max([row_channel, *(messages.channel for messages in other_messages)])
     blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in other_messages)])
@@ -540,9 +554,9 @@ def lay_out_chunks(
 
 
 def _message_entries(other_messages: list[MessageRecords]) -> Entries:
-    """Return the messages in order of time, with their starts in the joined blobs.
+    """Return the entries of messages in order of time, with their starts in the joined blobs.
 
-    Their offsets are not set yet.
+    Their offsets in the chunks are not set yet.
     """
     entries: Entries = np.zeros(sum(len(messages.log_times) for messages in other_messages), dtype=ENTRY)
     first, start = 0, 0
@@ -559,10 +573,12 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
 
 @compiled
 def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
-    """Return the log time (ns) of the last of ``times`` (s).
+    """Check that the times of rows (s) increase, and return the log time (ns) of the last row.
 
-    newest: log time before the first. Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if
-    a time is not later than the time before it.
+    Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if a time is not later than the time
+    before it.
+
+    newest: log time before the first row, ns.
     """
     for k in range(len(times)):
         if not 0.0 <= times[k] < max_time:

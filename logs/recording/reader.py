@@ -99,9 +99,9 @@ def log_messages(path: Path) -> Iterator[LogMessage]:
 
 
 def log_channels(path: Path) -> list[LogChannel]:
-    """List the channels declared by the first chunk of a log: all channels of a `logs.recording.recorder.Recorder`.
+    """List the channels that the first chunk of a log declares.
 
-    Raises OSError.
+    These are all channels of a log from `logs.recording.recorder.Recorder`.  Raises OSError.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -244,7 +244,7 @@ class _MessageCollector:
             position = end
 
     def _add_channel(self, channel: Channel) -> None:
-        """Note a channel, and prepare to read state rows if it is the state's."""
+        """Register a channel, and prepare to read state rows if it is the state channel."""
         if channel.id in self._channels:
             return
         self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))
@@ -255,7 +255,10 @@ class _MessageCollector:
             self._matcher = RowMatcher(channel.id)
 
     def _add_message(self, data: bytes, position: int, start: int, end: int) -> int:
-        """Add the message at ``position``, or all successive state rows from there; return the next position."""
+        """Add the message at ``position``, or all successive state rows from there; return the next position.
+
+        start, end: range of the record's content in the data.
+        """
         channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
         if channel == self._state_channel and self._matcher is not None:
             matched = self._matcher.match(data, position)
@@ -278,10 +281,11 @@ class _MessageCollector:
 
 
 def read_log(path: Path | str) -> FlightLog:
-    """Read a flight log; return a damaged or unfinished log up to its damage, with ``complete`` False.
+    """Read a flight log.
 
-    Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
-    contains no complete second of flight.
+    A damaged or unfinished log is returned up to its damage, with ``complete`` False.  Raises LogError, in one line,
+    for a file that is missing, empty, not an MCAP file or not a planfly log, or that contains no complete second of
+    flight.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -354,7 +358,10 @@ def _check_magic(magic: bytes, path: Path) -> None:
 
 
 def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords, str]:
-    """Return the rows before the first invalid row, and that row's fault; "" if all rows are valid."""
+    """Return the rows before the first invalid row, and the fault of that row.
+
+    The fault is "" if all rows are valid.
+    """
     state = rows["state"]
     time = state["time_s"]
     is_increasing = np.isfinite(time) & (time >= 0.0) & (time < MAX_TIME_S)
@@ -373,7 +380,7 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return the recorded end of the flight, and any fault of its record."""
+    """Return how the flight ended as recorded, or None, and the fault of the record, "" if it has none."""
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
     data = _parse_object(attachments[RESULT_FILE])
@@ -392,7 +399,7 @@ def _recorded_loss(recovery: bytes) -> str:
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
-    """Return the recorded verdict, or None, and any fault of its attachment."""
+    """Return the recorded verdict, or None, and the fault of its attachment, "" if it has none."""
     if VERDICT_FILE not in attachments:
         return None, ""
     verdict = _parse_object(attachments[VERDICT_FILE])
@@ -400,7 +407,7 @@ def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None,
 
 
 def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
-    """Return the results of reference flights, or None, and any fault of their attachment."""
+    """Return the results of reference flights, or None, and the fault of their attachment, or ""."""
     if REFERENCE_FILE not in attachments:
         return None, ""
     try:

@@ -103,11 +103,12 @@ class Recorder:
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
-        """Open ``path`` for writing (replacing it) and write the setup. Raises OSError.
+        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
 
-        every: record every n-th row, and the last row of the flight.  batch: number of whole seconds of flight written
-        at once, each in its own chunks; a larger batch costs less time, but a killed process loses up to one batch.
-        The bytes are the same.
+        every: record every n-th row, and the last row of the flight.
+        batch: number of whole seconds of flight written at once, each in its own chunks; a larger batch costs less
+            time, but
+            a killed process loses up to one batch.  The bytes are the same.
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
@@ -147,7 +148,7 @@ class Recorder:
             self._close_file()
 
     def abandon(self) -> None:
-        """Close the file after an error, without a result, and ignore errors of closing: report the first error."""
+        """Close the file after an error, without a result, and ignore errors while closing."""
         if self._is_open:
             with contextlib.suppress(OSError):
                 self._close_file()
@@ -178,7 +179,7 @@ class Recorder:
             self._append_rows(recorded_rows)
 
     def _append_rows(self, rows: Rows) -> None:
-        """Keep rows for writing, and write all rows of complete batches."""
+        """Add rows to the rows to be written, and write all complete batches."""
         self._pending_rows.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
@@ -198,7 +199,10 @@ class Recorder:
         self._write_pending(self._last_ns + 1)
 
     def event(self, time: float, text: str, level: str = "info") -> None:
-        """Record an event at ``time`` (s); level: debug, info, warning, error or fatal. Raises ValueError."""
+        """Record an event at a time (s).  Raises ValueError for an unknown level and a time out of range.
+
+        level: debug, info, warning, error or fatal.
+        """
         if level not in scene.LOG_LEVELS:
             raise ValueError(f"level {level!r}: expected {', '.join(scene.LOG_LEVELS)}")
         if not 0.0 <= time < MAX_TIME_S:
@@ -214,7 +218,7 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write the reason for the flight's end, verdict, reference flights and returns, then close the file."""
+        """Write how the flight ended, verdict, reference flights and returns, and close the file."""
         if self._skipped_row is not None:
             self._append_rows(self._skipped_row)
             self._skipped_row = None
@@ -270,7 +274,7 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """Add a scene that is known only at the end, but is shown from the start of the flight."""
+        """Write a scene that is known only at the end of the flight, but is shown from its start."""
         self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
@@ -288,7 +292,10 @@ class Recorder:
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
-        """Write the pending rows and events before ``end_ns``, or all if it is None, in chunks of at most a second."""
+        """Write the pending rows and events before ``end_ns``, in chunks of at most a second.
+
+        All are written if ``end_ns`` is None.
+        """
         rows = join_rows(self._pending_rows)
         log_times = times_ns(rows["time"])
         end_row = len(rows) if end_ns is None else int(np.searchsorted(log_times, end_ns))

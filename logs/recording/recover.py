@@ -28,8 +28,8 @@ class RecoveredLog:
 def recover_log(path: Path) -> RecoveredLog | None:
     """Rebuild a log up to its first damage; return None for a complete log.
 
-    Chunks and attachments before the damage are kept unchanged. The result of the flight and the verdict are omitted,
-    because they may refer to lost rows. Raises LogError for a file without a flight, as `read_log` does.
+    Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are omitted,
+    because they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -65,7 +65,7 @@ def recover_log(path: Path) -> RecoveredLog | None:
 
 
 def _intact_chunks(path: Path) -> tuple[Container, list[bytes]]:
-    """Return the attachments and chunks of a log that precede its damage."""
+    """Return the container (with the attachments) and the chunks of a log that precede its damage."""
     container = Container()
     with path.open("rb") as file:
         file.seek(len(MAGIC))

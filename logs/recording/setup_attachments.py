@@ -107,7 +107,7 @@ class _TerrainFile(SetupModel):
 
 
 def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
-    """Pack the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights in parts."""
+    """Encode the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights in parts."""
     rows, cols = terrain.heights.shape
     parts = {}
     for k, (first, last) in enumerate(_row_blocks(rows, cols)):
@@ -129,10 +129,12 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
 
 
 def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
-    """Rebuild the packed terrain, bit for bit.
+    """Rebuild the terrain from its attachments, bit for bit.
 
-    attachments: attachments from `pack_terrain`, among others.  source: name of the log for messages. Raises LogError
-    for heights that are missing, damaged or of wrong size, and for an invalid map.
+    Raises LogError for heights that are missing, damaged or of wrong size, and for an invalid map.
+
+    attachments: attachments from `pack_terrain`, among others.
+    source: name of the log for messages.
     """
     try:
         file = _TerrainFile.model_validate_json(attachments[TERRAIN_FILE])
@@ -162,7 +164,7 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
-    """Return the first row and the end row of each part of the heights."""
+    """Return the first row and the end row of the heights in each attachment."""
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
@@ -190,7 +192,7 @@ def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any
 
 
 def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
-    """Return the rows of the map's coefficients as an array; raise LogError if their shape is invalid."""
+    """Return the coefficients of the map as an array; raise LogError if their shape is invalid."""
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
         shape_text = f"{len(rows)} rows of {size}"
@@ -265,7 +267,9 @@ def _cached_versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Return versions of Python and the packages whose arithmetic or formats a log depends on, if installed.
+    """Return the versions of Python and of the packages on whose arithmetic or formats a log depends.
+
+    Packages that are not installed are left out.
 
     >>> versions = package_versions()
     >>> versions["numpy"] == metadata.version("numpy")
@@ -286,7 +290,7 @@ def _find_versions() -> dict[str, str]:
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
-    """Pack a setup as the attachments that a log needs, bytes by name, `SETUP_FILE` first.
+    """Encode a setup as the attachments that a log needs, bytes by name, `SETUP_FILE` first.
 
     The same setup and packages give the same bytes.
     """
@@ -330,10 +334,12 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
 
 
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
-    """Rebuild the setup from its attachments; no file is opened.
+    """Rebuild a setup from its attachments; no file is opened.
 
-    attachments: bytes by name.  source: name of the log for messages. Raises LogError, in one line, for an attachment
-    that is missing, altered or inconsistent.
+    Raises LogError, in one line, for an attachment that is missing, altered or inconsistent.
+
+    attachments: bytes by name.
+    source: name of the log for messages.
     """
     if SETUP_FILE not in attachments:
         raise LogError(f"{source}: not a planfly log: an MCAP file without {SETUP_FILE}", file=source)
@@ -387,12 +393,12 @@ def _read_autopilot(file: _SetupFile, file_name: str) -> Autopilot:
 
 
 def _json_bytes(data: Any) -> bytes:
-    """Write data as JSON, with non-finite numbers as text."""
+    """Encode data as JSON; non-finite numbers become strings."""
     return (json.dumps(_finite_or_text(data), indent=1, allow_nan=False) + "\n").encode()
 
 
 def _finite_or_text(data: Any) -> Any:
-    """Replace non-finite numbers by strings, as JSON has no such numbers."""
+    """Return the data with non-finite numbers as strings, because JSON has no such numbers."""
     if isinstance(data, float) and not math.isfinite(data):
         return str(float(data))
     if isinstance(data, dict):
@@ -443,7 +449,7 @@ def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | No
 
 
 def _check_terrain_is_stored(spec: Any, terrain: Terrain | None, file_name: str) -> None:
-    """Raise LogError if reading the log would open an elevation file."""
+    """Raise LogError if the scenario of a log names an elevation file, but the log has no terrain."""
     terrain_table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = terrain_table.get("kind") if isinstance(terrain_table, dict) else None
     if terrain is None and kind != "none":

@@ -46,11 +46,14 @@ class SetupModel(BaseModel):
 
     @classmethod
     def from_dataclass(cls, value: object) -> Self:
-        """Make the table of a dataclass from its fields."""
+        """Make the table of a dataclass from the dataclass's fields."""
         return cls.model_validate(value, from_attributes=True, by_alias=False, by_name=True)
 
     def fault(self, file: str, field: str, message: str) -> LogError:
-        """Return an error on a field, named by its key in the file."""
+        """Return the error for a field, which is named by its key in the file.
+
+        file: name of the log for the message.
+        """
         key = f"{self.name}.{type(self).model_fields[field].alias or field}"
         return LogError(f"{file}: {key}: {message}", file=file, field=key)
 
@@ -99,7 +102,7 @@ class _SurveyPlan(SetupModel):
     camera: _Camera | None
 
     def plan(self) -> SurveyPlan:
-        """Return the plan of the table."""
+        """Return the survey plan of the table."""
         return _make_from_table(
             SurveyPlan, self, camera=None if self.camera is None else _make_from_table(Camera, self.camera)
         )
@@ -173,9 +176,9 @@ class RouteTable(SetupModel):
             if length != expected:
                 raise self.fault(file, field, f"{length} values: expected {expected}")
         if self.rtl_start >= len(waypoints) - 1 or (self.rtl_start < 0) != (self.rtl_loiter is None):
-            raise self.fault(file, "rtl_start", f"{self.rtl_start}: a waypoint before the last, with its target")
+            raise self.fault(file, "rtl_start", f"{self.rtl_start}: expected a waypoint before the last, and a target")
         if self.direct_landing_start >= len(waypoints):
-            raise self.fault(file, "direct_landing_start", f"{self.direct_landing_start}: a waypoint, or -1")
+            raise self.fault(file, "direct_landing_start", f"{self.direct_landing_start}: expected a waypoint, or -1")
         heights = {field: getattr(self, field) for field in ("takeoff_ground", "landing_ground")}
         ground_heights = {field: math.nan if height is None else height for field, height in heights.items()}
         circle = None if self.rtl_loiter is None else ReturnCircle(*self.rtl_loiter)
@@ -271,5 +274,5 @@ class ProgramTable(SetupModel):
     unused: tuple[str, ...]
 
     def program(self) -> AutopilotProgram:
-        """Return the autopilot of the table."""
+        """Return the autopilot program of the table."""
         return _make_from_table(AutopilotProgram, self)

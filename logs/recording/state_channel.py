@@ -49,14 +49,18 @@ def submessage_dtype(names: Sequence[str]) -> np.dtype[np.void]:
 
 
 def fill_doubles(out: Encoded, names: Sequence[str], values: Floats) -> None:
-    """Write values (n, m) and their tags into ``out``, (n,).  names: names of the fields with numbers 1 to m."""
+    """Write values (n, m), each after its tag, into ``out``, (n,).
+
+    names: names of the m fields, which have the numbers 1 to m.
+    """
     for field_number, (name, column) in enumerate(zip(names, values.T, strict=True), 1):
         out[f"tag_{name}"], out[name] = field_number << 3 | _FIXED64, column
 
 
 def fill_submessages(out: Encoded, field_number: int, names: Sequence[str], values: Floats) -> None:
-    """Fill ``out``, an array (n,) of type `submessage_dtype`, with a submessage of doubles per row of values (n, m).
+    """Write a submessage of doubles into ``out`` for each row of values (n, m).
 
+    out: (n,) of type `submessage_dtype`.
     field_number: field number of the submessage in its parent message.
     """
     out["tag"], out["size"] = field_number << 3 | _LENGTH_DELIMITED, out.dtype.itemsize - 2
@@ -135,8 +139,8 @@ FIELDS = _make_fields()
 _MESSAGE_FIELDS = [("row", "<u4"), *((field.name, field.kind) for field in FIELDS)]
 
 
-def _make_file() -> descriptor_pb2.FileDescriptorProto:
-    """Make the protobuf file that describes the state message."""
+def _make_file_descriptor() -> descriptor_pb2.FileDescriptorProto:
+    """Make the protobuf description of the file that declares the state message."""
     file = descriptor_pb2.FileDescriptorProto(name="planfly/State.proto", package="planfly", syntax="proto3")
     message = file.message_type.add(name="State")
     for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
@@ -145,7 +149,7 @@ def _make_file() -> descriptor_pb2.FileDescriptorProto:
 
 
 def _make_layout() -> tuple[np.dtype[np.void], dict[str, int]]:
-    """Return the message as a packed structured type with a tag before each value, and the tags."""
+    """Return the structured type of a message, with a tag before each value, and the tags by name."""
     parts: list[tuple[str, str]] = []
     tags: dict[str, int] = {}
     for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
@@ -156,7 +160,7 @@ def _make_layout() -> tuple[np.dtype[np.void], dict[str, int]]:
     return np.dtype(parts), tags
 
 
-STATE_FILE = _make_file()
+STATE_FILE = _make_file_descriptor()
 _LAYOUT = _make_layout()
 STATE_BODY = _LAYOUT[0]
 _TAGS = _LAYOUT[1]
@@ -223,9 +227,11 @@ _TEMPLATE = _make_template()
 
 
 def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> StateRecords:
-    """Encode flown rows, (t,) of `flight.simulation.track.TRACK_ROW`, as MCAP message records (t,) of `RECORD`.
+    """Encode rows of a flight as MCAP message records, (t,) of `RECORD`.
 
-    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
+    rows: (t,) of `flight.simulation.track.TRACK_ROW`.
+    first_row: number of the first row in the whole flight.
+    channel: number of the MCAP channel.
     """
     log_times = times_ns(rows["time"])
     records: StateRecords = np.repeat(_TEMPLATE, len(rows))
@@ -243,7 +249,10 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> State
 
 
 def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
-    """Join arrays of one structured type as bytes, because numpy compares structured types name by name."""
+    """Join arrays of one structured type.
+
+    They are joined as bytes, because numpy compares structured types name by name.
+    """
     if not parts:
         return np.zeros(0, dtype=kind)
     return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)

@@ -38,7 +38,9 @@ _QUANTITIES = {
 
 
 def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
-    """Draw four panels: slopes over airspeed, level speeds over altitude, slopes over ground in wind, turn radii.
+    """Draw the envelope of steady flight in four panels.
+
+    The panels show slopes over airspeed, level speeds over altitude, slopes over the ground in wind, and turn radii.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from logs.recording.example_log import example_log
@@ -132,11 +134,13 @@ def _draw_turns(axes: Any, aircraft: Aircraft) -> None:
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
-    """Draw four panels: angle of attack and controls, throttle and power, roots of the modes.
+    """Draw the trims of level flight, and the modes of motion, in four panels.
 
-    All panels but the roots are drawn over airspeed.
+    The panels show angle of attack and surfaces over airspeed, throttle and power over airspeed, and the roots of all
+    modes and of the slow modes.
 
-    trims: trims in order of airspeed.  modes: modes by airspeed, m/s.
+    trims: trims in order of airspeed.
+    modes: modes by airspeed, m/s.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import level_flight_modes, trim_table
@@ -265,7 +269,7 @@ def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Fi
 
 
 def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
-    """Draw the change of one quantity after a step; the time for which the step is held is shaded."""
+    """Draw the change of one quantity after a step, and shade the time for which the step is held."""
     name, unit, factor = _QUANTITIES[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
@@ -279,7 +283,7 @@ def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
 
 
 def _step_title(step: StepResponse) -> str:
-    """Name a control, the size and direction of its step, and the time for which it is held."""
+    """Return the title of a step: the control, the step's size and direction, and the time it is held."""
     name = step.control
     if step.control == "throttle":
         size_text = f"{100.0 * step.size:+.0f} %"
@@ -294,7 +298,7 @@ def _step_title(step: StepResponse) -> str:
 
 
 def _add_legend_above(axes: Any, title: str, columns: int) -> None:
-    """Write the legend in the upper part of the panel, and raise the axis limit to keep lines clear of it."""
+    """Draw the legend in the upper part of the panel, and raise the axis limit so that it hides no lines."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
     legend_fraction = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height

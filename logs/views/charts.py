@@ -105,7 +105,7 @@ class Panel:
         return any(np.isfinite(layer.y).any() for layer in self.layers)
 
     def shown_span(self) -> tuple[float, float]:
-        """`span`, or the range of values and limits, at least `min_span` wide, with an 8 % margin."""
+        """Return `span`, or else the range of values and limits, at least `min_span` wide, with an 8 % margin."""
         if self.span is not None:
             return self.span
         values = [value for _, value in self.limits if math.isfinite(value)]
@@ -155,7 +155,7 @@ class Chart:
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
     def shown_axis_range(self) -> tuple[float, float]:
-        """`axis_range`, or from the first to the last value along the axis."""
+        """Return `axis_range`, or else the range from the first to the last value along the axis."""
         if self.axis_range is not None:
             return self.axis_range
         finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]
@@ -164,9 +164,9 @@ class Chart:
 
 
 def series(name: str, role: str, along: Floats, values: ArrayLike, **options: Any) -> Layer:
-    """Return a line over a long axis, thinned without losing a peak.
+    """Return a line layer over a long axis, thinned so that its peaks remain.
 
-    along, values: (t,).
+    along, values: position along the axis, and value, of each row, (t,).
     """
     column = np.asarray(values, dtype=np.float64)
     rows = outline_rows(column, BLOCKS)
@@ -174,16 +174,16 @@ def series(name: str, role: str, along: Floats, values: ArrayLike, **options: An
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
-    """Return a line as `series` does, filled from zero."""
+    """Return a layer as `series` does, filled from zero."""
     column = np.asarray(values, dtype=np.float64)
     rows = outline_rows(column, BLOCKS)
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
 
 
-def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Join lines (k, 2), with a gap after each, and return x and y of one layer.
+def join_with_gaps(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Join lines (k, 2) into the x and y of one layer, with a gap after each line.
 
-    >>> x, y = parted([np.zeros((2, 2)), np.ones((1, 2))])
+    >>> x, y = join_with_gaps([np.zeros((2, 2)), np.ones((1, 2))])
     >>> x.tolist()
     [0.0, 0.0, nan, 1.0, nan]
     """
@@ -192,9 +192,14 @@ def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     return points[:, 0], points[:, 1]
 
 
-def held_band(is_held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
-    """Return a layer that shades the parts of a long axis (t,) in which a control is at its limit."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_held, [False]]).astype(np.int8)))
+def saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+    """Return a layer that shades the parts of a long axis in which a control is at its limit.
+
+    is_saturated: True at rows where the control is at its limit, (t,).
+    along: position of each row along the axis, (t,).
+    span: lower and upper edge of the shaded bands.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_saturated, [False]]).astype(np.int8)))
     starts, band_ends = along[edges[::2]], along[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
     x = np.column_stack([starts, band_ends, band_ends]).ravel()
@@ -203,15 +208,21 @@ def held_band(is_held: NDArray[np.bool_], along: Floats, span: tuple[float, floa
 
 
 def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
-    """Return the start of each leg along an axis (t,), and its name.  legs: (t,) number of each row's leg."""
+    """Return a mark at the start of each leg: its position along an axis, and the leg's name.
+
+    legs: number of each row's leg, (t,).
+    along: position of each row along the axis, (t,).
+    """
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
     return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
 
 
 def outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Return the rows of the lowest and highest value of each of `count` blocks, to keep the outline of a long series.
+    """Return the rows of the lowest and highest value of each of `count` blocks of a long series.
 
-    values: (t,); NaN rows are omitted unless a block has no other rows.  All rows of a short series are returned.
+    They keep its outline.  All rows of a short series are returned.
+
+    values: (t,); NaN rows are omitted unless a block has no other rows.
     """
     column = np.asarray(values, dtype=np.float64)
     if column.size <= 2 * count:
@@ -228,7 +239,7 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
 
 
 def nice_step(span: float, max_count: int) -> float:
-    """Return the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `max_count` pieces."""
+    """Return a step for ticks: 1, 2 or 5 times a power of ten, for at most `max_count` steps in `span`."""
     min_step = max(span, 1e-9) / max_count
     power = 10.0 ** np.floor(np.log10(min_step))
     for factor in (1.0, 2.0, 5.0, 10.0):
@@ -256,10 +267,12 @@ def numbers(values: Iterable[float], digits: int) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in rounded.tolist()]
 
 
-def telling_digits(values: Floats) -> int:
-    """Return the decimals that show a ten-thousandth of the range of values, the resolution of a screen.
+def screen_decimals(values: Floats) -> int:
+    """Return the number of decimals that resolves a ten-thousandth of the range of values.
 
-    >>> telling_digits(np.array([0.0, 90.0])), telling_digits(np.array([0.001, 0.002]))
+    This is the resolution of a screen.
+
+    >>> screen_decimals(np.array([0.0, 90.0])), screen_decimals(np.array([0.001, 0.002]))
     (3, 7)
     """
     finite = values[np.isfinite(values)]
@@ -269,7 +282,7 @@ def telling_digits(values: Floats) -> int:
 
 
 def chart_json(chart: Chart) -> Json:
-    """Return the chart as JSON data.
+    """Return the chart as JSON data for the page.
 
     >>> line = Layer("line", "flown", "flown", np.array([0.0, 1.0]), np.array([2.0, np.nan]))
     >>> made = chart_json(Chart("a flight", "time", "s", (Panel("bank", "°", (line,)),)))
@@ -288,7 +301,7 @@ def chart_json(chart: Chart) -> Json:
 
 
 def panel_json(panel: Panel) -> Json:
-    """Return a panel as JSON data; layers without a value and NaN limits are omitted."""
+    """Return a panel as JSON data for the page; layers without a value and NaN limits are omitted."""
     labels = [label for label in panel.labels if label.rank in ("end", "number")]
     return {
         "title": panel.title,
@@ -303,12 +316,12 @@ def panel_json(panel: Panel) -> Json:
 
 
 def _layer_json(layer: Layer) -> Json:
-    """Return a layer as data for the page's own charts."""
+    """Return a layer as JSON data for the page."""
     document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
     if layer.flight is None:
-        document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
+        document |= {"x": numbers(layer.x, screen_decimals(layer.x)), "y": numbers(layer.y, screen_decimals(layer.y))}
     if layer.lower_edge is not None:
-        document["low"] = numbers(layer.lower_edge, telling_digits(layer.lower_edge))
+        document["low"] = numbers(layer.lower_edge, screen_decimals(layer.lower_edge))
     optional_keys: Json = {
         "dashed": layer.dashed,
         "quiet": layer.quiet,
@@ -328,7 +341,7 @@ class LegendEntry:
 
 
 def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
-    """Return one entry for each name of the panels' layers, in order, and then the limits, as lines without values."""
+    """Return one legend entry per layer name, in order, then one per limit label (an empty line layer)."""
     layers_by_name: dict[str, list[Layer]] = {}
     for panel in panels:
         for layer in panel.layers:

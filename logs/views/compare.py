@@ -11,7 +11,7 @@ from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.views.charts import Chart, Layer, Panel, filled_series, leg_marks, series, shorten
 from logs.views.map import DrawnTrack, MapChart, NamedWind, map_chart
-from logs.views.time_series import doubles
+from logs.views.time_series import to_float64
 from world.arrays import Floats
 
 # Roles of the first and the second flight.
@@ -22,7 +22,7 @@ _POINTS = 3000
 
 @dataclass(frozen=True, slots=True)
 class NamedFlight:
-    """A flight to draw, and the name of its lines in the legend."""
+    """Flight to draw, and the name of its lines in the legend."""
 
     name: str
     setup: FlightSetup
@@ -60,7 +60,7 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     distances = [_distance_flown(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
-    def both(values: list[Floats]) -> tuple[Layer, ...]:
+    def flight_lines(values: list[Floats]) -> tuple[Layer, ...]:
         """Return a line for each flight: its values of a quantity over the distance flown."""
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
@@ -69,12 +69,14 @@ def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
 
     tracks = [flight.track for flight in flights]
     panels = (
-        Panel("altitude", "m AMSL", both([track.position[:, 2] for track in tracks])),
-        Panel("height above ground", "m", both([_height_above_ground(flight) for flight in flights])),
-        Panel("airspeed", "m/s", both([doubles(track.airspeed) for track in tracks]), min_span=4.0),
-        Panel("bank, right +", "°", both([np.degrees(doubles(_roll_angle(track))) for track in tracks])),
-        Panel("cross-track, right +", "m", both([doubles(track.cross_track) for track in tracks]), min_span=0.1),
-        Panel("throttle", "%", both([100.0 * doubles(_throttle_fraction(track)) for track in tracks])),
+        Panel("altitude", "m AMSL", flight_lines([track.position[:, 2] for track in tracks])),
+        Panel("height above ground", "m", flight_lines([_height_above_ground(flight) for flight in flights])),
+        Panel("airspeed", "m/s", flight_lines([to_float64(track.airspeed) for track in tracks]), min_span=4.0),
+        Panel("bank, right +", "°", flight_lines([np.degrees(to_float64(_roll_angle(track))) for track in tracks])),
+        Panel(
+            "cross-track, right +", "m", flight_lines([to_float64(track.cross_track) for track in tracks]), min_span=0.1
+        ),
+        Panel("throttle", "%", flight_lines([100.0 * to_float64(_throttle_fraction(track)) for track in tracks])),
     )
     return Chart("Two flights along their paths", "distance flown over the ground", "km", panels)
 
@@ -119,8 +121,8 @@ _REFLOWN = (
 )
 
 
-def refly_charts(again: Reflight) -> dict[str, Chart]:
-    """Return charts over the distance, as flown and as simulated, by name of the PNG.
+def refly_charts(reflight: Reflight) -> dict[str, Chart]:
+    """Return a chart of each quantity over the distance, as flown and as simulated, by PNG file name.
 
     Quantities that the log lacks have no chart.
 
@@ -134,11 +136,11 @@ def refly_charts(again: Reflight) -> dict[str, Chart]:
     >>> list(refly_charts(again))[:2]
     ['refly-cross-track.png', 'refly-height.png']
     """
-    along = again.distance / 1e3
-    marks = leg_marks(again.first + np.searchsorted(again.ends, again.distance, side="right"), along)
+    along = reflight.distance / 1e3
+    marks = leg_marks(reflight.first + np.searchsorted(reflight.ends, reflight.distance, side="right"), along)
     charts = {}
     for file, name, title, unit, factor, span in _REFLOWN:
-        flown_values, simulated_values = factor * getattr(again.flown, name), factor * getattr(again.model, name)
+        flown_values, simulated_values = factor * getattr(reflight.flown, name), factor * getattr(reflight.model, name)
         if not np.isfinite(flown_values).any():
             continue
         lines = (series("flown", "flown", along, flown_values), series("simulated", "other", along, simulated_values))
@@ -147,6 +149,6 @@ def refly_charts(again: Reflight) -> dict[str, Chart]:
             Panel(title, unit, lines, min_span=span),
             Panel("difference", unit, difference, limits=(("", 0.0),), min_span=0.5 * span),
         )
-        heading = f"{shorten(again.setup.scenario.name, 40)}: flown, and by the model {again.setup.aircraft}"
+        heading = f"{shorten(reflight.setup.scenario.name, 40)}: flown, and by the model {reflight.setup.aircraft}"
         charts[file] = Chart(heading, "along the legs", "km", panels, marks=marks)
     return charts

@@ -44,7 +44,7 @@ def draw_map(chart: MapChart) -> Figure:
     with clean_style():
         handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
         legend_height = _legend_height(handles)
-        figure, axes = map_frame(chart.east, chart.north, legend_height)
+        figure, axes = make_map_axes(chart.east, chart.north, legend_height)
         axes.set_xlabel(f"east of {chart.origin} (km)")
         axes.set_ylabel("north (km)")
         axes.set_title(chart.title, fontweight="bold")
@@ -62,9 +62,10 @@ def _legend_height(handles: list[Any]) -> float:
     return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 
 
-def map_frame(east: tuple[float, float], north: tuple[float, float], legend_height: float) -> tuple[Figure, Any]:
-    """Make figure and axes of a map with these ranges (m).
+def make_map_axes(east: tuple[float, float], north: tuple[float, float], legend_height: float) -> tuple[Figure, Any]:
+    """Make the figure and the axes of a map.
 
+    east, north: range of the map, m.
     legend_height: height of the legend below the map, inches.
     """
     height = _MAP_WIDTH * (north[1] - north[0]) / (east[1] - east[0])
@@ -93,9 +94,9 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
     if terrain is None:
         figure.text(s="no terrain\nwas given", **note)
         return []
-    pitch = max(terrain.spacing * 0.5, np.ptp(east_range) / 900.0)
-    east = np.linspace(east_range[0], east_range[1], 2 + int(np.ptp(east_range) / pitch))
-    north = np.linspace(north_range[0], north_range[1], 2 + int(np.ptp(north_range) / pitch))
+    sample_spacing = max(terrain.spacing * 0.5, np.ptp(east_range) / 900.0)
+    east = np.linspace(east_range[0], east_range[1], 2 + int(np.ptp(east_range) / sample_spacing))
+    north = np.linspace(north_range[0], north_range[1], 2 + int(np.ptp(north_range) / sample_spacing))
     heights = terrain.height(east[None, :], north[:, None])
     if not np.isfinite(heights).any():
         figure.text(s="no terrain\nhere", **note)
@@ -143,8 +144,9 @@ def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, co
 
 
 def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend_height: float = 0.0) -> None:
-    """Draw north and the direction of each wind in the column right of the map (left edge in inches).
+    """Draw north and the direction of each wind in the column right of the map.
 
+    column: left edge of the column, inches.
     legend_height: height of the legend below the map, inches; the notes on winds stay above its upper edge.
     """
     figure_height = float(figure.get_figheight())
@@ -181,7 +183,7 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
 
 
 def _wind_text(named_wind: NamedWind) -> str:
-    """Describe a wind in a few short lines."""
+    """Return the note below the compass on a wind: flight, speed, direction and turbulence."""
     wind = named_wind.wind
     text = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
     if wind.speed > 0.0:

@@ -79,12 +79,10 @@ class Projection:
 
 
 def draw_scene(view: SceneView) -> Figure:
-    """Draw the scene from the side of the line from start to destination.
+    """Draw the 3-D scene of a flight, seen from the side of the line from start to destination.
 
-    The title states the stretch of heights.
-
-    Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground around it,
-    so that it does not appear as a strip.
+    The title states the factor by which heights are exaggerated.  Lines are dashed and thin behind a ridge.  A long and
+    narrow scene is seen more from its end, with ground around it, so that it does not appear as a strip.
     """
     setup, track, failed = view.setup, view.track, view.failed
     scene_limits = scene_bounds(setup, track)
@@ -111,7 +109,7 @@ def draw_scene(view: SceneView) -> Figure:
 
 
 def _widen_bounds(bounds: Floats) -> Floats:
-    """Widen the bounds of a narrow scene, (2, 2) m, to the smallest allowed ratio of the sides."""
+    """Widen the bounds (m, (2, 2)) of a narrow scene to the smallest allowed ratio of the sides."""
     sides = np.ptp(bounds, axis=1)
     widening = 0.5 * np.maximum(_MIN_SIDE_RATIO * sides.max() - sides, 0.0)
     return np.asarray(bounds + np.stack([-widening, widening], axis=1))
@@ -128,7 +126,10 @@ def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: b
 
 
 def _compass_name(azimuth: float) -> str:
-    """Name the side from which a viewer looks.  azimuth: rad, counter-clockwise from east."""
+    """Return the name of the side from which a viewer looks, such as "south-west".
+
+    azimuth: direction of the viewer, rad, counter-clockwise from east.
+    """
     names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
     return names[round(azimuth / (math.pi / 4.0)) % 8]
 
@@ -175,7 +176,10 @@ def _make_axes(
 
 
 def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
-    """Draw the cells of the ground from the farthest to the nearest, shaded by light from the north-west."""
+    """Draw the cells of the ground from the farthest to the nearest, shaded by light from the north-west.
+
+    Without terrain, draw a level plane.  Return the legend's handles.
+    """
     if grid is None:
         level_altitude = float(projection.middle[2])
         corners = np.array(
@@ -224,7 +228,7 @@ def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bou
 
 
 def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
-    """Draw outlines of the upper halves of spheres, at the altitude of their centers.
+    """Draw the domes of missiles and radars, the upper halves of their spheres; return legend handles.
 
     Spheres that the flight enters have a broad outline.
     """
@@ -254,7 +258,10 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
 
 
 def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
-    """Draw walls of the zones, from ground or floor to the ceiling, or to above the path."""
+    """Draw the walls of the zones, from ground or floor to the ceiling, or to above the path.
+
+    Return the legend's handles.
+    """
     zones, route = setup.scenario.zones, setup.route.waypoints
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
     for zone in zones:
@@ -278,13 +285,13 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
 
 
 def _legend_handle(kind: LayerKind, role: str, text: str) -> Any:
-    """Return the handle of a line in the legend."""
+    """Return the handle of a legend entry with the look of a role."""
     empty = np.zeros(0)
     return legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 
 
 def _find_hidden_points(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
-    """Return flags of the points (n, 3) that the ground hides from the viewer."""
+    """Return a mask (n,): True for points (n, 3) that the ground hides from the viewer."""
     is_hidden = np.zeros(len(points), dtype=bool)
     if terrain is None:
         return is_hidden

@@ -145,7 +145,9 @@ def png_bytes(figure: Figure) -> bytes:
 
 
 def jpeg_bytes(png: bytes) -> bytes:
-    """Return a PNG as a JPEG, which takes a quarter of the bytes for shaded ground and a tenth of the time to write.
+    """Convert a PNG to a JPEG.
+
+    For shaded ground, the JPEG takes a quarter of the bytes and a tenth of the time to write.
 
     >>> jpeg_bytes(png_bytes(new_figure(1.0)))[:3].hex()
     'ffd8ff'
@@ -166,7 +168,9 @@ def svg_bytes(figure: Figure) -> bytes:
 
 
 def page_svg(figure: Figure, description: str) -> str:
-    """Return the figure as a page element, in the light and dark colours of the page (`theme.css_variables`).
+    """Return the figure as an SVG element of a page, in the page's light and dark colours.
+
+    The colours are those of `theme.css_variables`.
 
     description: description for readers who cannot see the figure.
 
@@ -191,7 +195,7 @@ def page_svg(figure: Figure, description: str) -> str:
 
 @contextmanager
 def _picture_settings() -> Iterator[None]:
-    """Use the common settings for a picture, without warnings of names in letters that the font shows as boxes."""
+    """Use the common settings for a picture, without warnings about letters that the font lacks."""
     with clean_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
         yield
@@ -262,7 +266,10 @@ def _panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, flo
 
 
 def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
-    """Return the label of the horizontal axis, and how much larger altitudes are drawn than distances."""
+    """Return the label of the horizontal axis.
+
+    If the chart is scaled, the label states how much larger heights are drawn than distances.
+    """
     label = f"{chart.along} ({chart.unit})" if chart.along else panel.along
     if not chart.scaled:
         return label
@@ -273,7 +280,9 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 
 
 def can_share_legend(panels: Sequence[Panel]) -> bool:
-    """Return True if all panels can share a legend: looks and meanings correspond one to one, and some repeat.
+    """Return True if all panels can share a legend.
+
+    They can if each look has one meaning and each meaning one look in all panels, and some repeat.
 
     >>> none = np.zeros(2)
     >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
@@ -303,7 +312,7 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
         axes.xaxis.set_major_locator(MultipleLocator(nice_step(float(np.ptp(axes.get_xlim())), 14)))
         _draw_marks(axes, chart.marks, has_leg_numbers=has_leg_numbers and chart.legend == "beside")
     else:
-        _label_places(axes, panel)
+        _set_place_ticks(axes, panel)
     axes.set_ylim(*panel.shown_span())
     if chart.legend == "below" and axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]:
         axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.7, zorder=1)
@@ -357,8 +366,8 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
         last_middle = middle
 
 
-def _label_places(axes: Any, panel: Panel) -> None:
-    """Label the horizontal axis with waypoints or legs, with failing ones in the colour of failures."""
+def _set_place_ticks(axes: Any, panel: Panel) -> None:
+    """Label the horizontal axis by numbers of waypoints or legs, failing ones in the colour of failures."""
     positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
     label_interval = -(-len(positions) // _MAX_TICKS)
@@ -442,7 +451,7 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _area_look(look: theme.Look) -> dict[str, Any]:
-    """Return matplotlib's style of a filled area."""
+    """Return matplotlib's style options of a filled area."""
     edge = (theme.colour(look.edge) if look.edge else look.light) if look.width or look.hatch else "none"
     return {
         "facecolor": (*theme.rgb(look.light), look.fill),
@@ -473,7 +482,7 @@ def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
-    """Return matplotlib's style of markers; many markers are smaller."""
+    """Return matplotlib's style options of markers; many markers are smaller."""
     size = 3.0 if count > _MAX_TICKS and look.size == 5.5 else look.size
     style: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
     if look.face:
@@ -488,7 +497,7 @@ def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> No
 
 
 def _ring_look(look: theme.Look) -> dict[str, Any]:
-    """Return matplotlib's style of hollow circles."""
+    """Return matplotlib's style options of hollow circles."""
     return {
         "marker": "o",
         "linestyle": "",
@@ -608,7 +617,7 @@ def _add_legend_beside(axes: Any) -> None:
 
 
 def _add_legend_above(figure: Figure, top: float) -> None:
-    """Draw each entry of the panels once, in a row.
+    """Draw one legend for all panels, in a row above them.
 
     top: upper edge as a fraction of the height of the figure.
     """

@@ -49,7 +49,7 @@ class FlownMoments:
 
 
 def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
-    """Return at most ``count`` moments of a track with finite values."""
+    """Return at most ``count`` moments of a flight, evenly spaced; moments with NaN values are omitted."""
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), count)).astype(np.intp))
     air_velocity = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
     east, north, up = air_velocity.T
@@ -62,7 +62,7 @@ def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
 
 
 def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
-    """Return two panels over true airspeed (m/s): air-relative path angle and bank, with their limits.
+    """Chart the air-relative path angle and the bank over true airspeed, with their limits.
 
     Limits apply at the lowest and highest altitude of the route.  Dots are moments of the flight; a pull-up or a gust
     may exceed the limits for a moment, a leg may not.

@@ -38,18 +38,21 @@ class Failures:
         """Return True if anything failed at a place."""
         return bool(self.legs or self.waypoints or self.threats)
 
-    def name(self, kind: PlaceKind, number: int) -> str:
+    def place_name(self, kind: PlaceKind, number: int) -> str:
         """Return the name of a leg or a waypoint in the verdict.
 
-        >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).name("leg", 7)
+        >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).place_name("leg", 7)
         'leg 7, to item 9'
-        >>> Failures({7: ("slope",)}, {}).name("leg", 7)
+        >>> Failures({7: ("slope",)}, {}).place_name("leg", 7)
         'leg 7'
         """
         return place_text(self.places.get((kind, number), Place(kind, number)))
 
     def threat_names(self) -> dict[int, str]:
-        """Return the verdict's name of each failing threat, keyed by its index; the missile's name takes precedence."""
+        """Return the verdict's name of each failing threat, by its index.
+
+        A unit that fails as a missile and as a radar is named as a missile.
+        """
         radars_first = sorted(self.threats, key=lambda place: place.kind == "missile")
         return {place.index or 0: place_text(place) for place in radars_first}
 
@@ -80,7 +83,7 @@ def _failed_rules_by_number(failed_findings: list[Finding], kind: PlaceKind, cou
 
 
 def stop_rows(stops: Sequence[int]) -> list[int]:
-    """Return the waypoints at which a stop begins: for a loiter, the first of its corners.
+    """Return the index of the first waypoint of each stop; a loiter is one stop with several corners.
 
     stops: number of the stop of each waypoint, in flying order.
 
@@ -96,7 +99,10 @@ def route_distance(waypoints: Floats) -> Floats:
 
 
 def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
-    """Return distance (s,) m and position (s, 3) m of waypoints and points between, at most `step` apart."""
+    """Sample a route at its waypoints and at points between them, at most `step` (m) apart.
+
+    Returns the distance along the route, m, (s,), and the position, m, (s, 3), of each sample.
+    """
     waypoint_distances = route_distance(waypoints)
     count = max(2, int(np.ceil(waypoint_distances[-1] / step)) + 1) if waypoint_distances[-1] > 0.0 else 2
     distance = np.union1d(np.linspace(0.0, waypoint_distances[-1], count), waypoint_distances)
@@ -104,15 +110,15 @@ def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
 
 
 def paths_differ(first_path: Floats, second_path: Floats, tolerance: float) -> bool:
-    """Return True if any corner of either path is further than `tolerance` (m) from the other path.
+    """Return True if a corner of either path is farther than `tolerance` (m) from the other path.
 
-    first_path, second_path: (n, 3) and (m, 3) m.
+    first_path, second_path: corners of the paths, m, (n, 3) and (k, 3).
     """
     return max(_max_distance(first_path, second_path), _max_distance(second_path, first_path)) > tolerance
 
 
 def _max_distance(points: Floats, path: Floats) -> float:
-    """Return the largest distance (m) of the points from the path."""
+    """Return the largest distance (m) of any of the points from the path."""
     start, step = path[:-1], np.diff(path, axis=0)
     length_square = (step**2).sum(axis=1)
     max_distance = 0.0
@@ -146,18 +152,19 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 def fail_labels(
     failed: Failures, corners: Floats, threat_positions: Mapping[int, tuple[float, float]]
 ) -> tuple[Label, ...]:
-    """Name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
+    """Return labels with the names of failing rules, at the first failing legs, threats and waypoints.
 
-    corners: (w, 2) drawn positions of the route's waypoints.  threat_positions: positions of threats by index;
-    other threats get no label.
+    corners: (w, 2) drawn positions of the route's waypoints.
+    threat_positions: positions of threats by index; other threats get no label.
     """
     middles = 0.5 * (corners[:-1] + corners[1:])
-    labels = [(f"{failed.name('leg', k)}: {', '.join(rules)}", *middles[k]) for k, rules in failed.legs.items()]
+    labels = [(f"{failed.place_name('leg', k)}: {', '.join(rules)}", *middles[k]) for k, rules in failed.legs.items()]
     labels += [
         (f"{text}: threat", *threat_positions[k]) for k, text in failed.threat_names().items() if k in threat_positions
     ]
     labels += [
-        (f"{failed.name('waypoint', k)}: {', '.join(rules)}", *corners[k]) for k, rules in failed.waypoints.items()
+        (f"{failed.place_name('waypoint', k)}: {', '.join(rules)}", *corners[k])
+        for k, rules in failed.waypoints.items()
     ]
     return tuple(Label(text, float(x), float(y), "fail", "fail") for text, x, y in labels[:_MAX_LABELS])
 
@@ -169,7 +176,7 @@ def threat_radius(threats: Threats, place: Place) -> float:
 
 
 def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
-    """Return flags (t,) of the rows of the track inside a sphere whose rule fails."""
+    """Return a mask (t,): True for rows of the track inside a sphere whose rule fails."""
     is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]

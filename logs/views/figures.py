@@ -36,7 +36,7 @@ View = Chart | MapChart | SceneView
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """Data for the figures.
+    """Flight or plan that the figures show.
 
     setup: setup with the mission's fence among the zones.
     track: track of at least one row; None for a plan that was not flown.
@@ -50,7 +50,7 @@ class Subject:
 
     @property
     def contents_text(self) -> str:
-        """Text that lists ground, threats and paths."""
+        """Text that lists what a figure shows: ground, threats and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
         return (
@@ -83,7 +83,7 @@ class FigureEntry:
 
 
 def _path_arguments(subject: Subject) -> dict[str, Any]:
-    """Return the arguments of plan, route, track and verdict that all views of the path share."""
+    """Return the keyword arguments that the map and the profile share: plan, route, track, verdict, stops."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -106,7 +106,7 @@ def _make_scene(subject: Subject) -> SceneView:
 
 
 def _flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
-    """Make a builder of views that returns None for a plan that was not flown."""
+    """Make a function that builds a view of a flight, and returns None for a plan that was not flown."""
     return lambda subject: None if subject.track is None else make_chart(subject.setup, subject.track)
 
 
@@ -120,17 +120,17 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 
 
 def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> dict[str, View]:
-    """Build the descriptions of figures on returns, by name; figures without data are omitted."""
+    """Build the views of returns, by name of the figure; figures without data are omitted."""
     setup = with_fence_zones(setup)
     views = ((name, make_view(setup, drawn_returns, track)) for name, make_view in RETURN_FIGURES.items())
     return {name: view for name, view in views if view is not None and drawn_returns.returns.each}
 
 
 def _returns_view(name: str) -> Callable[[Subject], View | None]:
-    """Make a builder of one view on returns."""
+    """Make a function that builds one of the `RETURN_FIGURES`, and returns None if no returns were judged."""
 
     def view(subject: Subject) -> View | None:
-        """Return the view, or None if no returns were judged."""
+        """Return the figure's view, or None if no returns were judged."""
         if subject.returns is None or not subject.returns.returns.each:
             return None
         return RETURN_FIGURES[name](subject.setup, subject.returns, subject.track)
@@ -139,17 +139,17 @@ def _returns_view(name: str) -> Callable[[Subject], View | None]:
 
 
 def _fixed_caption(text: str) -> Callable[[Subject], str]:
-    """Make a caption that is the same for every subject."""
+    """Make a caption function that returns the same text for every subject."""
     return lambda _: text
 
 
 def _as_sentence(line: str) -> str:
-    """Write a line as a sentence: with a capital letter and a full stop."""
+    """Return a line as a sentence, with a capital letter, a full stop and a space."""
     return f"{line[:1].upper()}{line[1:]}. "
 
 
 def _map_caption(subject: Subject) -> str:
-    """Describe the lines of the map."""
+    """Return the caption of the map, which explains its lines."""
     arc_text = " At corners the two differ: the aircraft flies an arc inside the waypoint."
     flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
         arc_text if subject.setup.source is None else ""
@@ -340,14 +340,12 @@ FIGURES = (
 def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """Return the data for figures; a track without rows is omitted."""
+    """Return the subject of the figures; a track without rows is omitted."""
     return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
 
 
 def figure_views(subject: Subject) -> dict[str, View]:
-    """Build the descriptions of all figures of a flight or of a plan, by name.
-
-    Figures without data are omitted.
+    """Build the views of all figures of a flight or of a plan, by name; figures without data are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
@@ -360,7 +358,10 @@ def figure_views(subject: Subject) -> dict[str, View]:
 
 
 def draw(view: View) -> "Figure":
-    """Draw a description with matplotlib, which takes most of a second to import."""
+    """Draw a view with matplotlib.
+
+    Matplotlib is imported here, because its import takes most of a second.
+    """
     from logs.views.draw_map import draw_map
     from logs.views.draw_scene import draw_scene
     from logs.views.drawing import draw_chart
@@ -371,7 +372,7 @@ def draw(view: View) -> "Figure":
 
 
 def view_json(view: View) -> dict[str, Any]:
-    """Return a description as JSON data, for the page."""
+    """Return a view as JSON data for the page."""
     if isinstance(view, MapChart):
         return map_json(view)
     return scene_data(view) if isinstance(view, SceneView) else chart_json(view)
@@ -383,7 +384,7 @@ def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> d
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
-    """Render figures, each 1500 px wide: file names (`map.png`) and bytes.
+    """Render figures as PNG, 1500 px wide; return the bytes by file name (`map.png`).
 
     svg: True to render each figure as SVG (`map.svg`), too.
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logs.views.charts import Chart, Label, Layer, Panel
-from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
+from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
 from planner.search.plan_front import Front
 
 # One watt hour, J.
@@ -43,9 +43,9 @@ def _named_plans(front: Front) -> list[_NamedPlan]:
 
 
 def front_map(front: Front) -> MapChart:
-    """Return all plans of a non-empty front from above.
+    """Return a map of all plans of a non-empty front.
 
-    The best in each objective are numbered and stand out.
+    The best plan in each objective is numbered and stands out.
     """
     scenario, named_plans = front.plans[0].plan.scenario, _named_plans(front)
     named_rows = {plan.row for plan in named_plans}
@@ -62,7 +62,7 @@ def front_map(front: Front) -> MapChart:
         labels.append(Label(str(named_plan.row + 1), float(middle[0]), float(middle[1]), "number", named_plan.role))
     paths = [plan.plan.waypoints for plan in front.plans]
     shortest = paths[0]
-    return world_map(
+    return scenario_map(
         scenario,
         f"front of {len(paths)} plans from above",
         layers,
@@ -74,7 +74,7 @@ def front_map(front: Front) -> MapChart:
 
 
 def front_chart(front: Front) -> Chart:
-    """Return exposure, height above ground, and energy or time of each plan over its length."""
+    """Chart each plan's exposure, height above ground, energy and time of flight over its length."""
     named_plans, plans = _named_plans(front), front.plans
     lengths = np.array([plan.length for plan in plans]) / 1e3
     other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])

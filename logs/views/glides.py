@@ -8,7 +8,7 @@ from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text, site_text
 from logs.verdict.returns.judge_glides import REACHES, Glide, Reach
 from logs.views.charts import Label, Layer
-from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, world_map
+from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.returns import path_layers
 
 # Role and name of the path by destination within reach without an engine.
@@ -16,7 +16,7 @@ _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(r
 
 
 def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | None:
-    """Return the glide footprint from above, and the path coloured by destination in reach.
+    """Return a map of the glide footprint, and of the path coloured by the destination in reach.
 
     Return None if glides were not judged.
     """
@@ -43,7 +43,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
     labels = [
         Label(name, site.east, site.north, "end", "waypoint") for name, site in zip(names, glides.sites, strict=True)
     ]
-    return world_map(
+    return scenario_map(
         scenario,
         "without its engine",
         layers,
@@ -55,16 +55,16 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
 
 
 def _glide_text(glide: Glide, drawn_returns: DrawnReturns) -> str:
-    """Describe the best destination of one glide, and the altitude to spare."""
+    """Return the hover text of a glide: its best destination, and the altitude to spare."""
     altitude_left = drawn_returns.glides.altitude_left(glide)
     left_text = f", {altitude_left:.0f} m of altitude to spare" if altitude_left >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 
 def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:
-    """Return layers of the glide footprint: minimum heights above ground to reach a site, and flat ground.
+    """Return layers of the glide footprint; [] if none was computed.
 
-    The list is empty without a map.
+    They are the areas by the lowest height above ground from which a site can be reached, and flat ground.
     """
     footprint = drawn_returns.glides.footprint
     if footprint is None:

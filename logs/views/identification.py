@@ -11,7 +11,7 @@ _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/
 
 
 def equation_chart(equation: Equation) -> Chart:
-    """Return a chart of measured and predicted values, and their difference, over the time of all log segments.
+    """Chart measured and predicted values of an equation, and their difference, over all log segments.
 
     >>> wave = np.sin(np.arange(500) / 20.0)
     >>> chart = equation_chart(Equation("pitch acceleration", "rad/s2", 25.0, wave, 0.9 * wave, 0.99, 0.1))
@@ -33,7 +33,10 @@ def equation_chart(equation: Equation) -> Chart:
 
 
 def prediction_chart(predicted: PredictedLog) -> Chart:
-    """Return measured quantities, and the identified model's predictions half a second before, one panel each."""
+    """Chart measured quantities and the identified model's predictions, one panel for each quantity.
+
+    The predictions were made half a second before.
+    """
     panels = tuple(
         Panel(
             name,

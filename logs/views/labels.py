@@ -119,7 +119,7 @@ class LabelPlacer:
             artist.set_path_effects([outline])
 
     def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
-        """Draw a thin line from under a label to its point."""
+        """Draw a thin line from the centre of a label's box, below the label, to its point."""
         center = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         line_ends = self.axes.transData.inverted().transform([center, (x, y)])
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
@@ -145,9 +145,11 @@ class LabelPlacer:
         )
 
     def _order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a box that stands on the wrong side of labels of near points.
+        """Return the cost of a label's box that stands on the wrong side of the labels of near points.
 
-        A framed label needs no order, because it has a line to its point.
+        A framed label has no such cost, because it has a line to its point.
+
+        x, y: point of the label, pixels.
         """
         cost = 0.0
         for other_box, (other_x, other_y) in zip(self.boxes, self.points, strict=True):
@@ -163,7 +165,7 @@ class LabelPlacer:
         return cost
 
     def _box_cost(self, box: Box) -> float:
-        """Rate a box: 0 for a free one, more if it leaves the frame or covers labels or lines."""
+        """Return the cost of a box: 0 if it is free, more if it leaves the frame or covers labels or lines."""
         frame = self.axes.get_window_extent()
         cost = 0.0
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:

@@ -8,11 +8,11 @@ import numpy as np
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.link_outages import LinkAlongPath
 from logs.views.charts import Chart, Label, Layer, Panel, series, shorten
-from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
+from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.returns import path_layers
 from world.arrays import Floats
 
-# Margin over the fade margin below which the map calls the link weak, dB.
+# Margin above the fade margin below which the map calls the link weak, dB.
 WEAK_MARGIN_DB = 6.0
 LinkQuality = Literal["kept", "weak", "lost", "unknown"]
 # Role and name of the path by the quality of the link; the first is drawn lowest.
@@ -25,7 +25,7 @@ _LOOKS: dict[LinkQuality, tuple[str, str]] = {
 
 
 def link_quality(margin: float) -> LinkQuality:
-    """Return the quality of the link by its margin over the fade margin, dB.
+    """Return the quality of a link from its margin above the fade margin, dB.
 
     >>> link_quality(8.0), link_quality(2.0), link_quality(-1.0), link_quality(float("nan"))
     ('kept', 'weak', 'lost', 'unknown')
@@ -36,11 +36,14 @@ def link_quality(margin: float) -> LinkQuality:
 
 
 def link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
-    """Return a chart of the margin over the fade margin, the terrain loss and the distance over time."""
+    """Chart the margin above the fade margin, the terrain loss and the distance over time."""
     points = along.points
 
     def panel(title: str, unit: str, values: Floats, limits: tuple[tuple[str, float], ...] = ()) -> Panel:
-        """Return a panel with the flown values over time; limits: names and values of lines to draw."""
+        """Return a panel of values over time.
+
+        limits: names and values of the limit lines.
+        """
         return Panel(title, unit, (series("flown", "flown", along.time, values),), limits=limits)
 
     panels = (
@@ -53,7 +56,10 @@ def link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
 
 
 def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapChart:
-    """Return the path from above by the quality of the link, and the station.  antenna: (3,) m."""
+    """Return a map of the path, coloured by the quality of the link, and of the station.
+
+    antenna: position of the station's antenna, m, (3,).
+    """
     scenario, route, points = setup.scenario, setup.route.waypoints, along.points
     qualities = [link_quality(float(margin)) for margin in points.margin]
     segments = []
@@ -73,7 +79,7 @@ def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapCh
     layers = path_layers(segments, _LOOKS, position, point_text)
     layers.append(Layer("dots", "station", "waypoint", antenna[:1], antenna[1:2], hover_texts=("station",)))
     label = Label("station", float(antenna[0]), float(antenna[1]), "end", "waypoint", (1, 1))
-    return world_map(
+    return scenario_map(
         scenario,
         "the radio link along the flight",
         layers,

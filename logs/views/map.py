@@ -10,7 +10,7 @@ from flight.simulation.track import Track
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Json, Label, Layer, Panel, numbers, panel_json, shorten
 from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ, stop_rows
-from logs.views.threats_and_zones import threat_circles, threat_names, zone_names, zone_shapes
+from logs.views.threats_and_zones import threat_circles, threat_labels, zone_labels, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.arrays import Floats
 from world.scenario import Scenario
@@ -143,12 +143,12 @@ def map_chart(
     labels += end_labels(scenario, route, None if route is None else stops)
     labels += [] if route is None else _waypoint_labels(scenario, route, stops, failed)
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
-    return world_map(
+    return scenario_map(
         scenario, subject, layers, labels, extent, route=route, failing_threats=frozenset(failing_threats), winds=winds
     )
 
 
-def world_map(
+def scenario_map(
     scenario: Scenario,
     subject: str,
     layers: Sequence[Layer],
@@ -159,11 +159,14 @@ def world_map(
     failing_threats: frozenset[int] = frozenset(),
     winds: Sequence[NamedWind] = (),
 ) -> MapChart:
-    """Return a map of a scenario: its area, threats and zones under layers, start and destination over them.
+    """Return a map of a scenario with the given layers.
 
-    labels: labels that take precedence over the names of threats and zones.  extent: range as from `map_extent`.
-    route: (w, 3) m, whose altitudes determine the filled sections of missiles.
-    failing_threats: threats whose rule fails.
+    They are drawn above area, threats and zones, and below start and destination.
+
+    labels: labels that take precedence over the names of threats and zones.
+    extent: range as from `map_extent`.
+    route: waypoints (w, 3), m, whose altitudes determine the filled sections of missiles.
+    failing_threats: indices of the threats whose rule fails.
     """
     east, north = extent
     area_layers = [
@@ -171,7 +174,7 @@ def world_map(
         *threat_circles(scenario.threats, route, failing_threats),
         *zone_shapes(scenario.zones),
     ]
-    names = [*threat_names(scenario.threats, failing_threats), *zone_names(scenario.zones)]
+    names = [*threat_labels(scenario.threats, failing_threats), *zone_labels(scenario.zones)]
     names = [name for name in names if east[0] < name.x < east[1] and north[0] < name.y < north[1]]
     origin = scenario.origin
     return MapChart(
@@ -196,10 +199,11 @@ def map_json(chart: MapChart) -> Json:
 
 
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
-    """Return the east and north range of the scenario's area and everything outside, with a margin, m.
+    """Return the east and north range that shows the scenario's area and all paths, with a margin, m.
 
-    paths: paths (t, 3) m; unknown rows are ignored.
     Bounds made around an external mission limit nothing: the range covers its path, and the parts of zones within them.
+
+    paths: paths (t, 3), m; rows with NaN are ignored.
     """
     points = [scenario.start[None, :2], scenario.destination[None, :2]]
     if scenario.external:
@@ -221,9 +225,9 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
 
 
 def _area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Draw the edge of the scenario's area.
+    """Return the layer of the edge of the scenario's area.
 
-    Bounds made around an external mission limit nothing and are not drawn.
+    There is none for an external mission, because the bounds made around it limit nothing.
     """
     if scenario.external:
         return []
@@ -233,7 +237,7 @@ def _area_edge_layers(scenario: Scenario) -> list[Layer]:
 
 
 def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
-    """Draw failing legs under the route, and the plan if it differs."""
+    """Return the layers of the failing legs, of the plan if it differs from the route, and of the route."""
     has_different_plan = plan is not None and paths_differ(plan, route, 1.0)
     legs = [route[k : k + 2] for k in failed.legs]
     layers = [Layer("line", "leg that fails a rule", "failing-leg", leg[:, 0], leg[:, 1], quiet=True) for leg in legs]
@@ -252,7 +256,7 @@ def _track_layer(drawn_track: DrawnTrack) -> Layer:
 
 
 def _inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
-    """Return the part of a track inside a threat whose rule fails."""
+    """Return the layer of the part of a track inside a threat whose rule fails, if any."""
     is_inside = inside_threats(failed, scenario.threats, track)
     if not is_inside.any():
         return []
@@ -285,7 +289,7 @@ def _end_markers(scenario: Scenario) -> list[Layer]:
 
 
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | None = None) -> list[Label]:
-    """Label start and destination, with one label if they coincide.
+    """Return the labels of start and destination, one label if they coincide.
 
     If the first or last waypoint coincides with them, its number is part of the label.
     """
@@ -308,7 +312,10 @@ def _are_close(a: Floats, b: Floats) -> bool:
 
 
 def _waypoint_labels(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
-    """Label waypoints by their numbers, as far as they fit, and all that fail a rule; not start and destination."""
+    """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
+
+    Waypoints at start and destination are left out.
+    """
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     last = len(route) - 1
@@ -323,7 +330,7 @@ def _waypoint_labels(scenario: Scenario, route: Floats, stops: Sequence[int], fa
 
 
 def position_text(lat_deg: float, lon_deg: float) -> str:
-    """Format a position as an axis shows it; "" for an unknown position.
+    """Return a position as the label of an axis shows it; "" for an unknown position.
 
     >>> position_text(46.0, -8.5)
     '46.0000°, −8.5000°'

@@ -18,10 +18,12 @@ MAX_MOMENTS = 2000
 
 
 def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
-    """Return columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known position.
+    """Return columns of at most `MAX_MOMENTS` rows of a flight for the page, by name.
 
     time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
-    positive), pitch, heading (°); leg.  Unknown values are null.  In addition, legs: names of the legs.
+    positive), pitch, heading (deg); leg.  Unknown values are null.  In addition, legs: names of the legs.  Rows without
+    a position are left out.
+
     name, role: name and role of the line.
 
     >>> from logs.recording.example_log import example_log
@@ -84,7 +86,10 @@ def _item_or_none(item: int) -> int | None:
 
 
 def aircraft_model() -> dict[str, Any]:
-    """Return the aircraft model: coloured triangles with corners forward, left, up, one unit wide."""
+    """Return the triangles that depict the aircraft on the page, as their corners and colours.
+
+    Corners are forward, left and up, in units of the span.
+    """
 
     def rounded_list(values: NDArray[np.float32]) -> Any:
         """Return values as a list, rounded to four decimals."""

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from logs import theme
 from logs.views.charts import Label, Layer, Panel, legend_entries
-from logs.views.draw_map import draw_ground, map_frame
+from logs.views.draw_map import draw_ground, make_map_axes
 from logs.views.drawing import clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_label
 from logs.views.labels import LabelPlacer
 from logs.views.threats_and_zones import threat_circles
@@ -54,7 +54,9 @@ class PaperPath:
 
 
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
-    """Draw paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
+    """Draw the paths of one algorithm over contours, missile and radar circles.
+
+    As in Yang, Tang and Lozano 2014, Figs. 5-8.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -117,7 +119,7 @@ def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: floa
     min_corner, max_corner = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((max_corner - min_corner).max())
     (west, south), (east, north) = (min_corner - padding).tolist(), (max_corner + padding).tolist()
-    figure, axes = map_frame((west, east), (south, north), legend_height)
+    figure, axes = make_map_axes((west, east), (south, north), legend_height)
     axes.set(xlabel="east (km)", ylabel="north (km)")
     axes.set_title(title, fontweight="bold")
     ground_handles = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
@@ -197,7 +199,12 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
 
 
 def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
-    """Draw one algorithm on one problem; a search that ended early keeps its last value."""
+    """Draw how many searches of one algorithm have a safe path, and the length ratios of these paths.
+
+    A search that ended early keeps its last value.
+
+    upper, lower: axes of the number and of the length ratios, over generations.
+    """
     length = max(len(history) for history in histories)
     padded_histories = np.stack(
         [np.vstack([history, np.repeat(history[-1:], length - len(history), axis=0)]) for history in histories]

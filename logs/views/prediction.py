@@ -16,7 +16,7 @@ _LABEL_FRACTION = 0.12
 
 
 def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Chart:
-    """Return a panel for each quantity, with its band and the flight.
+    """Chart the predicted band of each quantity and the flown values, a panel for each quantity.
 
     by_time: True for bands over the time of the log, s, False for bands over the distance along the legs, m.
 
@@ -44,7 +44,10 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
 
 
 def _with_gaps(along: Floats, *columns: Floats) -> tuple[Floats, ...]:
-    """Return the axis and columns with a NaN wherever the axis jumps, as it does between segments of the log."""
+    """Insert NaN into an axis and its columns wherever the axis jumps.
+
+    It jumps between the segments of a log.
+    """
     steps = np.diff(along)
     jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1
     return along if not len(jumps) else np.insert(along, jumps, np.nan), *(

@@ -43,11 +43,12 @@ def profile_chart(
     stops: Sequence[int] | None = None,
     above_ground: Floats | None = None,
 ) -> Chart:
-    """Return a chart of altitudes (m AMSL) over the distance along the route (km).
+    """Chart altitudes (m AMSL) over the distance along the route (km).
 
     The route is route_waypoints (w, 3), or plan_waypoints if that is None; without either, the straight line from start
     to destination.  Ground, spheres and zones are cut by the vertical plane along the route.  Flown altitudes are drawn
     at the progress of the flight along the route, which never decreases.
+
     stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
     above_ground: (w,) m, as in `flight.mission.route.Route`; None if no leg follows the ground.
 
@@ -77,7 +78,7 @@ def profile_chart(
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
     stop_starts = stop_rows(stops)
-    zones, zone_names = zone_bands(scenario.zones, plane)
+    zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown_layers, entered_positions = _flown_layers(scenario, route, track, failed, plane)
     layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(waypoint_distances, route, failed)]
@@ -91,7 +92,7 @@ def profile_chart(
         labels = _waypoint_labels(waypoint_distances, route, stops, failed)
     layers += _failing_waypoints(waypoint_distances, route, failed)
     corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
-    labels = [*fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_names]
+    labels = [*fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_labels]
     limits, note = _limit_lines(scenario, min_altitude, max_altitude)
     panel = Panel(
         "altitude", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
@@ -102,9 +103,10 @@ def profile_chart(
 def _make_chart(
     scenario: Scenario, waypoint_distances: Floats, stop_starts: list[int], panel: Panel, *, is_straight: bool
 ) -> Chart:
-    """Return the panel as a chart.
+    """Make the chart of the profile from its panel.
 
-    waypoint_distances: distance of each waypoint along the route, m.  stop_starts: waypoints at which a stop begins.
+    waypoint_distances: distance of each waypoint along the route, m.
+    stop_starts: waypoints at which a stop begins.
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
@@ -188,7 +190,7 @@ def _altitude_limits(
 
 
 def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
-    """Return the ground, the band of the minimum clearance above it, and the height limit."""
+    """Return layers of the ground, of the required clearance above it, and of the height limit."""
     ground, along = plane.ground, plane.kilometres
     if ground is None:
         return []
@@ -210,7 +212,10 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
 def _flown_layers(
     scenario: Scenario, route: Floats, track: Track | None, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return flown altitudes, and entered threats along the flight, or along a plan that was not flown."""
+    """Return layers of flown altitudes and entered threats, and label positions of these threats.
+
+    For a plan that was not flown, the threats are those that the plan enters.
+    """
     if track is None:
         return entered_cuts(scenario.threats, failed, plane)
     progress, heights = track_distance(route, track) / 1000.0, track.position[:, 2]
@@ -231,7 +236,7 @@ def _flown_layers(
 
 
 def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
-    """Mark the legs that fail a rule."""
+    """Return layers that mark the legs that fail a rule."""
     return [
         Layer(
             "line",
@@ -246,7 +251,7 @@ def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -
 
 
 def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
-    """Mark the waypoints that fail a rule."""
+    """Return the layer that marks the waypoints that fail a rule, if any."""
     if not failed.waypoints:
         return []
     rows = list(failed.waypoints)
@@ -258,7 +263,7 @@ def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failur
 
 
 def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
-    """Label waypoints by their numbers, as far as they fit, and all that fail a rule."""
+    """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule."""
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0 or n == len(stop_starts) - 1} | set(
@@ -273,7 +278,7 @@ def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[
 def _limit_lines(
     scenario: Scenario, min_altitude: float, max_altitude: float
 ) -> tuple[tuple[tuple[str, float], ...], str]:
-    """Return ceiling and floor as level lines, and a note on a ceiling outside the picture."""
+    """Return ceiling and floor as horizontal lines, and a note if the ceiling is outside the picture."""
     if scenario.external:
         return (), ""
     ceiling, floor = f"ceiling, {scenario.ceiling:.0f} m AMSL", f"floor, {scenario.floor:.0f} m AMSL"

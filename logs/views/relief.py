@@ -5,20 +5,21 @@ import numpy as np
 from world.arrays import Floats
 
 
-def relief(heights: Floats, pitch: float, span: float) -> Floats:
-    """Return the brightness of shaded relief, (rows, columns): 0.55 in shade to 1.0 in light from the north-west.
+def relief(heights: Floats, spacing: float, span: float) -> Floats:
+    """Return the brightness of shaded relief, (rows, columns): 0.55 in shade to 1.0 in light.
 
-    Where heights are unknown (NaN), the ground is taken as level.
+    The light comes from the north-west.  Where heights are unknown (NaN), the ground is taken as level.
 
-    heights: (rows, columns) m, rows from south to north.  pitch: distance between rows, m.  span: difference between
-    lowest and highest height, m.
+    heights: (rows, columns) m, rows from south to north.
+    spacing: distance between rows, m.
+    span: difference between lowest and highest height, m.
 
     >>> slope = np.arange(3.0)[None, :] * np.ones((3, 1))
     >>> bool(relief(-slope, 1.0, 2.0).mean() < relief(slope, 1.0, 2.0).mean())  # falls to the east, then rises
     True
     """
     filled = np.where(np.isfinite(heights), heights, np.nanmean(heights))
-    up_north, up_east = np.gradient(filled, pitch)
+    up_north, up_east = np.gradient(filled, spacing)
     # Exaggerate gentle terrain, so that its ridges show.
     gain = float(np.clip(600.0 / span, 0.5, 4.0))
     slope_e, slope_n = gain * up_east, gain * up_north

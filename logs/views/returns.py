@@ -11,8 +11,8 @@ from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn
 from logs.verdict.returns.judge_glides import Glides
 from logs.verdict.returns.judge_returns import KINDS, Kind, SimulatedReturn
 from logs.verdict.returns.returns_text import outcome_text, segment_text
-from logs.views.charts import Chart, Label, Layer, Panel, parted, series, shorten
-from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
+from logs.views.charts import Chart, Label, Layer, Panel, join_with_gaps, series, shorten
+from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.profile import ground_bands, terrain_altitudes
 from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_bands
 from world.arrays import Floats
@@ -35,27 +35,31 @@ def path_layers(
     position_of: Callable[[Element], tuple[float, float]],
     text_of: Callable[[Element], str],
 ) -> list[Layer]:
-    """Return the path in one layer for each look, in the order of the looks.
+    """Return line layers of a path whose segments are coloured by key, one layer for each look.
 
     segments: key and elements of each segment of the path.
-    looks: role and name of each key.  position_of: coordinates of an element.  text_of: hover text of an element.
+    looks: role and name of each key, in the order of the layers.
+    position_of: coordinates of an element.
+    text_of: hover text of an element.
     """
     layers = []
     for role, name in dict.fromkeys(looks.values()):
         matching_segments = [elements for kind, elements in segments if looks[kind] == (role, name)]
-        x, y = parted([np.array([position_of(element) for element in elements]) for elements in matching_segments])
+        x, y = join_with_gaps(
+            [np.array([position_of(element) for element in elements]) for elements in matching_segments]
+        )
         texts = [text for elements in matching_segments for text in (*map(text_of, elements), "")]
         layers.append(Layer("line", name, role, x, y, hover_texts=tuple(texts)))
     return [layer for layer in layers if layer.x.size]
 
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
-    """Return the path from above, coloured by the outcome of returns, and the paths of the worst returns."""
+    """Return a map of the path, coloured by the outcome of a return from there, and of the worst returns."""
     scenario, route = setup.scenario, setup.route.waypoints
     limit = drawn_returns.returns.limit
 
     def return_text(ret: SimulatedReturn) -> str:
-        """Describe one return for the pointer: start, target and outcome."""
+        """Return the hover text of a return: start, target and outcome."""
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
     layers = path_layers(drawn_returns.segments_by_outcome, _LOOKS, lambda ret: ret.start[:2], return_text)
@@ -88,7 +92,7 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
     ]
     paths = [worst.path for worst in drawn_returns.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
     extent = map_extent(scenario, route, [*paths, np.array([ret.start for ret in drawn_returns.returns.each])])
-    return world_map(
+    return scenario_map(
         scenario,
         "returns to launch from points along the route",
         layers,
@@ -100,7 +104,7 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
 
 
 def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
-    """Mark the targets of returns."""
+    """Return the layer that marks the targets of returns, if any."""
     if not targets:
         return []
     east, north, _ = np.array(list(targets.values())).T
@@ -112,7 +116,7 @@ def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer
 
 
 def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Chart | None:
-    """Return altitude profiles of the worst returns with the ground below, one panel each.
+    """Chart the altitudes along the worst returns over the ground, a panel for each return.
 
     Return None without returns.
     """
@@ -135,7 +139,7 @@ def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Char
 
 
 def _altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float]:
-    """Return lowest and highest altitude of a path and the ground under it, with a margin, m."""
+    """Return the lowest and highest altitude of a return's path and the ground under it, with a margin, m."""
     ground = terrain_altitudes(scenario, worst.path)
     altitudes = np.concatenate([worst.path[:, 2], np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
@@ -144,11 +148,11 @@ def _altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float
 
 
 def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
-    """Draw the profile of one of the worst returns, with ground, zones and spheres."""
+    """Return the profile of one of the worst returns, with ground, zones and spheres."""
     path = worst.path
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
     plane = PathPlane(along, path, terrain_altitudes(scenario, path), *span)
-    zones, zone_names = zone_bands(scenario.zones, plane)
+    zones, zone_labels = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset())
     layers = [*zones, *cuts, *ground_bands(scenario, plane)]
     layers.append(Layer("line", "path of the return", "return-way", along, path[:, 2]))
@@ -159,7 +163,7 @@ def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tu
         )
     title = f"{number}: from {worst.simulated.time:.0f} s"
     note = segment_text(worst.simulated.kind).removeprefix("a return ")
-    return Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_names))
+    return Panel(title, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_labels))
 
 
 # ----------------------------------------------------------------------
@@ -167,9 +171,9 @@ def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tu
 
 
 def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> Chart | None:
-    """Chart over time the flown altitude by the outcome of a return, the lowest safe altitude, and glide margins.
+    """Chart over time the flown altitude, the lowest safe altitude for a return, and the glide margins.
 
-    Return None if no returns were judged.
+    The flown altitude is coloured by the outcome of a return.  Return None if no returns were judged.
     """
     if not drawn_returns.returns.each:
         return None
@@ -207,7 +211,10 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
 
 
 def _path_positions(drawn_returns: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
-    """Return times, s, (t,), and positions, m, (t, 3), of the path, from the track or from the starts of returns."""
+    """Return the times, s, (t,), and positions, m, (t, 3), of the path on which returns were judged.
+
+    They are the rows of the track, thinned, or the starts of the returns if the flight was not flown.
+    """
     first, last = drawn_returns.returns.each[0].time, max(ret.time for ret in drawn_returns.returns.each)
     if track is not None and drawn_returns.returns.flown:
         is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
@@ -220,7 +227,7 @@ def _path_positions(drawn_returns: DrawnReturns, track: Track | None) -> tuple[F
 
 
 def _glide_margin_panel(glides: Glides) -> Panel:
-    """Return a panel of the height margin over time for destinations within reach without the engine."""
+    """Return the panel of the altitude to spare of glides without the engine, over time, by destination."""
     time = np.array([glide.time for glide in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:

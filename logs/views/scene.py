@@ -42,7 +42,7 @@ class GroundGrid:
 
 
 def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
-    """Return the east and north range (2, 2) m of area, route and flight."""
+    """Return the east and north range of area, route and flight, m, (2, 2)."""
     points = [setup.scenario.bounds.T, setup.route.waypoints[:, :2]]
     if track is not None:
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
@@ -51,7 +51,10 @@ def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
 
 
 def ground_grid(terrain: Terrain | None, bounds: Floats, max_samples: int) -> GroundGrid | None:
-    """Sample the ground at up to ``max_samples`` crossings a side, with nearly square cells; None without ground."""
+    """Sample the ground in nearly square cells, with up to ``max_samples`` samples a side.
+
+    Return None without terrain, or if no height is known.
+    """
     if terrain is None:
         return None
     spans = np.ptp(bounds, axis=1)
@@ -86,7 +89,9 @@ def drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
 
 
 def script_json(data: object) -> str:
-    """Return JSON for an HTML script element, with "<" escaped: in a name it could end the element early.
+    """Return JSON for an HTML script element.
+
+    "<", ">" and "&" are escaped, because "</script>" in a name would end the element early.
 
     >>> "<" in script_json({"name": "</script>"}), json.loads(script_json({"name": "</script>"}))
     (False, {'name': '</script>'})
@@ -96,10 +101,10 @@ def script_json(data: object) -> str:
 
 
 def scene_data(view: SceneView) -> dict[str, object]:
-    """Return the scene as JSON data; the flight only determines the extent of the scene.
+    """Return the scene as JSON data for the page; the flight only determines its extent.
 
-    Numbers are rows of the plan with the numbers of their waypoints.
-    Lengths are in m; heights of the ground are 16-bit fractions of their range, little-endian, in base64.
+    Lengths are in m.  "numbers" lists the index and the number of each numbered waypoint.  The heights of the ground
+    are 16-bit fractions of their range, little-endian, in base64.
     """
     setup, failed = view.setup, view.failed
     bounds = scene_bounds(setup, view.track)
@@ -127,7 +132,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
 
 
 def _zone_walls(setup: FlightSetup) -> dict[str, object]:
-    """Return names, kinds and rings of zones, with lower and upper end of each corner.
+    """Return the zones as JSON data: name, kind, and rings with the lower and upper end of each corner.
 
     The result is empty without zones.
     """
@@ -151,7 +156,7 @@ def _zone_walls(setup: FlightSetup) -> dict[str, object]:
 
 
 def _ground_data(grid: GroundGrid) -> dict[str, object]:
-    """Encode the ground's altitudes as 16-bit fractions of their range, base64."""
+    """Return the ground as JSON data, with altitudes as 16-bit fractions of their range in base64."""
     min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
     fraction = (grid.heights - min_height) / max(max_height - min_height, 1e-6)
     codes = np.where(np.isfinite(fraction), np.round(fraction * (MISSING - 1)), MISSING).astype("<u2")

@@ -8,7 +8,7 @@ from flight.simulation.track import Track
 from logs.verdict.measures.photo_lines import LineMeasure, measure_line
 from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.views.charts import Chart, Label, Layer, Panel, parted
+from logs.views.charts import Chart, Label, Layer, Panel, join_with_gaps
 from world.arrays import Floats
 
 # Largest number of lines that are all numbered; of more lines every second, third, ... is numbered.
@@ -18,7 +18,7 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Return a panel for each survey, rotated so that its lines are horizontal.
+    """Chart each survey of a flight from above, rotated so that its lines are horizontal, a panel each.
 
     Return None without a flown survey.
     """
@@ -52,7 +52,7 @@ def _survey_panel(
     position: Floats,
     name: str,
 ) -> Panel:
-    """Draw one survey from above: its lines, the flight, and the unusable stretches."""
+    """Return the panel of one survey: usable and lost parts of its lines, and the flown track."""
     origin = requirements.points[survey.first, :2]
     unit = np.array([np.sin(survey.course), np.cos(survey.course)])
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
@@ -73,20 +73,23 @@ def _survey_panel(
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     track_points = to_panel(position[:: max(1, len(position) // _POINTS)])
     layers = (
-        Layer("line", "usable part of a photo line", "planned", *parted(usable_parts), quiet=True),
-        Layer("line", "photo line, lost", "fail", *parted(lost_parts), quiet=True),
+        Layer("line", "usable part of a photo line", "planned", *join_with_gaps(usable_parts), quiet=True),
+        Layer("line", "photo line, lost", "fail", *join_with_gaps(lost_parts), quiet=True),
         Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True),
     )
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
 def _lost_spans(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
-    """Return the lost stretches of a line, m; a line that was not flown is lost as a whole."""
+    """Return the start and end of each lost part of a photo line, m.
+
+    A line that was not flown is lost as a whole.
+    """
     return ((0.0, np.inf),) if measure is None else measure.lost_spans
 
 
 def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
-    """Return the usable stretches of a line, m."""
+    """Return the start and end of each usable part of a photo line, m."""
     if measure is None:
         return []
     edges = [0.0, *(metres for span in measure.lost_spans for metres in span), measure.length]

@@ -27,9 +27,12 @@ _CIRCLE_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 def threat_circles(threats: Threats, route: Floats | None, failing_threats: frozenset[int]) -> tuple[Layer, ...]:
-    """Return circles of missiles and radars from above, m: the sphere as a line, its section at the path filled.
+    """Return layers of missiles and radars from above: circles of spheres, and filled missile sections.
 
-    route: (w, 3) m, or None to show only the spheres.  failing_threats: threats whose rule fails.
+    A section is the sphere's circle at the altitude of the nearest path point.
+
+    route: waypoints (w, 3), m, or None to show only the spheres.
+    failing_threats: indices of the threats whose rule fails.
     """
     radars, sections, missiles, units = [], [], [], []
     missile_indices = np.flatnonzero(threats.kill_radius > 0.0)
@@ -42,7 +45,7 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
         center = threats.position[k, :2]
         texts = (_threat_text(name, kill_radius, detection_radius),)
         if detection_radius > 0.0:
-            x, y = circle(center, detection_radius)
+            x, y = circle_points(center, detection_radius)
             radars.append(
                 Layer(
                     "line",
@@ -55,10 +58,10 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
                 )
             )
         if radius_at_path[k] > 0.0:
-            x, y = circle(center, float(radius_at_path[k]))
+            x, y = circle_points(center, float(radius_at_path[k]))
             sections.append(Layer("area", name, "missile-reach", x, y, legend=section_name, hover_texts=texts))
         if kill_radius > 0.0:
-            x, y = circle(center, kill_radius)
+            x, y = circle_points(center, kill_radius)
             is_entered = k in failing_threats
             legend = "threat that is entered" if is_entered else "missile: circle of its sphere"
             missiles.append(Layer("line", name, "fail" if is_entered else "missile", x, y, quiet=True, legend=legend))
@@ -67,7 +70,7 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
 
 
 def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
-    """Describe a threat by its name and the radii of its spheres."""
+    """Return the hover text of a threat: its name and the radii of its spheres."""
     return "\n".join(
         [
             name,
@@ -77,13 +80,16 @@ def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
     )
 
 
-def circle(center: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Return east and north (73,) of a closed circle."""
+def circle_points(center: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Return the east and north coordinates of the points of a closed circle, (73,) each."""
     return center[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), center[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
 
-def threat_names(threats: Threats, labelled_elsewhere: frozenset[int] = frozenset()) -> tuple[Label, ...]:
-    """Return the names of threats at their positions on the map.  labelled_elsewhere: threats with their own labels."""
+def threat_labels(threats: Threats, labelled_elsewhere: frozenset[int] = frozenset()) -> tuple[Label, ...]:
+    """Return labels with the names of threats at their positions; none for more than `_MAX_NAMES` threats.
+
+    labelled_elsewhere: indices of threats with their own labels.
+    """
     if len(threats) > _MAX_NAMES:
         return ()
     return tuple(
@@ -109,9 +115,11 @@ def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floa
 
 
 def sphere_cuts(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
-    """Return lower and upper surface (m AMSL) of a sphere at each of the points, NaN outside the sphere.
+    """Return the altitude of the lower and upper surface of a sphere at each point, m AMSL, (s,) each.
 
-    center: (3,), points: (s, 3) m.
+    Both are NaN at points outside the sphere's circle.
+
+    center, points: (3,) and (s, 3), m.
     """
     distance_square = ((points[:, :2] - center[:2]) ** 2).sum(axis=1)
     half_height = np.sqrt(np.where(distance_square <= radius**2, radius**2 - distance_square, np.nan))
@@ -123,12 +131,13 @@ def outline_label_position(
 ) -> tuple[float, float, tuple[int, int]] | None:
     """Find where to label the outline of a sphere in a vertical section.
 
+    Returns distance (km), altitude (m AMSL) and the direction (right, up) in which the label lies; None if no part of
+    the outline is visible.
+
     kilometres: distance of each sample along the section, km, (s,).
     lower, upper: altitude of the sphere's surface, m AMSL, (s,), NaN outside the sphere.
     min_altitudes: altitude below which the ground hides the sphere, m AMSL, (s,).
     max_altitude: upper edge of the picture, m AMSL.
-    Returns distance (km), altitude (m AMSL) and the direction (right, up) in which the label lies; None if no part of
-    the outline is visible.
     """
     samples_inside = np.flatnonzero(np.isfinite(upper))
     top, bottom = samples_inside[np.argmax(upper[samples_inside])], samples_inside[np.argmin(lower[samples_inside])]
@@ -174,9 +183,11 @@ class PathPlane:
 def threat_cuts(
     threats: Threats, plane: PathPlane, labelled_elsewhere: frozenset[int]
 ) -> tuple[list[Layer], list[Label]]:
-    """Return the sections of missile and radar spheres, radars first, and their names, once for each unit.
+    """Return layers of the missile and radar spheres cut by the plane, and labels of the units.
 
-    labelled_elsewhere: threats with their own labels.
+    Radars come first.
+
+    labelled_elsewhere: indices of threats with their own labels.
     """
     layers: list[Layer] = []
     labels: dict[int, Label] = {}
@@ -207,7 +218,7 @@ def threat_cuts(
 def entered_cuts(
     threats: Threats, failed: Failures, plane: PathPlane
 ) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
-    """Return the sections of entered spheres along the flight, and their label positions, keyed by threat."""
+    """Return layers of the entered spheres cut by the plane, and label positions by index of the threat."""
     layers, label_positions = [], {}
     for place in failed.threats:
         k = place.index or 0
@@ -227,11 +238,11 @@ def entered_cuts(
 # Zones of airspace.
 
 
-def zone_label(zone: Zone) -> str:
-    """Return name and altitude band of a zone.
+def zone_text(zone: Zone) -> str:
+    """Return the name and the altitude band of a zone as text.
 
     >>> from world.airspace.zones import Cylinder
-    >>> zone_label(Zone("mast", "exclusion", Cylinder(0.0, 0.0, 90.0), ceiling=ZoneLevel(120.0, "ground")))
+    >>> zone_text(Zone("mast", "exclusion", Cylinder(0.0, 0.0, 90.0), ceiling=ZoneLevel(120.0, "ground")))
     'mast, below 120 m above ground'
     """
     name = shorten(zone.name, 24)
@@ -245,17 +256,17 @@ def zone_label(zone: Zone) -> str:
 
 
 def _level_text(level: ZoneLevel) -> str:
-    """Write an altitude limit of a zone, and what it is measured from."""
+    """Return an altitude limit of a zone as text, with what it is measured from."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
 
 def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
-    """Return zones from above, m: exclusion zones as areas with open holes, inclusion zones as lines."""
+    """Return layers of zones from above: exclusion zones as areas with holes, inclusion zones as lines."""
     layers = []
     for zone in zones:
         gap = np.full((1, 2), np.nan)
         x, y = np.vstack([np.vstack([ring, gap]) for ring in zone_rings(zone)])[:-1].T
-        texts = (zone_label(zone),)
+        texts = (zone_text(zone),)
         if zone.kind == "exclusion":
             layers.append(Layer("area", zone.name, "zone", x, y, legend="zone to keep out of", hover_texts=texts))
         else:
@@ -265,8 +276,8 @@ def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
     return tuple(layers)
 
 
-def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
-    """Label zones: exclusion zones at the center, inclusion zones at their northernmost corner."""
+def zone_labels(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
+    """Return labels of zones: exclusion zones at the center, inclusion zones at the northernmost corner."""
     if len(zones) > _MAX_ZONE_NAMES:
         return ()
     labels = []
@@ -274,7 +285,7 @@ def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
         ring = zone_rings(zone)[0]
         is_exclusion = zone.kind == "exclusion"
         east, north = (ring[:-1].mean(axis=0) if is_exclusion else ring[np.argmax(ring[:, 1])]).tolist()
-        labels.append(Label(zone_label(zone), east, north, "name", "zone", (0, 0) if is_exclusion else (0, 1)))
+        labels.append(Label(zone_text(zone), east, north, "name", "zone", (0, 0) if is_exclusion else (0, 1)))
     return tuple(labels)
 
 
@@ -294,7 +305,10 @@ class ZoneCut:
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
-    """Return the sections of zones in the plane, without zones away from the path."""
+    """Return the parts of the plane that zones forbid, without zones away from the path.
+
+    An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.
+    """
     min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)
     if plane.ground is not None:
@@ -317,15 +331,15 @@ def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
 
 
 def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
-    """Return the sections of zones in the plane, and labels of exclusion zones at the section's center."""
+    """Return layers of the parts of the plane that zones forbid, and labels of exclusion zones."""
     layers, labels = [], []
     for cut in zone_cuts(zones, plane):
         is_exclusion = cut.zone.kind == "exclusion"
         legend = "zone to keep out of" if is_exclusion else "outside a zone to stay in"
         top = np.where(cut.where, cut.top, np.nan)
-        layers.append(Layer("band", zone_label(cut.zone), "zone", plane.kilometres, top, cut.bottom, legend=legend))
+        layers.append(Layer("band", zone_text(cut.zone), "zone", plane.kilometres, top, cut.bottom, legend=legend))
         if is_exclusion:
             middle = int(np.flatnonzero(cut.where)[cut.where.sum() // 2])
             amsl = 0.5 * float(cut.bottom[middle] + cut.top[middle])
-            labels.append(Label(zone_label(cut.zone), float(plane.kilometres[middle]), amsl, "name", "zone", (0, 0)))
+            labels.append(Label(zone_text(cut.zone), float(plane.kilometres[middle]), amsl, "name", "zone", (0, 0)))
     return layers, labels[:_MAX_CUT_NAMES]

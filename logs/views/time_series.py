@@ -8,37 +8,37 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, saturated_rows
-from logs.views.charts import Chart, Panel, filled_series, held_band, leg_marks, series, shorten
+from logs.views.charts import Chart, Panel, filled_series, leg_marks, saturation_band, series, shorten
 from world.arrays import Floats
 from world.geometry import segment_exposure
 from world.kernels import compiled
 
 _GUIDANCE_SERIES = "according to guidance"
-# Window for power from battery energy, s: a shorter one would show the float32 steps of the energy.
+# Window for power from battery energy, s: a shorter window would show the float32 steps of the energy.
 _POWER_WINDOW_S = 2.0
 
 
-def doubles(values: NDArray[np.float32]) -> Floats:
+def to_float64(values: NDArray[np.float32]) -> Floats:
     """Convert a column of the track to float64, so that computed values are not rounded again."""
     return values.astype(np.float64)
 
 
-def over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
-    """Return a chart over time since the start, with marked legs."""
+def chart_over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
+    """Return a chart over time since the start, with a mark at the start of each leg."""
     title = f"{shorten(setup.scenario.name, 60)}: {subject}"
     marks = leg_marks(track.leg, track.time)
     return Chart(title, "time since the start", "s", tuple(panels), marks=marks, timed=True)
 
 
 def time_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Return airspeed, bank, climb, load factor, wind, cross-track error, altitude error and clearance over time.
+    """Chart airspeed, bank, climb, load factor, wind, path errors and height above ground over time.
 
-    Clearance is computed from track and terrain, not read from the log; without terrain there is no such panel.
+    The height above ground is computed from track and terrain, not read from the log; without terrain it has no panel.
     """
     time = track.time
     roll, _, _ = track.attitude.T
     _, _, climb = track.velocity.T
-    east, north, _ = doubles(track.wind).T
+    east, north, _ = to_float64(track.wind).T
     bank_limit = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
     airspeed = (
         series("commanded", "commanded", time, track.speed_command),
@@ -46,18 +46,18 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
     )
     turn_limits = (("limit of planned turns; corrections may bank beyond it", bank_limit), ("", -bank_limit))
 
-    def one(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
+    def single_line_panel(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
         """Make a panel with one line."""
         return Panel(title, unit, (series(name, "flown", time, values),), min_span=min_span)
 
     panels = [
         Panel("airspeed", "m/s", airspeed, min_span=4.0),
-        replace(one("bank, right +", "°", np.degrees(doubles(roll)), 1.0), limits=turn_limits),
-        one("climb rate", "m/s", doubles(climb), 1.0),
-        one("load factor", "g", doubles(track.load_factor), 0.2),
-        one("wind, with gusts", "m/s", np.hypot(east, north), 1.0),
-        one("cross-track, right +", "m", doubles(track.cross_track), 0.1, _GUIDANCE_SERIES),
-        one("height error, high +", "m", doubles(track.height_error), 0.1, _GUIDANCE_SERIES),
+        replace(single_line_panel("bank, right +", "°", np.degrees(to_float64(roll)), 1.0), limits=turn_limits),
+        single_line_panel("climb rate", "m/s", to_float64(climb), 1.0),
+        single_line_panel("load factor", "g", to_float64(track.load_factor), 0.2),
+        single_line_panel("wind, with gusts", "m/s", np.hypot(east, north), 1.0),
+        single_line_panel("cross-track, right +", "m", to_float64(track.cross_track), 0.1, _GUIDANCE_SERIES),
+        single_line_panel("height error, high +", "m", to_float64(track.height_error), 0.1, _GUIDANCE_SERIES),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:
@@ -65,15 +65,15 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
         clearance_limit = (("required", setup.scenario.limits.min_clearance_m),)
         panels.append(
             replace(
-                one("height above ground", "m", height_above_ground, 1.0, "from track and terrain"),
+                single_line_panel("height above ground", "m", height_above_ground, 1.0, "from track and terrain"),
                 limits=clearance_limit,
             )
         )
-    return over_time(setup, "the flight over time", panels, track)
+    return chart_over_time(setup, "the flight over time", panels, track)
 
 
 def control_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Return commanded and actual elevator, aileron, rudder and throttle over time.
+    """Chart commanded and actual elevator, aileron, rudder and throttle over time.
 
     The chart is shaded where the command is at or beyond the limit of the control.
     """
@@ -85,38 +85,39 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
         unit, scale = ("%", 100.0) if name == "throttle" else ("°", 180.0 / np.pi)
         min_value, max_value = (0.0, 1.0) if name == "throttle" else (-limit, limit)
         layers = (
-            series("commanded", "commanded", track.time, scale * doubles(command)),
-            series("actual", "flown", track.time, scale * doubles(position)),
+            series("commanded", "commanded", track.time, scale * to_float64(command)),
+            series("actual", "flown", track.time, scale * to_float64(position)),
         )
         has_limits = np.isfinite([min_value, max_value]).all()
         panel = Panel(
             name, unit, layers, (("limits", scale * min_value), ("", scale * max_value)) if has_limits else ()
         )
-        is_held = saturated_rows(track, k, min_value, max_value)
-        if is_held.any():
-            panel = replace(panel, layers=(held_band(is_held, track.time, panel.shown_span()), *layers))
+        is_saturated = saturated_rows(track, k, min_value, max_value)
+        if is_saturated.any():
+            panel = replace(panel, layers=(saturation_band(is_saturated, track.time, panel.shown_span()), *layers))
         panels.append(panel)
-    return over_time(setup, "controls and their limits", panels, track)
+    return chart_over_time(setup, "controls and their limits", panels, track)
 
 
 def energy_chart(setup: FlightSetup, track: Track) -> Chart:
-    """Return battery energy used, power, current, and the aircraft's specific energy as a height, over time.
+    """Chart battery energy used, power, current, and the aircraft's specific energy over time.
 
-    For an aircraft that burns fuel, the heat of the fuel is shown, and no current.
+    The specific energy is shown as a height.  For an aircraft that burns fuel, the heat of the fuel is shown, and no
+    current.
     """
     burns_fuel = setup.envelope.power_level.size > 0 and not setup.envelope.volts
     store_name, unit, power_unit, scale = (
         ("heat of fuel", "kWh", "kW", 1e-3) if burns_fuel else ("battery energy", "Wh", "W", 1.0)
     )
     time = track.time
-    used_energy = doubles(track.energy)
+    used_energy = to_float64(track.energy)
     window_start = np.searchsorted(time, time - _POWER_WINDOW_S)
     durations = np.maximum(time - time[window_start], 1e-9)
     power = np.where(
         window_start < np.arange(len(track)), 3600.0 * (used_energy - used_energy[window_start]) / durations, np.nan
     )
     height = track.position[:, 2]
-    kinetic_height = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
+    kinetic_height = to_float64(track.airspeed) ** 2 / (2.0 * GRAVITY)
     energy_heights = (
         series("height and speed", "second", time, height + kinetic_height),
         series("height only", "flown", time, height),
@@ -128,7 +129,7 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
         Panel("energy as height", "m", energy_heights),
     ]
     capacity_text = f"{scale * setup.battery:.0f} {unit} {'in full tanks' if burns_fuel else 'in a full battery'}"
-    return over_time(setup, f"energy, of {capacity_text}", panels, track)
+    return chart_over_time(setup, f"energy, of {capacity_text}", panels, track)
 
 
 # Exposure along the flown track.
@@ -138,19 +139,23 @@ _MAX_SEGMENTS = 12_000
 
 
 def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Return the mean of (scale/d)^4 on each segment (paper eq. 9, 10), summed over spheres around it.
+    """Return the exposure rate on each segment of a track, (t - 1,), summed over spheres.
 
-    position: (t, 3) m.  centres: (m, 3).  radii, scales: (m,).  Returns (t - 1,), 1 at a distance of one scale; NaN
-    where the track is unknown.
+    The rate is the segment's mean of (scale/d)^4 within a sphere (paper eq. 9, 10): 1 at a distance of one scale.  It
+    is NaN where the track is unknown.
+
+    position: (t, 3) m.
+    centres: (m, 3) m.
+    radii, scales: (m,) m.
     """
-    return _exposure_rates(
+    return _sum_exposure_rates(
         np.ascontiguousarray(position), np.ascontiguousarray(centres), np.ascontiguousarray(radii), scales.copy()
     )
 
 
 @compiled
-def _exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
-    """Return the exposure to all missiles on each segment, per second."""
+def _sum_exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
+    """Return the exposure rate on each segment, summed over spheres, as `exposure_rates` does."""
     count = position.shape[0] - 1
     rates = np.zeros(max(0, count))
     for k in range(count):
@@ -162,9 +167,9 @@ def _exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Fl
 
 
 def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Return a chart of kill and detection exposure, their rate and their sum so far, over the flown distance (km).
+    """Chart the kill and detection exposure, as a rate and as a sum, over the distance flown (km).
 
-    Only exposure that occurred is shown; return None if there was no exposure.
+    Only exposure that occurred is shown; return None if there was none.
     """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:

@@ -37,7 +37,7 @@ class PlaceValue:
 
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """List the findings of a rule by number of waypoint or leg, without findings on the whole flight."""
+    """List the findings of a rule by number of their waypoint or leg; findings elsewhere are left out."""
     place_rows = []
     for finding in findings:
         place = finding.place
@@ -51,9 +51,10 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
-    """Return panels of turns, slopes, clearances, waypoints and corridor, as far as the verdict has findings.
+    """Chart turns, slopes, clearances, waypoints and corridor, a panel each if the verdict has findings.
 
     Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.
+
     name: name of the scenario.
 
     >>> turn_chart("a plan", Verdict((), flyable=False, complete=False, lines=(), level="plan")).panels
@@ -69,7 +70,7 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
 
 
 def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
-    """Draw planned and flown values of a rule and its limits, with failures marked."""
+    """Return the panel of a rule with planned and flown values, limits, and marked failures."""
     numbers = np.array([value.number for value in values], dtype=np.float64)
     planned_values, flown_values, limit_values = (
         np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")
@@ -101,6 +102,9 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
 
 
 def _is_shown_limit(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return a mask of the limits to show; a much higher limit of turns or corridors would flatten the other values."""
+    """Return a mask (n,): True for limits to show.
+
+    A much higher limit of turns or corridors would flatten the other values, and is not shown.
+    """
     max_limit = _MAX_LIMIT_RATIO * max(max_value, 1e-9) if rule in ("turn", "corridor") else math.inf
     return np.asarray(limits <= max_limit, dtype=np.bool_)

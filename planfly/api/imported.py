@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Unpack
 
-from logs.importers.columns.file_names import FOLDER_TABLE, TABLE_SUFFIX, is_table
+from logs.importers.columns.file_names import FOLDER_TABLE, TABLE_SUFFIX, is_column_table_name
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
 from logs.recording.recover import recover_log
@@ -111,14 +111,14 @@ def guess_columns(
     table: the table to write, ``NAME.columns.toml`` or ``columns.toml``.  overwrite: True replaces an existing one.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
-    from logs.importers.columns.guesses import guess_table
+    from logs.importers.columns.guesses import guess_column_table
 
     target = Path(table)
-    if not is_table(target):
+    if not is_column_table_name(target):
         allowed = f"expected {FOLDER_TABLE} or a name that ends with {TABLE_SUFFIX}"
         raise LogError(f"{target}: {allowed}", file=target, allowed=allowed)
     check_output_file(target, overwrite)
-    text = guess_table([Path(file) for file in ([files] if isinstance(files, str | Path) else files)], target)
+    text = guess_column_table([Path(file) for file in ([files] if isinstance(files, str | Path) else files)], target)
     write_atomically(target, text.encode())
     lines = text.splitlines()
     missing = tuple(line.removeprefix("# ") for line in lines if line.startswith("# Not found"))

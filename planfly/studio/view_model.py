@@ -19,7 +19,7 @@ from logs.verdict.wording import suggestion_text
 from logs.views.failures import route_distance, route_samples
 from logs.views.map import map_extent
 from logs.views.profile import terrain_altitudes
-from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_label
+from logs.views.threats_and_zones import PathPlane, threat_cuts, zone_cuts, zone_text
 from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import Window
 from planfly.studio.states import PlaceStates, State, place_states
@@ -117,7 +117,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
     zones = judged_airspace(setup).zones if mission.fences else scenario.zones
     return [
         {
-            "name": zone_label(zone),
+            "name": zone_text(zone),
             "kind": zone.kind,
             "rings": [round_to_json(ring) for ring in zone_rings(zone)],
         }

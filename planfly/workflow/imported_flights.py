@@ -26,7 +26,7 @@ from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
 from flight.simulation.simulate import Flight, TrackBuilder, simulate
 from flight.simulation.track import Track
 from logs.importers.clean_positions import MAX_STEP_S
-from logs.importers.imported_flight import LoggedFlight, make_flight, make_track, mean_wind, with_flown_heights
+from logs.importers.imported_flight import LoggedFlight, make_flight, make_track, mean_wind, with_flown_altitudes
 from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
@@ -93,7 +93,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     mission = fences.add_to_mission(mission)
     has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not has_plan_heights:
-        mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
+        mission = with_flown_altitudes(mission, flight.lat, flight.lon, flight.up)
     _check_plan_autopilot(path, mission, flight.raw.program)
     scenario, placed = _choose_scenario_and_place_mission(mission, options, planned_in)
     scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)

@@ -28,10 +28,12 @@ class ClockShift(NamedTuple):
 def find_clock_shift(
     time: Floats, values: Floats, other_time: Floats, other_values: Floats, max_shift: float
 ) -> ClockShift:
-    """Return the shift of the first signal, at most ``max_shift`` (s), with the best correlation of both signals.
+    """Find the time shift of the first signal with the best correlation to the second signal.
 
     The signals are linearly interpolated.  The correlation is 0 if the signals have too little time in common or do
     not vary.
+
+    max_shift: largest shift in either direction, s.
 
     >>> time = np.arange(0.0, 100.0, 0.1)
     >>> chirp = np.sin(0.02 * time**2)

@@ -15,10 +15,10 @@ from logs.importers.columns.column_table import (
     ClockTable,
     ColumnTable,
     LogTable,
-    read_table,
+    read_column_table,
 )
 from logs.importers.columns.data_files import Column, DataFile, read_data_file
-from logs.importers.columns.file_names import find_table, is_table
+from logs.importers.columns.file_names import find_column_table, is_column_table_name
 from logs.importers.columns.quantities import (
     ANGLES,
     QUANTITIES,
@@ -79,9 +79,9 @@ class ColumnLog:
     """
 
     def __init__(self, path: Path) -> None:
-        table_path = path if is_table(path) else find_table(path)
+        table_path = path if is_column_table_name(path) else find_column_table(path)
         self.path, self.table_path = path, table_path
-        self.table: LogTable = read_table(table_path)
+        self.table: LogTable = read_column_table(table_path)
         self._files: dict[Path, DataFile] = {}
         self._clocks: dict[str, _Clock] = {}
         self._shifts: dict[str, float] = {}
@@ -176,19 +176,24 @@ class ColumnLog:
         """Return the times and the unconverted values of a quantity, such as the names or numbers of modes."""
         entry = self.table.columns[quantity][0]
         clock = self._clock(entry.clock)
-        return self._times(entry.clock), self._column(
+        return self._times(entry.clock), self._column_on_clock(
             clock, entry.column or "", f"columns.{quantity}.column", entry.clock
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the autopilot's parameters by name; the table's [parameters] take precedence over its columns."""
+        """Return the autopilot's parameters by name, from the parameter columns and from [parameters].
+
+        A value in [parameters] takes precedence.
+        """
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
-        data = self._data(next(iter(self.table.clocks.values())))
-        names, values = (self._named(data, column, "parameter_columns") for column in self.table.parameter_columns)
+        data = self._data_file(next(iter(self.table.clocks.values())))
+        names, values = (
+            self._column_by_name(data, column, "parameter_columns") for column in self.table.parameter_columns
+        )
         if len(names) != len(values):
             raise self._error("parameter_columns", f"{len(names)} names", f"{len(values)} values: expected as many")
-        numbers = _numbers(values, self._place(data, self.table.parameter_columns[1]))
+        numbers = _numbers(values, self._location(data, self.table.parameter_columns[1]))
         stored = {text_of(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
         return {name: value for name, value in stored.items() if math.isfinite(value)} | self.table.parameters
 
@@ -211,15 +216,15 @@ class ColumnLog:
             )
         return self.table_path.parent / self.table.file
 
-    def _data(self, clock: ClockTable) -> DataFile:
-        """Return the contents of a clock's data file, which is read once."""
+    def _data_file(self, clock: ClockTable) -> DataFile:
+        """Return the contents of a clock's data file, which is read at the first call."""
         path = self._file_of(clock)
         if path not in self._files:
             self._files[path] = read_data_file(path)
         return self._files[path]
 
     def _clock(self, name: str) -> _Clock:
-        """Return a clock by name, which is read once."""
+        """Return the clock with a name; its times are read at the first call."""
         if name not in self._clocks:
             self._clocks[name] = self._read_clock(name, self.table.clocks[name])
         return self._clocks[name]
@@ -229,16 +234,16 @@ class ColumnLog:
 
         Raises LogError for missing, decreasing or too many times, and for a stated rate that contradicts the times.
         """
-        data, field = self._data(clock), f"clocks.{name}"
+        data, field = self._data_file(clock), f"clocks.{name}"
         if clock.column is None:
-            lengths = [len(self._named(data, column)) for column in self._columns_of(name)]
+            lengths = [len(self._column_by_name(data, column)) for column in self._columns_of(name)]
             rate = clock.rate or 1.0
             return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
-        values = self._named(data, clock.column, f"{field}.column")
+        values = self._column_by_name(data, clock.column, f"{field}.column")
         if clock.unit == "iso" or values.dtype.kind == "M":
-            time = _seconds_of_dates(values, self._place(data, clock.column))
+            time = _seconds_of_dates(values, self._location(data, clock.column))
         else:
-            time = _numbers(values, self._place(data, clock.column)) * UNITS["time"][clock.unit]
+            time = _numbers(values, self._location(data, clock.column)) * UNITS["time"][clock.unit]
         missing_rows = np.flatnonzero(~np.isfinite(time))
         if missing_rows.size:
             k = int(missing_rows[0])
@@ -265,14 +270,14 @@ class ColumnLog:
     @cached_property
     def start(self) -> float:
         """Time of the main clock that becomes time 0, s: its first time if it counts from 1970, otherwise 0."""
-        first = float(self._clock(self._main).time[0])
+        first = float(self._clock(self._main_clock).time[0])
         if first > _UTC_AFTER_S:
             self.utc_start = first
             return first
         return 0.0
 
     @property
-    def _main(self) -> str:
+    def _main_clock(self) -> str:
         """Name of the main clock: "main", or the first clock if none has this name."""
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
@@ -283,9 +288,9 @@ class ColumnLog:
 
     def _check_overlap(self, name: str) -> None:
         """Raise LogError for a clock that is not aligned and has no time in common with the main clock."""
-        time, main = self._own_times(name), self._own_times(self._main)
+        time, main = self._own_times(name), self._own_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
-            spans = f"{time[0]:.6g} to {time[-1]:.6g} s, and {self._main} from {main[0]:.6g} to {main[-1]:.6g} s"
+            spans = f"{time[0]:.6g} to {time[-1]:.6g} s, and {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
             allowed = f"runs from {spans}: expected the same clock, `offset_s` or `align`"
             raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
@@ -295,7 +300,7 @@ class ColumnLog:
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
     def _clock_shift(self, name: str) -> float:
-        """Return the shift that best aligns a clock's column with its partner, s; 0 for a clock without `align`.
+        """Return the shift that aligns a clock's column with its partner, s; 0 for a clock without `align`.
 
         Raises LogError if the correlation is too small at every shift.
         """
@@ -305,9 +310,10 @@ class ColumnLog:
         if name not in self._shifts:
             clock, field = self._clock(name), f"clocks.{name}.align"
             values = _numbers(
-                self._column(clock, align.column, f"{field}.column", name), self._place(clock.data, align.column)
+                self._column_on_clock(clock, align.column, f"{field}.column", name),
+                self._location(clock.data, align.column),
             )
-            partner = self._partner(align.partner, field)
+            partner = self._alignment_partner(align.partner, field)
             is_known = np.isfinite(values)
             time = self._own_times(name)[is_known]
             best = find_clock_shift(time, values[is_known], *partner, align.within_s)
@@ -320,14 +326,17 @@ class ColumnLog:
             self._shifts[name] = best.shift
         return self._shifts[name]
 
-    def _partner(self, name: str, field: str) -> tuple[Floats, Floats]:
-        """Return times and values of the finite rows of a quantity, or of a column with the main clock."""
+    def _alignment_partner(self, name: str, field: str) -> tuple[Floats, Floats]:
+        """Return times and finite values of the signal to which a clock is aligned.
+
+        name: a quantity, or a column with the main clock.
+        """
         if name in self.table.columns:
             series = self.series(name)
         else:
-            clock = self._clock(self._main)
-            column = self._column(clock, name, f"{field}.with", self._main)
-            series = Series(self._times(self._main), _numbers(column, self._place(clock.data, name)))
+            clock = self._clock(self._main_clock)
+            column = self._column_on_clock(clock, name, f"{field}.with", self._main_clock)
+            series = Series(self._times(self._main_clock), _numbers(column, self._location(clock.data, name)))
         known = np.isfinite(series.values)
         return series.time[known], series.values[known]
 
@@ -348,25 +357,25 @@ class ColumnLog:
         for quantity, entries in self.table.columns.items():
             for entry in entries:
                 if entry.column is not None:
-                    data = self._data(self.table.clocks[entry.clock])
-                    self._named(data, entry.column, f"columns.{quantity}.column")
+                    data = self._data_file(self.table.clocks[entry.clock])
+                    self._column_by_name(data, entry.column, f"columns.{quantity}.column")
 
-    def _named(self, data: DataFile, name: str, field: str = "") -> Column:
+    def _column_by_name(self, data: DataFile, name: str, field: str = "") -> Column:
         """Return a column by name.  Raises LogError, with a similar name as a hint, if the file does not have it."""
         if name not in data.columns:
             hint = did_you_mean(name, data.columns) or f": it has {', '.join(list(data.columns)[:12])}"
             raise self._error(field or "column", name, f"no such column in {data.path.name}{hint}")
         return data.columns[name]
 
-    def _column(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
+    def _column_on_clock(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
         """Return a column with a clock.  Raises LogError if it has another number of rows than the clock."""
-        values = self._named(clock.data, name, field)
+        values = self._column_by_name(clock.data, name, field)
         if len(values) != len(clock.time):
             allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
             raise self._error(field, name, allowed)
         return values
 
-    def _place(self, data: DataFile, name: str) -> str:
+    def _location(self, data: DataFile, name: str) -> str:
         """Return file and column as the start of a message."""
         return f"{data.path}: {name}"
 
@@ -376,20 +385,20 @@ class ColumnLog:
         Rows that do not meet the entry's condition are NaN.
         """
         if entry.value is not None:
-            time = self._times(self._main)
+            time = self._times(self._main_clock)
             return Series(time, np.full(len(time), self._convert(quantity, entry, np.array([entry.value]))[0]))
         field = f"columns.{quantity}"
         clock = self._clock(entry.clock)
-        column = self._column(clock, entry.column or "", f"{field}.column", entry.clock)
-        raw = _numbers(column, self._place(clock.data, entry.column or ""))
+        column = self._column_on_clock(clock, entry.column or "", f"{field}.column", entry.clock)
+        raw = _numbers(column, self._location(clock.data, entry.column or ""))
         values = self._convert(quantity, entry, raw)
         if entry.when is not None:
-            partner = self._column(clock, entry.when.column, f"{field}.when.column", entry.clock)
-            values = np.where(_equals(partner, entry.when.value), values, np.nan)
+            partner = self._column_on_clock(clock, entry.when.column, f"{field}.when.column", entry.clock)
+            values = np.where(_mask_equal(partner, entry.when.value), values, np.nan)
         self._check_plausible(quantity, entry, values)
         time = self._times(entry.clock)
         if entry.rate is not None:
-            time, values = self._fresh_rows(quantity, entry, time, values)
+            time, values = self._changed_rows(quantity, entry, time, values)
         if self.table.span_s is not None:
             start, end = self.table.span_s
             is_in_span = (time >= start) & (time <= end)
@@ -427,10 +436,11 @@ class ColumnLog:
         allowed = f"expected {bounds} {entry.unit}".rstrip()
         raise self._error(f"columns.{quantity}", f"{entry.column} has {shown}", f"{allowed}{hint}")
 
-    def _fresh_rows(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
-        """Return the rows in which the value changes, for a column that is written more often than it is measured.
+    def _changed_rows(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """Return the times and values of the rows in which the value changes.
 
-        Raises LogError if the value changes more often than the stated rate.
+        They are the measurements of a column that is written more often than it is measured.  Raises LogError if the
+        value changes more often than the stated rate.
         """
         changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
         rate, stated_rate = changes.sum() / max(1e-9, float(np.ptp(time))), entry.rate or 0.0
@@ -440,15 +450,15 @@ class ColumnLog:
         return time[changes], values[changes]
 
 
-def _equals(values: Column, wanted: float | str) -> Flags:
-    """Return a mask of the values that equal a number or a text, (n,)."""
+def _mask_equal(values: Column, wanted: float | str) -> Flags:
+    """Return a mask (n,): True where a value equals a number or a text."""
     if isinstance(wanted, str):
         return np.asarray([text_of(value) == wanted for value in values], np.bool_)
     return np.asarray(values == wanted, np.bool_)
 
 
 def text_of(value: Any) -> str:
-    """Return a value of a text column, which may be bytes, as a str."""
+    """Return a cell of a text column, which may be bytes, as a str."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 

@@ -45,7 +45,7 @@ def read_column_motion(path: Path) -> MotionLog:
     check_signs_and_units(log)
     air, velocity = read_air(log), read_velocity(log)
     controls, angles, elevons = _controls(log)
-    place = _group(log, "latitude", "longitude", "altitude")
+    place = _joined_series(log, "latitude", "longitude", "altitude")
     if len(place.time):
         place = Samples(place.time, place.values * np.array([math.degrees(1.0), math.degrees(1.0), 1.0]))
     return MotionLog(
@@ -54,15 +54,15 @@ def read_column_motion(path: Path) -> MotionLog:
         span=log.table.span_s or (-math.inf, math.inf),
         program=log.table.program,
         vehicle="plane",
-        inertial=_group(log, *_INERTIAL),
+        inertial=_joined_series(log, *_INERTIAL),
         outputs=NO_SAMPLES,
         attitude=_attitude(log),
         velocity=velocity,
         wind=air.wind,
         airspeed=air.airspeed,
         ratio=air.ratio,
-        height=_group(log, "altitude"),
-        battery=_group(log, "voltage", "current"),
+        height=_joined_series(log, "altitude"),
+        battery=_joined_series(log, "voltage", "current"),
         parameters=log.parameters(),
         home=first_ground_position(place, velocity),
         program_kind="columns",
@@ -80,14 +80,14 @@ def read_column_motion(path: Path) -> MotionLog:
     )
 
 
-def _group(log: ColumnLog, *quantities: str) -> Samples:
-    """Return several quantities as one series, (n, k); no rows if the table lacks one of them."""
+def _joined_series(log: ColumnLog, *quantities: str) -> Samples:
+    """Return several quantities as columns of one series, (n, k); no rows if the table lacks one of them."""
     if not log.has(*quantities):
         return NO_SAMPLES
-    return join([log.series(quantity) for quantity in quantities])
+    return join_series([log.series(quantity) for quantity in quantities])
 
 
-def join(parts: list[Series]) -> Samples:
+def join_series(parts: list[Series]) -> Samples:
     """Join series as columns at the times of the longest series, with linear interpolation, (n, k).
 
     Rows with a missing value are left out; there are no rows if a series has fewer than two values.
@@ -107,7 +107,7 @@ def join(parts: list[Series]) -> Samples:
 
 def _attitude(log: ColumnLog) -> Samples:
     """Return roll, pitch and yaw without jumps at full turns, rad, (n, 3); no rows if the table lacks one."""
-    attitude = _group(log, "roll", "pitch", "yaw")
+    attitude = _joined_series(log, "roll", "pitch", "yaw")
     return Samples(attitude.time, np.unwrap(attitude.values, axis=0)) if len(attitude.time) else attitude
 
 
@@ -125,11 +125,11 @@ def read_velocity(log: ColumnLog) -> Samples:
     else:
         return NO_SAMPLES
     if log.has("velocity_down"):
-        return join([*parts, log.series("velocity_down")])
+        return join_series([*parts, log.series("velocity_down")])
     if not log.has("altitude"):
         return NO_SAMPLES
-    altitude = join([log.series("altitude")])
-    return join([*parts, Series(altitude.time, -np.gradient(altitude.values[:, 0], altitude.time))])
+    altitude = join_series([log.series("altitude")])
+    return join_series([*parts, Series(altitude.time, -np.gradient(altitude.values[:, 0], altitude.time))])
 
 
 def _interpolate_at(series: Series, time: Floats, *, wraps: bool = False) -> Floats:
@@ -165,12 +165,12 @@ def read_air(log: ColumnLog) -> AirData:
     """
     ratio = NO_SAMPLES
     if log.has("static_pressure", "temperature"):
-        pressure = _group(log, "static_pressure", "temperature")
+        pressure = _joined_series(log, "static_pressure", "temperature")
         density = pressure.values[:, 0] / (_GAS_CONSTANT * (pressure.values[:, 1] + _ZERO_CELSIUS_K))
         ratio = Samples(pressure.time, np.sqrt(_SEA_LEVEL_DENSITY / density)[:, np.newaxis])
-    airspeed = true_airspeed = _group(log, "airspeed")
+    airspeed = true_airspeed = _joined_series(log, "airspeed")
     if len(airspeed.time):
-        factor = _airspeed_ratio_at(ratio, _group(log, "altitude"), airspeed.time)[:, np.newaxis]
+        factor = _airspeed_ratio_at(ratio, _joined_series(log, "altitude"), airspeed.time)[:, np.newaxis]
         if log.frame("airspeed") == "true":
             airspeed = Samples(airspeed.time, airspeed.values / factor)
         else:
@@ -182,13 +182,13 @@ def read_air(log: ColumnLog) -> AirData:
 
 
 def _logged_wind(log: ColumnLog) -> Samples:
-    """Return the logged wind velocity to north and east, m/s, (n, 2); no rows if the table lacks the wind."""
+    """Return the logged wind velocity to north and east, m/s, (n, 2); no rows if it is not logged."""
     if log.has("wind_north", "wind_east"):
-        return join([log.series("wind_north"), log.series("wind_east")])
+        return join_series([log.series("wind_north"), log.series("wind_east")])
     if log.has("wind_speed", "wind_direction"):
         speed, direction = log.series("wind_speed"), log.series("wind_direction")
         origin = _interpolate_at(direction, speed.time, wraps=True)
-        return join([Series(speed.time, -speed.values * function(origin)) for function in (np.cos, np.sin)])
+        return join_series([Series(speed.time, -speed.values * function(origin)) for function in (np.cos, np.sin)])
     return NO_SAMPLES
 
 
@@ -204,33 +204,35 @@ def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
 
 
 def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls as in `MotionLog`, flags for the surfaces given as angles, and True if there are elevons.
+    """Return the controls, which of them are angles, and True if elevons make them.
 
-    Left and right halves become one surface: the elevator is their mean, the aileron half their difference.  There are
-    no rows if elevator, aileron or throttle is missing; a missing rudder is 0.
+    The controls and the flags of the three surfaces are those of `MotionLog.controls` and `MotionLog.angles`.  Left and
+    right halves become one surface: the elevator is their mean, the aileron half their difference.  There are no rows
+    if elevator, aileron or throttle is missing; a missing rudder is 0.
     """
     has_elevons = log.has("elevon_left", "elevon_right")
-    elevator = _surface(
+    elevator = _surface_deflections(
         log, "elevator", ("elevon_left", "elevon_right") if has_elevons else ("elevator_left", "elevator_right")
     )
-    aileron = _surface(
+    aileron = _surface_deflections(
         log, "aileron", ("elevon_left", "elevon_right") if has_elevons else ("aileron_left", "aileron_right")
     )
-    rudder = _surface(log, "rudder", ())
+    rudder = _surface_deflections(log, "rudder", ())
     if elevator is None or aileron is None or not log.has("throttle"):
         return NO_SAMPLES, (False, False, False), has_elevons
     (elevator_series, elevator_unit), (aileron_series, aileron_unit) = elevator, aileron
     rudder_series, rudder_unit = rudder or (Series(elevator_series.time, 0.0 * elevator_series.values), "rad")
     negated = Series(elevator_series.time, -elevator_series.values), Series(rudder_series.time, -rudder_series.values)
-    samples = join([negated[0], aileron_series, negated[1], log.series("throttle")])
+    samples = join_series([negated[0], aileron_series, negated[1], log.series("throttle")])
     angles = tuple(unit not in FRACTION_UNITS for unit in (elevator_unit, aileron_unit, rudder_unit))
     return samples, (angles[0], angles[1], angles[2]), has_elevons
 
 
-def _surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
-    """Return a surface's deflections and their unit, from its own column or from its two halves.
+def _surface_deflections(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
+    """Return a surface's deflections and their unit, or None if the table lacks them.
 
-    Return None if the table lacks them.  Raises LogError for one half as an angle and the other as a fraction.
+    They come from the surface's own column, or else from the columns of its left and right half.  Raises LogError if
+    one half is an angle and the other a fraction.
     """
     if log.has(name):
         return log.series(name), log.unit(name)

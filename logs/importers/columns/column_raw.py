@@ -10,7 +10,7 @@ from flight.mission_files.formats import read_mission
 from flight.simulation.setup import VerticalDatum
 from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog, text_of
-from logs.importers.columns.column_motion import join, read_air, read_velocity
+from logs.importers.columns.column_motion import join_series, read_air, read_velocity
 from logs.importers.raw_log import LoggedMission, LogSeries, ModeChange, RawLog
 from world.arrays import Floats
 from world.errors import LogError
@@ -50,12 +50,12 @@ def read_columns(path: Path) -> RawLog:
 
 
 def _position(log: ColumnLog) -> LogSeries:
-    """Return latitude, longitude (deg) and altitude (m), (n, 3); the altitude is NaN if the table has none."""
+    """Return latitude (deg), longitude (deg) and altitude (m), (n, 3); the altitude is NaN if not logged."""
     latitude, longitude = log.series("latitude"), log.series("longitude")
-    parts = join([latitude, longitude])
+    parts = join_series([latitude, longitude])
     up = np.full(len(parts.time), math.nan)
     if log.has("altitude"):
-        altitude = join([log.series("altitude")])
+        altitude = join_series([log.series("altitude")])
         up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
     values = np.column_stack([np.degrees(parts.values), up])
     return LogSeries(log.column("altitude" if log.has("altitude") else "latitude"), parts.time, values)
@@ -67,7 +67,7 @@ def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
     if len(velocity.time):
         yield "velocity", LogSeries("ground velocity", velocity.time, velocity.values[:, [1, 0, 2]] * [1.0, 1.0, -1.0])
     if log.has("roll", "pitch", "yaw"):
-        attitude = join([log.series(name) for name in ("roll", "pitch", "yaw")])
+        attitude = join_series([log.series(name) for name in ("roll", "pitch", "yaw")])
         yield "attitude", LogSeries("attitude", attitude.time, attitude.values)
     air = read_air(log)
     if len(air.true_airspeed.time):
@@ -77,18 +77,21 @@ def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
     if log.has("current"):
         yield "battery", _battery(log)
     if log.has("throttle"):
-        throttle = join([log.series("throttle")])
+        throttle = join_series([log.series("throttle")])
         yield "throttle", LogSeries(log.column("throttle"), throttle.time, throttle.values)
 
 
 def _battery(log: ColumnLog) -> LogSeries:
-    """Return the current, A, and the energy taken from the battery, Wh, (n, 2); the energy is NaN without a voltage."""
+    """Return the current (A) and the energy taken from the battery (Wh), (n, 2).
+
+    The energy is NaN if the voltage is not logged.
+    """
     if not log.has("voltage"):
-        current = join([log.series("current")])
+        current = join_series([log.series("current")])
         return LogSeries(
             "battery", current.time, np.column_stack([current.values, np.full(len(current.time), math.nan)])
         )
-    battery = join([log.series("current"), log.series("voltage")])
+    battery = join_series([log.series("current"), log.series("voltage")])
     power = battery.values.prod(axis=1)
     steps = np.diff(battery.time, prepend=battery.time[:1])
     energy: Floats = np.cumsum(power * steps) / 3600.0

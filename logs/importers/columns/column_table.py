@@ -152,8 +152,11 @@ def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:
         raise ValueError(f"{field}: {value or 'missing'}: {expected}")
 
 
-def read_table(path: Path) -> LogTable:
-    """Read and check a table of columns.  Raises LogError with the file, the key, the value and the allowed values."""
+def read_column_table(path: Path) -> LogTable:
+    """Read and check a table of columns.
+
+    Raises LogError with the file, the key, the value and the allowed values.
+    """
     text = read_small_file(path, _MAX_BYTES, "table of columns", LogError)
     try:
         data = toml_table(text.decode("utf-8-sig"))

@@ -12,16 +12,16 @@ FOLDER_TABLE = "columns.toml"
 TABLE_SUFFIX = ".columns.toml"
 
 
-def is_table(path: Path) -> bool:
-    """Return True if a file has the name of a table of columns.
+def is_column_table_name(path: Path) -> bool:
+    """Return True if a file name is that of a table of columns: columns.toml or *.columns.toml.
 
-    >>> is_table(Path("flight.columns.toml")), is_table(Path("columns.toml")), is_table(Path("scenario.toml"))
-    (True, True, False)
+    >>> [is_column_table_name(Path(name)) for name in ("flight.columns.toml", "columns.toml", "scenario.toml")]
+    [True, True, False]
     """
     return path.name == FOLDER_TABLE or path.name.endswith(TABLE_SUFFIX)
 
 
-def find_table(path: Path) -> Path:
+def find_column_table(path: Path) -> Path:
     """Return the path of the table of columns for a data file: its own table, or the table of its folder.
 
     Raises LogError if there is neither.

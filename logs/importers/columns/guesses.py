@@ -190,54 +190,54 @@ class _Guess:
     reason: str
 
 
-def guess_table(paths: Sequence[Path], target: Path) -> str:
-    """Return the text of a table of columns for data files.
+def guess_column_table(paths: Sequence[Path], target: Path) -> str:
+    """Guess a table of columns for data files, and return its text (TOML).
 
     paths: data files, the main file first.
     target: path of the table, to which the files' paths in the text are relative.
 
     Raises LogError for a file that cannot be read, and if no column was recognized.
     """
-    files = {_relative(path, target): read_data_file(path) for path in paths}
-    times = [clock for file, data in files.items() for clock in _times(data, file)]
+    files = {_relative_path(path, target): read_data_file(path) for path in paths}
+    times = [clock for file, data in files.items() for clock in _time_clocks(data, file)]
     clocks: list[_Clock] = []
     for clock in sorted(times, key=lambda clock: -clock.length):
         # Of several columns of times in a group, use the one with the most time in common with the longest group.
-        rivals = [
+        clocks_of_group = [
             other
             for other in times
             if (other.file, other.prefix, other.length) == (clock.file, clock.prefix, clock.length)
         ]
-        best = max(rivals, key=lambda rival: rival.overlap(clocks[0]) if clocks else 0.0)
+        best = max(clocks_of_group, key=lambda candidate: candidate.overlap(clocks[0]) if clocks else 0.0)
         if best not in clocks:
             clocks.append(best)
     guesses: list[_Guess] = []
-    rivals_of_guesses: list[_Guess] = []
+    alternatives: list[_Guess] = []
     for quantity in NAMES:
         # A column with the rate of the sensors is preferred.
-        candidates = sorted(_candidates(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
+        candidates = sorted(_candidate_entries(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
         guesses += candidates[:1]
-        rivals_of_guesses += [guess for guess in candidates[1:] if guess.clock != candidates[0].clock]
+        alternatives += [guess for guess in candidates[1:] if guess.clock != candidates[0].clock]
     if not guesses:
         names = ", ".join(list(next(iter(files.values())).columns)[:12])
         raise LogError(f"{paths[0]}: no column was recognized among {names}; write a table by hand", file=paths[0])
-    return _table_text(guesses, rivals_of_guesses, files)
+    return _table_text(guesses, alternatives, files)
 
 
-def _relative(path: Path, target: Path) -> str:
+def _relative_path(path: Path, target: Path) -> str:
     """Return a path relative to the folder of the table, with forward slashes."""
     return Path(os.path.relpath(path, target.parent)).as_posix()
 
 
-def _plain(name: str) -> str:
+def _plain_name(name: str) -> str:
     """Return only the letters and digits of a name, in lower case."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
-    """Return the prefix of a column's name, the rest without a unit, and the unit that the name or the file states.
+    """Split a column's name into its prefix, its own name without a unit, and the unit.
 
-    The unit is "" if neither states one.
+    The unit is the one that the file or the name states; "" if neither states one.
     """
     prefix, _, own = column.rpartition(".")
     unit = _SPELLINGS.get(data.units.get(column, "").strip().lower(), "")
@@ -248,18 +248,22 @@ def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
     return prefix, own, unit
 
 
-def _times(data: DataFile, file: str) -> Iterator[_Clock]:
-    """Yield a clock for each column with increasing times and the name of a time."""
+def _time_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
+    """Yield a clock for each column that has the name of a time and increasing values."""
     for column, values in data.columns.items():
         prefix, own, unit = _name_parts(data, column)
-        if {_plain(own), _plain(column.rpartition(".")[2])} & set(_TIMES) and (unit := _time_unit(values, unit)):
+        if {_plain_name(own), _plain_name(column.rpartition(".")[2])} & set(_TIMES) and (
+            unit := _time_unit(values, unit)
+        ):
             factor = UNITS["time"][unit]
             span = (0.0, 0.0) if unit == "iso" else (float(values[0]) * factor, float(values[-1]) * factor)
             yield _Clock(file, prefix, column, unit, len(values), span)
 
 
 def _time_unit(values: Column, stated: str) -> str:
-    """Return the unit in which a column has increasing times at usual intervals; "" if the column has no such times.
+    """Return the unit in which a column has increasing times at usual intervals.
+
+    Return "" if the column has no such times.
 
     stated: unit from the column's name or the file, or "".
     """
@@ -275,7 +279,7 @@ def _time_unit(values: Column, stated: str) -> str:
     return next((unit for unit in units if _STEPS_S[0] <= usual_step * UNITS["time"][unit] <= _STEPS_S[1]), "")
 
 
-def _candidates(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
+def _candidate_entries(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
     """Yield a guess for each column that can hold a quantity, the best name first."""
     for name in NAMES[quantity]:
         for clock in clocks:
@@ -283,15 +287,15 @@ def _candidates(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFi
             for column, values in data.columns.items():
                 prefix, own, unit = _name_parts(data, column)
                 has_clock = prefix == clock.prefix and len(values) == clock.length
-                if not has_clock or name not in (_plain(own), _plain(column.rpartition(".")[2])):
+                if not has_clock or name not in (_plain_name(own), _plain_name(column.rpartition(".")[2])):
                     continue
-                guess = _guess_unit(quantity, column, clock, values, unit)
+                guess = _guess_entry(quantity, column, clock, values, unit)
                 if guess is not None:
                     yield guess
 
 
-def _guess_unit(quantity: str, column: str, clock: _Clock, values: Column, stated: str) -> _Guess | None:
-    """Guess the unit and the frame of a column.
+def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stated: str) -> _Guess | None:
+    """Return a column as the guessed entry of a quantity, with its unit and frame.
 
     Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.
 
@@ -314,7 +318,10 @@ def _guess_unit(quantity: str, column: str, clock: _Clock, values: Column, state
 
 
 def _plausible_unit(quantity: str, known: Floats) -> str | None:
-    """Return the first unit in which the finite values of a quantity are plausible, or None."""
+    """Return the first unit in which the values of a quantity are plausible, or None.
+
+    known: finite values of the column.
+    """
     entry = QUANTITIES[quantity]
     for unit in _TRIED[entry.dimension]:
         values = known * UNITS[entry.dimension][unit] + UNIT_ZEROS.get(unit, 0.0)
@@ -328,7 +335,12 @@ def _plausible_unit(quantity: str, known: Floats) -> str | None:
 
 
 def _guess_frame(quantity: str, column: str, known: Floats) -> str:
-    """Guess the frame of a column from its name or the sign of its finite values; "" for a quantity without frames."""
+    """Guess the frame of a column from its name or the sign of its values.
+
+    Return "" for a quantity without frames.
+
+    known: finite values of the column.
+    """
     if quantity == "airspeed":
         return "true" if "tas" in column.lower() or "true" in column.lower() else "indicated"
     if quantity == "acceleration_down":
@@ -338,7 +350,10 @@ def _guess_frame(quantity: str, column: str, known: Floats) -> str:
 
 
 def _clock_names(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
-    """Return the names of the clocks that the guesses use; the clock with the most guesses is the main clock."""
+    """Return a name for each clock that the guesses use.
+
+    The clock with the most guesses is the main clock.
+    """
     counts = Counter(guess.clock for guess in guesses)
     names: dict[_Clock, str] = {}
     for clock, _ in counts.most_common():
@@ -348,10 +363,10 @@ def _clock_names(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
     return names
 
 
-def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict[str, DataFile]) -> str:
-    """Return the text of the table.
+def _table_text(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files: dict[str, DataFile]) -> str:
+    """Return the guessed table of columns as TOML, each guess with a remark.
 
-    rivals: other columns for the guessed quantities, with other clocks.
+    alternatives: columns for the guessed quantities on other clocks, used to align these clocks with the main clock.
     """
     file, names = next(iter(files)), _clock_names(guesses)
     lines = [*_HEAD, f'file = "{file}"', 'program = ""']
@@ -360,7 +375,7 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
         lines += ["", f"[clocks.{name}]  # guess: {clock.length} rows"]
         lines += [f'file = "{clock.file}"'] if clock.file != file else []
         lines += [f'column = "{clock.column}"', f'unit = "{clock.unit}"']
-        partner = next((guess for guess in rivals if guess.clock == clock), None)
+        partner = next((guess for guess in alternatives if guess.clock == clock), None)
         # Groups of one file with names of their own (GPS, IMU) share one clock.
         is_separate = clock != main and (clock.file != main.file or clock.prefix == main.prefix)
         if is_separate and partner is not None:
@@ -378,7 +393,7 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
 
 
 def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
-    """Yield remarks on the quantities that were not found."""
+    """Yield lines of remarks on the quantities that were not found."""
     found = {guess.quantity for guess in guesses}
     substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
         "elevator": "elevon_left",
@@ -396,7 +411,7 @@ def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
 
 
 def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
-    """Yield remarks on the columns that no guess uses."""
+    """Yield a line of remarks for each file with columns that no guess uses."""
     used = {(guess.clock.file, guess.column) for guess in guesses} | {
         (guess.clock.file, guess.clock.column) for guess in guesses
     }

@@ -67,11 +67,15 @@ QUANTITIES: dict[str, Quantity] = {
         "angle", "heading clockwise from north (NED) or counterclockwise from east (ENU)", -_TURN, _TURN, _WORLD
     ),
     "quaternion_w": Quantity(
-        "ratio", "real part of the attitude from body to earth, in place of roll, pitch and yaw", -1.01, 1.01, _WORLD
+        "ratio",
+        "real part of the attitude quaternion (body to earth), in place of roll, pitch and yaw",
+        -1.01,
+        1.01,
+        _WORLD,
     ),
     **{
-        f"quaternion_{axis}": Quantity("ratio", f"imaginary part {number} of it", -1.01, 1.01)
-        for axis, number in zip("xyz", (1, 2, 3), strict=True)
+        f"quaternion_{axis}": Quantity("ratio", f"{axis} component of the attitude quaternion", -1.01, 1.01)
+        for axis in "xyz"
     },
     "roll_rate": Quantity("angular rate", "about the axis forward", -12, 12, _BODY),
     "pitch_rate": Quantity("angular rate", "about the axis right (FRD) or left (FLU)", -12, 12, _BODY),
@@ -116,7 +120,9 @@ _NEGATED_BY_FRAME = {
 
 
 def to_frame(quantity: str, frame: str) -> tuple[float, float]:
-    """Return the factor and the offset that convert a quantity from a frame to its default frame, in SI units and rad.
+    """Return the factor and the offset that convert a quantity from a frame to its default frame.
+
+    The offset is in SI units and rad.
 
     >>> to_frame("velocity_down", "ENU"), to_frame("velocity_down", "NED")
     ((-1.0, 0.0), (1.0, 0.0))

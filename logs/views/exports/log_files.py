@@ -24,7 +24,7 @@ Columns = NDArray[Any]
 
 
 def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
-    """Return columns (t,) by name: fields of `/state` messages, with latitude and longitude after time.
+    """Return the rows of a flight as columns (t,) by name: the fields of `/state`, latitude and longitude.
 
     Each name ends with its unit.  East, north and courses refer to the map projection centred on the scenario's origin.
 
@@ -44,7 +44,7 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 
 
 def csv_text(log: FlightLog) -> str:
-    """Return the table as CSV: a line of names, then one line a row.
+    """Return the columns of a flight as CSV: a line of names, then one line per row.
 
     Numbers have the fewest digits from which the same value is read back.
 
@@ -62,7 +62,7 @@ def csv_text(log: FlightLog) -> str:
 
 
 def parquet_bytes(log: FlightLog) -> bytes:
-    """Return the table as a Parquet file with the types of the log, and scenario name and origin as metadata.
+    """Encode the columns of a flight as a Parquet file, with scenario name and origin as metadata.
 
     Raises MissingExtraError without the extra ``tables``.
 
@@ -131,7 +131,7 @@ class _Topic(NamedTuple):
 
 
 def px4_log_bytes(log: FlightLog) -> bytes:
-    r"""Return the bytes of the `.ulg`; rows without a position are omitted.
+    r"""Encode a flight as a PX4 log (`.ulg`); rows without a position or an attitude are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> px4_log_bytes(example_log())[:7]
@@ -171,7 +171,7 @@ def _encode_message(letter: bytes, body: bytes) -> bytes:
 
 
 def _format_text(topic: _Topic) -> str:
-    """Return the format of the fields in ULog syntax."""
+    """Return the format of a topic's fields in ULog syntax."""
     return "".join(
         f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
         for name, kind, *shape in [("timestamp", "<u8"), *topic.fields]
@@ -179,7 +179,10 @@ def _format_text(topic: _Topic) -> str:
 
 
 def _topic_records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
-    """Return timestamps and data messages of a topic at its rate."""
+    """Return the timestamps (us) and the encoded data messages of a topic, at the topic's interval.
+
+    number: number of the topic in the log.
+    """
     stamps = topic.values["timestamp"]
     if topic.period:
         slots = np.floor(stamps * 1e-6 / topic.period + 1e-9)
@@ -298,7 +301,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
 def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
     """Return the values of battery_status by field.
 
-    The voltage is the mean from logged energy and current.
+    The voltage is constant: the mean that follows from logged energy and current.
     """
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
@@ -316,8 +319,8 @@ def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Column
 def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     """Return the topic navigator_mission_item, with each item from the time at which it becomes active.
 
-    Items without a position get the time of the next item with one, and the position 0, 0: a gap in the numbers would
-    read as lost items.
+    Items without a position get the time of the next item with a position, and the position 0, 0: a gap in the numbers
+    would read as lost items.
     """
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
     legs, first_rows = np.unique(track.leg[rows], return_index=True)
@@ -360,9 +363,11 @@ def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
 
 
 def attitude_quaternion(attitude: Any) -> Floats:
-    """Return the rotation from forward, right, down to north, east, down as quaternion (n, 4) w, x, y, z.
+    """Convert roll, pitch and yaw to quaternions (n, 4): w, x, y, z.
 
-    attitude: (n, 3) roll, pitch, yaw in rad.
+    The quaternion rotates from forward, right, down to north, east, down.
+
+    attitude: roll, pitch and yaw, rad, (n, 3).
 
     >>> attitude_quaternion(np.array([[0.0, 0.0, np.pi]])).round(6).tolist()
     [[0.0, 0.0, 0.0, 1.0]]

@@ -68,7 +68,9 @@ def plan_line(setup: FlightSetup) -> MapLine:
 
 
 def track_line(setup: FlightSetup, track: Track) -> MapLine:
-    """Return the flown track, thinned to a known position each `POINT_INTERVAL_S` seconds and the last.
+    """Return the flown track as a line, with a point every `POINT_INTERVAL_S` seconds and at the end.
+
+    Rows without a position are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -125,7 +127,11 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 
 
 def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapLine]:
-    """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
+    """Return lines of a flight's returns and glides.
+
+    They are the path coloured by the outcome of a return from there, the paths of the worst returns, and the path
+    coloured by the destination that a glide reaches.
+    """
     limit, lines = drawn_returns.returns.limit, []
     for kind, segment in drawn_returns.segments_by_outcome:
         name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
@@ -148,7 +154,10 @@ def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str,
 
 
 def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZone]:
-    """Return the glide footprint: minimum heights above ground to reach a chosen place, and flat ground."""
+    """Return the areas of the glide footprint; [] if none was computed.
+
+    They are the areas by the lowest height above ground from which a chosen place can be reached, and flat ground.
+    """
     footprint = drawn_returns.glides.footprint
     if footprint is None:
         return []
@@ -171,7 +180,7 @@ def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZon
 
 
 def _to_geographic(setup: FlightSetup, ring: Floats) -> Floats:
-    """Convert an outline (n, 2) in m to latitude and longitude, degrees."""
+    """Convert an outline (n, 2) in m to latitude and longitude, deg, (n, 2)."""
     return np.stack(to_geo(setup.scenario.origin, ring[:, 0], ring[:, 1]), axis=-1)
 
 
@@ -230,7 +239,10 @@ class _Folders:
 
 
 def _add_style(mark: ElementTree.Element, role: str) -> None:
-    """Set colour and width of a role, for the dark background of aerial pictures."""
+    """Add the colour and the width of a role, for the dark background of aerial pictures.
+
+    Nothing is added if `role` is "".
+    """
     if not role:
         return
     look, style = LOOKS[role], _add_element(mark, "Style")
@@ -276,14 +288,14 @@ def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> Elem
 
 
 def _coordinates_text(line: MapLine, k: int) -> str:
-    """Write longitude, latitude and altitude of a point, as KML wants them."""
+    """Return longitude, latitude and altitude of a point in the syntax of KML."""
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 
 
 def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
-    """Return a GPX document: lines with named points as routes.
+    """Return a GPX document with lines and zones.
 
-    Other lines and outlines of zones are written as tracks.
+    Lines with named points are routes; other lines and the outlines of zones are tracks.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])

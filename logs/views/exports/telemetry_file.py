@@ -45,7 +45,7 @@ _STATION = (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
 
 def telemetry_bytes(log: FlightLog) -> bytes:
-    """Return the bytes of the `.tlog`: mission upload, telemetry, waypoints reached, and events as texts.
+    """Encode a flight as a telemetry log: mission upload, telemetry, reached waypoints, and event texts.
 
     >>> from logs.recording.example_log import example_log
     >>> data = telemetry_bytes(example_log())
@@ -62,7 +62,7 @@ def telemetry_bytes(log: FlightLog) -> bytes:
 
 
 def _timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
-    """Yield time in flight (s), sender and message, in order of time."""
+    """Yield the time in flight (s), the sender and the message of each frame, in order of time."""
     for message in _upload_messages(log):
         yield 0.0, _STATION, message
     for time, message in _flight_messages(log):
@@ -79,7 +79,7 @@ def _upload_messages(log: FlightLog) -> Iterator[Any]:
 
 
 def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
-    """Yield the time (s) and the messages of the vehicle during the flight."""
+    """Yield the time (s) and the message of each frame of the vehicle during the flight."""
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
     start = snapshots.start_snapshot(setup)

@@ -50,9 +50,11 @@ class Instruments:
     limits: tuple[tuple[str, float], ...]
 
     def frame(self, time: float, *, width: int = 80) -> list[str]:
-        """Return lines of at most ``width`` columns (at least `MIN_WIDTH`) for the last row at or before ``time`` (s).
+        """Return the instruments as lines of text, for the last row at or before ``time`` (s).
 
         For a time before the first row, the first row is shown.
+
+        width: largest number of columns of a line; at least `MIN_WIDTH` are used.
         """
         columns = max(MIN_WIDTH, width)
         log = self.log
@@ -73,7 +75,7 @@ class Instruments:
         return [shorten(line, columns).rstrip() for line in lines]
 
     def _head_lines(self, k: int, columns: int) -> list[str]:
-        """Write title and time, a bar of the time flown, and the leg with the distance that remains."""
+        """Return the title with the time, a bar of the time flown, and the leg with the remaining distance."""
         log, track = self.log, self.log.track
         time, end = float(track.time[k]), log.end_time
         title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
@@ -93,7 +95,7 @@ class Instruments:
         return [_without_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
 
     def _horizon_lines(self, k: int, columns: int) -> list[str]:
-        """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
+        """Return the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
         roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
         rows = []
         for row in range(_HORIZON_ROWS):
@@ -112,7 +114,7 @@ class Instruments:
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
     def _readout_lines(self, k: int) -> list[str]:
-        """Write the numbers next to the horizon: speeds, altitude, attitude, path errors, wind and battery."""
+        """Return the numbers next to the horizon: speeds, heights, attitude, path errors, wind and battery."""
         track, setup = self.log.track, self.log.setup
         east, north, up = (float(value) for value in track.velocity[k])
         roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
@@ -140,7 +142,7 @@ class Instruments:
         ]
 
     def _control_lines(self, k: int, bar_width: int) -> list[str]:
-        """Draw one bar for each control, with its position (O) between its limits, and its command (|)."""
+        """Return one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
         for (name, limit), deflection, command in zip(self.limits, controls, commands, strict=True):
@@ -163,7 +165,7 @@ class Instruments:
         return lines
 
     def _threat_text(self, k: int) -> str:
-        """Name the missiles and radars in whose range the aircraft is."""
+        """Return the names and distances of the missiles and radars in whose range the aircraft is."""
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         threats_in_reach = [
@@ -176,7 +178,7 @@ class Instruments:
         )
 
     def _latest_entries(self, time: float) -> list[str]:
-        """Write the latest entries of the timeline at a time, s."""
+        """Return the last entries of the timeline up to a time, s."""
         entry_count = bisect.bisect_right([entry.time for entry in self.entries], time + 1e-9)
         return [
             f"{entry.time:8.1f} s  {entry.text}"
@@ -185,7 +187,9 @@ class Instruments:
 
 
 def make_instruments(log: FlightLog) -> Instruments:
-    """Prepare a log for frames; its legs are computed from the track, not read from the log.
+    """Prepare the instruments of a log.
+
+    The legs are computed from the track, not read from the log.
 
     >>> from logs.recording.example_log import example_log
     >>> frame = make_instruments(example_log()).frame(10.0)
@@ -204,21 +208,21 @@ def make_instruments(log: FlightLog) -> Instruments:
 
 
 def _without_control_characters(text: str) -> str:
-    """Replace control characters with spaces, so that they cannot control the terminal."""
+    """Replace unprintable characters with spaces, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _number_text(value: float, digits: int, sign: str = "") -> str:
-    """Write a number with fixed decimals; "?" if it is not finite."""
+    """Return a number with fixed decimals; "?" if it is not finite."""
     # Zero has no unwanted sign: "+0.0" or "0", never "-0".
     return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 
 def _metres_text(value: float) -> str:
-    """Write a length in whole metres."""
+    """Return a length in whole metres with its unit."""
     return f"{_number_text(value, 0)} m"
 
 
 def _course_text(degrees: float) -> str:
-    """Write a course with three digits; "?" if it is not finite."""
+    """Return a course with three digits; "?" if it is not finite."""
     return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

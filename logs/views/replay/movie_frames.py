@@ -118,7 +118,7 @@ class _MovingParts:
         self._step = max(1, len(position) // _MAX_TRAIL_POINTS)
 
     def show(self, time: float) -> None:
-        """Draw the newest row at or before ``time`` (s), and the trail up to it."""
+        """Draw the last row at or before ``time`` (s), and the trail up to it."""
         track = self._track
         k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
         rows = np.append(np.arange(0, k, self._step), k)
@@ -134,7 +134,7 @@ class _MovingParts:
         self._figure.draw_artist(self._text)
 
     def _caption_text(self, k: int) -> str:
-        """Write time, leg, airspeed, altitude, height above ground and bank of a row."""
+        """Return the caption of a row: time, leg, airspeed, altitude, height above ground and bank."""
         track = self._track
         roll, _, _ = track.attitude[k].tolist()
         parts = [
@@ -149,7 +149,9 @@ class _MovingParts:
 
 
 def signed_number(value: float, digits: int) -> str:
-    """Write a number with ``digits`` decimals, zero without a sign, and "?" for a non-finite value.
+    """Return a number as text with ``digits`` decimals; "?" for a non-finite value.
+
+    Zero has no sign.
 
     >>> signed_number(-0.3, 0), signed_number(-12.34, 1)
     ('0', '−12.3')

@@ -66,8 +66,8 @@ def log_with_legs(log: FlightLog) -> FlightLog:
 
 
 def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
-    """List the entries as `timeline` does, for a log from `log_with_legs`."""
-    parts = _leg_rows(log.track, log.setup.route)
+    """List the entries as `timeline` does, for a log whose legs `log_with_legs` has computed."""
+    parts = _split_by_leg(log.track, log.setup.route)
     entries = [_start_entry(log)]
     entries += _leg_entries(log, parts)
     entries += _turn_entries(log, parts)
@@ -86,7 +86,7 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
 
 
 def entry_lines(entry: TimelineEntry) -> list[str]:
-    """Wrap an entry to lines of at most `WIDTH` columns: time in seconds, kind, text.
+    """Wrap an entry to lines of at most `WIDTH` columns that show time (s), kind and text.
 
     >>> entry_lines(TimelineEntry(20.0, "turn", "turn left 14.0° at waypoint 1"))
     ['    20.00 s  turn     turn left 14.0° at waypoint 1']
@@ -98,12 +98,12 @@ def entry_lines(entry: TimelineEntry) -> list[str]:
 
 
 def _without_control_characters(text: str) -> str:
-    """Replace control characters of a file's text, so that they cannot control the terminal."""
+    """Replace unprintable characters with spaces, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
-    """Split the track where the leg changes, and leave out rows outside the legs of the route."""
+def _split_by_leg(track: Track, route: Route) -> list[_LegRows]:
+    """Split the rows of a track where the leg changes; rows outside the legs of the route are left out."""
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]
@@ -112,7 +112,7 @@ def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
 
 
 def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
-    """Group the parts in order; parts around the same loiter form one group."""
+    """Group the parts of a flight in order: all parts around one loiter form one group, others one each."""
     first_legs: list[int] = []
     for leg in range(route.legs):
         is_on_circle = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
@@ -124,14 +124,14 @@ def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]
 
 
 def waypoint_name(route: Route, index: int) -> str:
-    """Name a waypoint by its number and its mission item, if it has one."""
+    """Return the name of a waypoint: its number and, if it has one, its mission item."""
     item = int(route.items[index])
     number = int(route.stops[index])
     return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
 
 
 def _start_entry(log: FlightLog) -> TimelineEntry:
-    """Describe aircraft, scenario and start of the flight."""
+    """Return the entry on aircraft, scenario and start of the flight."""
     setup, track = log.setup, log.track
     east, north, up = track.position[0].tolist()
     lat, lon = to_geo(setup.scenario.origin, east, north)
@@ -146,7 +146,10 @@ def _start_entry(log: FlightLog) -> TimelineEntry:
 
 
 def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List the start of each leg with course, length, slope and airspeed; one entry for a whole loiter."""
+    """List an entry for the start of each leg, with course, length, slope and airspeed.
+
+    A loiter has one entry for all its legs.
+    """
     route = log.setup.route
     points = log.setup.display_waypoints
     courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
@@ -172,7 +175,10 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 
 
 def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List each change to the next leg, with the turn of the route and the peak bank from mid-leg to mid-leg."""
+    """List an entry for each change to the next leg: the turn of the route, and the peak bank.
+
+    The peak bank is the largest from the middle of one leg to the middle of the next.
+    """
     route, track = log.setup.route, log.track
     turns = signed_turns(route.waypoints)
     roll, _, _ = track.attitude.T
@@ -193,7 +199,7 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 
 
 def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
-    """List the lowest height above ground of each leg, and whether it is below the required height."""
+    """List the lowest height above ground of each leg, marked if it is below the required height."""
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is unknown")]
@@ -239,7 +245,7 @@ def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[Ti
 
 
 def _throttle_entries(track: Track) -> list[TimelineEntry]:
-    """List the times at which the throttle is full or closed for long."""
+    """List the periods in which the throttle is full or closed for at least `_MIN_SATURATION_TIME_S`."""
     _, _, _, throttle = track.commands.T
     entries = []
     for name, is_held in (
@@ -258,7 +264,7 @@ def _throttle_entries(track: Track) -> list[TimelineEntry]:
 
 
 def _end_entries(log: FlightLog) -> list[TimelineEntry]:
-    """Describe how the flight ended, its time, distance and energy, and any fault of the log."""
+    """List the end of the flight, with time, distance and energy, and any fault of the log."""
     track = log.track
     steps = np.diff(track.position, axis=0)
     distance = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))

@@ -29,7 +29,7 @@ from logs.views.report.page import (
     CHART_SCRIPTS,
     page_library,
     page_template,
-    picture_address,
+    picture_data_url,
     script_digest,
     script_text,
     style_text,
@@ -76,7 +76,7 @@ class Comparison:
 
 
 def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
-    """Judge and measure both flights alike.
+    """Judge and measure the flights of two logs with the same rules, and list their differences.
 
     names: names in tables and legends; "(first)" and "(second)" are added to equal names.
 
@@ -109,7 +109,7 @@ def _judge_log(log: FlightLog) -> Verdict:
 
 
 def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
-    """Measure a flight: values by (name, unit)."""
+    """Measure a flight; return its values by (name, unit), NaN if unknown."""
     has_position = np.isfinite(track.position).all(axis=1)
     position, time = np.ascontiguousarray(track.position[has_position]), np.ascontiguousarray(track.time[has_position])
     roll, _, _ = track.attitude.T
@@ -155,7 +155,7 @@ def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[
 
 
 def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
-    """Return the number of failed findings, and the smallest margin of each rule; NaN if unknown."""
+    """Return the number of failed findings and the smallest margin of each rule, by (name, unit)."""
     values = {("findings that fail", ""): float(sum(finding.ok is False for finding in verdict.findings))}
     for name, rule in RULE_WORDS.items():
         closest = closest_to_limit(finding for finding in verdict.findings if finding.rule == name)
@@ -166,7 +166,7 @@ def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
 
 
 def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
-    """List the differences of the setups, and the distance between the tracks."""
+    """List sentences on the differences of the setups, and on the distance between the tracks."""
     first_setup, second_setup = first.setup, second.setup
     notes = []
     for name, first_value, second_value in (
@@ -206,9 +206,11 @@ _BLOCK_POINTS = 32
 
 
 def nearest_distances(points: Floats, track: Floats) -> Floats:
-    """Return the distance (n,) from each point of one track (n, 3) to the nearest point of another (m, 3).
+    """Return the distance (n,) from each point of one track to the nearest point of another track.
 
     Because successive points lie near each other, bounding boxes show which points of the other track can be nearest.
+
+    points, track: (n, 3) and (m, 3).
 
     >>> nearest_distances(np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
     array([5., 1.])
@@ -230,14 +232,17 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
 
 
 def _wind_text(setup: FlightSetup) -> str:
-    """Describe wind speed, direction and turbulence."""
+    """Return wind speed, direction and turbulence as text."""
     wind = setup.scenario.wind
     direction_text = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
     return f"{wind.speed:g} m/s{direction_text}, turbulence {wind.turbulence}"
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """Return rows of text: quantity, unit, first value, second value, and second minus first value."""
+    """Return the table of differences as text.
+
+    A row has quantity, unit, both values, and the second value minus the first.
+    """
     first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]
     for difference in comparison.differences:
@@ -249,7 +254,7 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def difference_lines(comparison: Comparison) -> list[str]:
-    """Format the table of differences and the notes as lines for a terminal.
+    """Return the table of differences and the notes as lines for a terminal.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -320,7 +325,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
 
 
 def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View]:
-    """Build the descriptions of the pictures by file name; no map if the origins of the flights differ.
+    """Build the map and the chart of two flights, by file name; no map if their origins differ.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -334,7 +339,10 @@ def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View
 
 
 def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View]) -> dict[str, Any]:
-    """Return scene, flights and charts of the page as JSON data; the scene holds the ground of the map."""
+    """Return scene, flights and charts of the page as JSON data.
+
+    The scene contains the ground of the map, and is None without a map.
+    """
     first, _ = flights
     scene = None
     if "compare-map" in views:
@@ -350,8 +358,8 @@ def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str
 def _page_html(
     comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
 ) -> str:
-    """Return the page with its pictures, charts and scripts."""
-    pictures = [(*_PICTURES[name.removesuffix(".png")], picture_address(data)) for name, data in files.items()]
+    """Return the comparison's page with its pictures, charts and scripts."""
+    pictures = [(*_PICTURES[name.removesuffix(".png")], picture_data_url(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
     verdicts = [
         (name, verdict_badge(verdict), verdict.headline)

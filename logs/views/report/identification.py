@@ -17,7 +17,7 @@ from logs.views.report.page import (
     CHART_SCRIPTS,
     page_library,
     page_template,
-    picture_address,
+    picture_data_url,
     script_digest,
     script_text,
     style_text,
@@ -81,7 +81,10 @@ def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
 
 
 def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
-    """Return the fixed quantities, and parameters that change most with one standard deviation of each."""
+    """Return a row for each fixed quantity: its name, and the parameters that depend most on it.
+
+    The row states the change of these `count` parameters for a change of the quantity by one standard deviation.
+    """
     rows = []
     sds = np.array([parameter.sd for parameter in PARAMETERS])
     for name, shift in estimate.shifts.items():
@@ -92,7 +95,10 @@ def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
 
 
 def prediction_rows(predicted: PredictedLog) -> list[tuple[str, str, list[str]]]:
-    """Return quantity with unit, time ahead, and the root mean square error of each model, as text."""
+    """Return a row for each quantity and time ahead, as text.
+
+    A row is the quantity with its unit, the time ahead, and the root mean square error of each model.
+    """
     return [
         (
             f"{name} ({unit})",
@@ -105,7 +111,7 @@ def prediction_rows(predicted: PredictedLog) -> list[tuple[str, str, list[str]]]
 
 
 def identification_page(facts: IdentificationFacts) -> str:
-    """Return the whole page with its pictures, charts and scripts."""
+    """Return the page of an identification as self-contained HTML, with pictures, charts and scripts."""
     charts = {f"fit-{k}": equation_chart(equation) for k, equation in enumerate(facts.estimate.equations)}
     charts["predicted"] = prediction_chart(facts.predicted)
     pictures = draw_pictures(charts)
@@ -119,7 +125,7 @@ def identification_page(facts: IdentificationFacts) -> str:
         shifts=shift_rows(facts.estimate),
         predictions=prediction_rows(facts.predicted),
         whiteness=[f"{100.0 * share:.0f} %" for share in facts.predicted.predictions[-1].whiteness],
-        predicted_picture=picture_address(pictures["predicted.png"]),
+        predicted_picture=picture_data_url(pictures["predicted.png"]),
         style=Markup(style_text("style", "compare", "identification")),
         scene=Markup(script_json(None)),
         flight_data=Markup(script_json({"flights": []})),
@@ -133,10 +139,10 @@ def identification_page(facts: IdentificationFacts) -> str:
 def _fit_charts(
     estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
 ) -> Sequence[tuple[str, str, str, str]]:
-    """Return name, description and picture of each chart, and the quality of its fit."""
+    """Return name, title, picture (data URL) and quality of fit of each equation's chart."""
     chart_rows = []
     for k, equation in enumerate(estimate.equations):
         name = f"fit-{k}"
         fit_text = f"R² {equation.explained:.3f}; its residuals are autocorrelated over {equation.correlation:.2g} s"
-        chart_rows.append((name, charts[name].title, picture_address(pictures[f"{name}.png"]), fit_text))
+        chart_rows.append((name, charts[name].title, picture_data_url(pictures[f"{name}.png"]), fit_text))
     return chart_rows

@@ -72,7 +72,7 @@ class ReportPicture:
 
 
 def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[str, bytes]) -> list[ReportPicture]:
-    """List the figures with these names in the order of the page.
+    """List the pictures of the figures with these names, in the order of the page.
 
     stills: PNG bytes of still pictures, by file name.
     """
@@ -82,17 +82,19 @@ def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[st
             title=entry.title,
             alternative=entry.alternative(subject),
             caption=entry.caption(subject),
-            data=picture_address(stills[f"{entry.name}.png"]) if entry.still else "",
+            data=picture_data_url(stills[f"{entry.name}.png"]) if entry.still else "",
         )
         for entry in FIGURES
         if entry.name in names
     ]
 
 
-def picture_address(png: bytes) -> str:
-    """Return a picture as a data URL; a large picture, which is seen only on paper, as a JPEG.
+def picture_data_url(png: bytes) -> str:
+    """Return a picture as a data URL.
 
-    >>> picture_address(b"PNG")
+    A large picture, which is seen only on paper, is converted to a JPEG.
+
+    >>> picture_data_url(b"PNG")
     'data:image/png;base64,UE5H'
     """
     # Imported here, so that matplotlib is not loaded before a drawing.
@@ -167,9 +169,9 @@ def page_template(name: str, package: str = "logs.views.report") -> Template:
 
 
 def script_text(names: tuple[str, ...]) -> str:
-    """Join the scripts of ``templates/scripts``, each from its own file, and always add ``start`` at the end.
+    """Join the looks of the theme and scripts of ``templates/scripts``.
 
-    The widths and dashes of the theme stand before the scripts.
+    names: names of the scripts in their order; ``start`` is added at the end.
     """
     files = resources.files("logs.views.report").joinpath("templates", "scripts")
     parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
@@ -178,14 +180,16 @@ def script_text(names: tuple[str, ...]) -> str:
 
 
 def style_text(*names: str) -> str:
-    """Join the colours of the theme and style sheets of ``templates``; both pages share the sheet "style"."""
+    """Join the theme's colours and the style sheets of ``templates`` with these names."""
     files = resources.files("logs.views.report").joinpath("templates")
     sheets = [files.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in names]
     return "\n".join([theme.css_variables(), *sheets])
 
 
 def script_digest(text: str) -> str:
-    """Return the hash of a script in the form of a policy (Content Security Policy Level 3, "hash-source").
+    """Return the hash of a script as a content security policy states it.
+
+    The form is that of Content Security Policy Level 3, "hash-source".
 
     >>> script_digest("")
     'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='
@@ -271,7 +275,7 @@ def _page_html(
     command: str,
     events: Sequence["LogEvent"] = (),
 ) -> str:
-    """Fill the page's template with verdict, tables, pictures and facts."""
+    """Return the report's page: the template filled with verdict, tables, pictures and facts."""
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
@@ -305,7 +309,7 @@ def _page_html(
         more_events=max(0, len(events) - tables.MAX_EVENTS),
         energy=tables.energy_facts(setup, track),
         command=command,
-        origin=tables.origin_facts(setup, versions),
+        reproducibility=tables.reproducibility_facts(setup, versions),
         **_page_data(setup, track, views),
     )
 
@@ -330,14 +334,14 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the charts that the scripts draw, by name of the figure; charts without panels are omitted."""
+    """Return the figures that the scripts draw as JSON data, by name; charts without panels are omitted."""
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 
 def report_flight(setup: FlightSetup, track: Track | None) -> dict[str, Any]:
-    """Return the flight for slider and map, and the aircraft model.
+    """Return the flight's moments for slider and map, and the aircraft model, for the page.
 
-    A plan that was not flown has no flight.
+    A plan that was not flown has no moments.
     """
     flights = [] if track is None else [flight_moments(setup, track)]
     # A flight without a known position cannot be shown.

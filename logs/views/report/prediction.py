@@ -11,7 +11,7 @@ from logs.views.report.page import (
     CHART_SCRIPTS,
     page_library,
     page_template,
-    picture_address,
+    picture_data_url,
     script_digest,
     script_text,
     style_text,
@@ -20,7 +20,7 @@ from logs.views.scene import script_json
 
 
 def prediction_page(heading: str, bands: Sequence[Band], chart: Chart) -> str:
-    """Return the whole page with its picture, chart and scripts.
+    """Return the page of a blind prediction as self-contained HTML, with picture, chart and scripts.
 
     heading: description of the prediction in a sentence.
     """
@@ -30,7 +30,7 @@ def prediction_page(heading: str, bands: Sequence[Band], chart: Chart) -> str:
         heading=heading,
         note=uninformative_note(bands),
         bands=[band for band in bands if band.inside == band.inside],
-        picture=picture_address(draw_pictures({"bands": chart})["bands.png"]),
+        picture=picture_data_url(draw_pictures({"bands": chart})["bands.png"]),
         style=Markup(style_text("style", "compare", "identification")),
         scene=Markup(script_json(None)),
         flight_data=Markup(script_json({"flights": []})),

@@ -56,7 +56,10 @@ LEG_COLUMNS = (
 
 
 def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -> list[LegRow]:
-    """List the legs of the route: planned shape and flown values."""
+    """List the legs of the route, with their planned shape and flown values.
+
+    failing: numbers of the legs with a failed finding.
+    """
     waypoints = setup.display_waypoints
     runs, courses, slopes = (
         leg_runs(waypoints),
@@ -85,7 +88,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
 
 
 def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
-    """Return the height above ground of each row, (t,) m, from track and terrain; None without terrain."""
+    """Return the height above ground of each row, m, (t,), from track and terrain; None without terrain."""
     terrain = setup.scenario.terrain
     if terrain is None:
         return None
@@ -112,7 +115,7 @@ def _flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: 
 
 
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
-    """Describe the flight in one line; "" for a plan that was not flown."""
+    """Return one sentence on the flight: distance, time, lowest height and energy; "" for a plan."""
     if track is None:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
@@ -185,7 +188,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
 
 
 def _position_text(lat_deg: float, lon_deg: float) -> str:
-    """Write latitude and longitude in degrees."""
+    """Return latitude and longitude as text, in degrees."""
     ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
     return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
 
@@ -195,7 +198,7 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     limits, wind = setup.scenario.limits, setup.scenario.wind
 
     def angle(value: float | str) -> str:
-        """Write a limit on an angle, or that the aircraft's limit applies."""
+        """Return a limit on an angle as text, or that the aircraft's limit applies."""
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
     wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
@@ -237,7 +240,7 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
 
 
 def _plan_status(feasible: bool, safe: bool) -> str:
-    """Describe whether a plan is feasible, and whether it avoids every missile."""
+    """Return a clause on whether a plan is feasible, and whether it avoids every missile."""
     if safe:
         return "feasible, and outside every missile's reach"
     return "feasible, but within a missile's reach" if feasible else "not feasible"
@@ -249,12 +252,12 @@ def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
 
 
 def mission_notes(setup: FlightSetup) -> list[str]:
-    """List warnings on the mission file, notes on the scenario, and items that cannot be flown as written."""
+    """List warnings on the mission file, and notes on the scenario and on items that cannot be flown."""
     return [*setup.mission.warnings, *setup.scenario.notes, *setup.notes]
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Summarize the energy that the flight drew from the battery, beyond the amount in `flight_sentence`."""
+    """Return facts on the energy drawn from the battery, other than the amount in `flight_sentence`."""
     if track is None or len(track) == 0:
         return []
     used_energy = float(track.energy[-1])
@@ -277,8 +280,8 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
     return facts
 
 
-def origin_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
-    """Return seed, versions and hashes, which are needed to repeat the flight."""
+def reproducibility_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
+    """Return the seed, versions and hashes that are needed to reproduce the flight."""
     wind_seed = setup.scenario.wind.seed
     facts: Facts = [("Seed", f"{setup.seed}" + (f"; turbulence {wind_seed}" if wind_seed is not None else ""))]
     facts += [(name, versions[name]) for name in sorted(versions)]
@@ -296,7 +299,10 @@ PASSAGE_COLUMNS = ("unit", "reach", "entered (s)", "left (s)", "inside (s)", "cl
 
 
 def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """List the stays inside missiles' and radars' spheres, in order of time, in the columns of `PASSAGE_COLUMNS`."""
+    """List the stays inside the spheres of missiles and radars in order of time.
+
+    Each row has the columns of `PASSAGE_COLUMNS`.
+    """
     if track is None or len(track) == 0:
         return []
     threats = setup.scenario.threats

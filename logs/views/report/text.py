@@ -77,7 +77,9 @@ _WORDS = {"pass": "ok", "fail": "fails", "open": "not judged", "unjudged": "not 
 
 
 def number(value: float | None, *, signed: bool = False, digits: int | None = None) -> str:
-    """Write a number with three or four significant digits, or an en dash for None and non-finite values.
+    """Return a number as text with three or four significant digits.
+
+    None and non-finite values become an en dash.
 
     digits: number of decimals, if all numbers of a column need the same.
     """
@@ -96,7 +98,7 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
 
 
 def quantity(value: float | None, unit: str) -> str:
-    """Write a number and its unit, with radians shown as degrees."""
+    """Return a number and its unit as text, with radians shown as degrees."""
     shown_value, name = in_unit(value, unit)
     text = number(shown_value)
     if text == NOTHING or not name:
@@ -105,19 +107,22 @@ def quantity(value: float | None, unit: str) -> str:
 
 
 def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
-    """Return the value and the name of its unit, as shown."""
+    """Return a value and the name of its unit as shown, with radians as degrees."""
     if unit == "rad":
         return (None if value is None else math.degrees(value)), "°"
     return value, _UNITS.get(unit, unit)
 
 
 def finding_state(ok: bool | None, *, is_open: bool = False) -> str:
-    """Name the state of a finding.  is_open: True if the finding, unjudged, leaves the verdict open."""
+    """Return the state of a finding, as in `FindingRow`.
+
+    is_open: True if the finding, unjudged, leaves the verdict open.
+    """
     return ("open" if is_open else "unjudged") if ok is None else "pass" if ok else "fail"
 
 
 def verdict_badge(verdict: Verdict) -> Badge:
-    """Summarize the verdict in one word; a verdict whose only failure is completion is incomplete."""
+    """Return the verdict in a few words; a verdict whose only failure is completion is "incomplete"."""
     if verdict.flyable:
         answer = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
         return Badge("pass", _SIGNS["pass"], answer)
@@ -176,23 +181,28 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
 
 
 def first_remedy(verdict: Verdict) -> FindingRow | None:
-    """Return the first failed finding with a remedy, a ground contact before all others; None if none has a remedy."""
+    """Return the first failed finding with a remedy, or None if none has one.
+
+    A ground contact comes before all others.
+    """
     worst = [rule.failed[0] for rule in verdict.present().failed_rules]
     # A ground contact ended the flight; the sort keeps the order of the others.
-    worst.sort(key=lambda one: not (one.rule == "clearance" and one.flown is not None and one.flown <= 0.0))
+    worst.sort(key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0)
     rows = (_finding_row(finding, verdict.deciding) for finding in worst)
     return next((row for row in rows if row.remedy), None)
 
 
 def _place_and_value(row: FindingRow) -> str:
-    """Describe the place and value of a failed finding."""
+    """Return the place and the value of a failed finding as text."""
     value = row.planned if row.flown == NOTHING else row.flown
     unit = row.unit if row.unit in ("°", "%") else f" {row.unit}"
     return row.where if value == NOTHING else f"{row.where} ({value}{unit.rstrip()})"
 
 
 def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
-    r"""Describe changes of the plan, each of which would make a failed finding pass; return "" if none is known.
+    r"""Return changes of the plan as text, each of which would make a failed finding pass.
+
+    Return "" if none is known.
 
     deciding: deciding parameter of the verdict; its value is named at the finding that it decides.
 
@@ -212,7 +222,7 @@ def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
 
 
 def count_sentence(rows: list[FindingRow]) -> str:
-    """State the numbers of findings that pass, fail, and were not judged."""
+    """Return a sentence on the numbers of findings that pass, fail, and were not judged."""
     counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
     passed_text = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings pass"
     failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
@@ -222,7 +232,10 @@ def count_sentence(rows: list[FindingRow]) -> str:
 
 
 def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
-    """Write all numbers and texts of one finding.  deciding: as in `finding_rows`."""
+    """Return all numbers and texts of one finding.
+
+    deciding: as in `finding_rows`.
+    """
     state = finding_state(finding.ok, is_open=bool(undecided_findings([finding])))
     planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
@@ -269,20 +282,20 @@ def _needed_decimals(finding: Finding) -> int | None:
 
 
 def _limit_text(finding: Finding, digits: int | None) -> str:
-    """Write the values that pass; an en dash without a limit."""
+    """Return the values that pass as text; an en dash without a limit."""
     text = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
     return text if text == NOTHING else f"{finding.limit_sign}\u00a0{text}"
 
 
 def _missed_text(finding: Finding) -> str:
-    """Write the distance of a failed finding from the values that pass; "" if it fails by other evidence."""
+    """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
         return ""
     return quantity(-finding.margin - (finding.tolerance or 0.0), finding.unit)
 
 
 def _sentence(finding: Finding) -> str:
-    """Describe a finding in words: its reason, or the flown or planned value and its limit."""
+    """Return a finding in words: its reason, or the flown or planned value and its limit."""
     parts: list[str] = []
     digits, unit = _needed_decimals(finding), in_unit(None, finding.unit)[1]
     space = "" if unit in ("", "°", "%") else "\u00a0"
@@ -296,12 +309,15 @@ def _sentence(finding: Finding) -> str:
 
 
 def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
-    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is omitted."""
+    """Return a row for each rule with findings, in the order of `RULE_WORDS`.
+
+    A row has the numbers of findings by state, and the finding closest to its limit.
+    """
     return [_rule_row(rule) for rule in findings_by_rule(findings)]
 
 
 def _rule_row(rule: RuleFindings) -> RuleRow:
-    """Count the findings of one rule, and show the finding closest to its limit."""
+    """Return the row of one rule: the numbers of its findings, and the finding closest to its limit."""
     failed_count, judged_count = len(rule.failed), rule.judged
     is_open = bool(undecided_findings(rule.findings))
     state = "fail" if failed_count else "open" if is_open else "pass" if judged_count else "unjudged"
@@ -330,8 +346,8 @@ _QUANTITY_NAMES = {
 _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)", "energy (Wh)")
 
 
-def refly_lines(again: Reflight) -> list[str]:
-    """Return tables of legs and turns, each number as flown and as simulated, and how far the model can be trusted.
+def refly_lines(reflight: Reflight) -> list[str]:
+    """Return tables of legs and turns, as flown and as simulated, and a line on how well the model fits.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -344,42 +360,42 @@ def refly_lines(again: Reflight) -> list[str]:
     'AUTO from 0.0 s to 36.5 s, legs 0 to 1: flown / simulated'
     """
     leg_table: list[tuple[str, ...]] = [_HEAD]
-    for pair in again.legs:
+    for pair in reflight.legs:
         numbers = (pair.cross_track, pair.height_error, pair.ground_speed, pair.bank, pair.energy)
         leg_table.append((f"leg {pair.leg}", *map(_pair_text, numbers)))
     turn_table: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
-    for turn in again.turns:
+    for turn in reflight.turns:
         name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
         turn_table.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
-    stretch = again.stretch
+    stretch = reflight.stretch
     stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
-    legs_text = f", legs {again.first} to {again.first + len(again.legs) - 1}"
+    legs_text = f", legs {reflight.first} to {reflight.first + len(reflight.legs) - 1}"
     lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(leg_table)]
-    if again.turns:
+    if reflight.turns:
         lines += ["", *_format_columns(turn_table)]
-    return [*lines, "", trust_line(again)]
+    return [*lines, "", trust_line(reflight)]
 
 
-def trust_line(again: Reflight) -> str:
-    """Describe in one line how well the model represents this aircraft."""
-    model = again.setup.aircraft
-    model_text = f"{model}, used because no aircraft was named," if again.stands_in else model
-    if not again.spreads:
+def trust_line(reflight: Reflight) -> str:
+    """Return one line on how well the model represents the aircraft of an imported flight."""
+    model = reflight.setup.aircraft
+    model_text = f"{model}, used because no aircraft was named," if reflight.stands_in else model
+    if not reflight.spreads:
         return f"Model and flight have no part in common: it is unknown how far {model_text} can be trusted"
     spread_texts = [
         f"{_QUANTITY_NAMES[spread.name]} {number(spread.median)} {spread.unit}"
         f" ({number(spread.percentile_95)} {spread.unit})"
-        for spread in again.spreads
+        for spread in reflight.spreads
     ]
-    end_text = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"
-    wind = again.setup.scenario.wind
+    end_text = "" if reflight.ended == "completed" else f"; the simulated flight ended early: {reflight.ended}"
+    wind = reflight.setup.scenario.wind
     gust_text = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
     wind_text = f" in {wind.speed:.1f} m/s of wind, {gust_text}"
     return f"Model {model_text}{wind_text}, against the flight, median (95 %): {', '.join(spread_texts)}{end_text}"
 
 
 def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:
-    """List the stretches that were not flown again, with the reasons.
+    """List the stretches of an imported flight that were not simulated, with the reasons.
 
     stretches: stretches of the imported flight.  max_count: largest number of stretches to fly again.
 
@@ -399,7 +415,7 @@ def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[Mission
 
 
 def _pair_text(pair: tuple[float, float]) -> str:
-    """Write a flown and a simulated value; "-" for an unknown one."""
+    """Return a flown and a simulated value as text; "-" for an unknown one."""
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 

@@ -38,7 +38,7 @@ def test_less_than_a_second_back_is_no_jump() -> None:
 
 def test_two_restarts_are_two_jumps() -> None:
     flight = np.arange(5.0, 25.0)
-    found = remove_clock_jumps(np.concatenate([flight, flight, flight]), usual=1.0)
+    found = remove_clock_jumps(np.concatenate([flight, flight, flight]), usual_step=1.0)
     assert found.time.tolist() == np.arange(5.0, 65.0).tolist()
     assert found.jumps == (24.0, 44.0)
 

@@ -4,7 +4,7 @@ import pytest
 
 from flight.mission.items import Command, MissionItem
 from flight.simulation.setup import MissingItems
-from logs.importers.logged_missions import LoggedItem, LoggedItems, combine_items, logged_mission
+from logs.importers.logged_missions import LoggedItem, LoggedItemGroup, combine_items, make_logged_mission
 from logs.importers.raw_log import LoggedMission
 
 WAY = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + 0.01 * k, 8.0, 75.0) for k in range(4)]
@@ -15,7 +15,7 @@ def items(time: float, way: list[MissionItem], total: int = 4) -> list[LoggedIte
 
 
 def made_of(way: list[MissionItem], total: int) -> LoggedMission | None:
-    return logged_mission(LoggedItems(1.0, total, tuple(way)), "a.BIN", "CMD")
+    return make_logged_mission(LoggedItemGroup(1.0, total, tuple(way)), "a.BIN", "CMD")
 
 
 def test_items_that_are_flown_make_no_mission() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from logs.importers.open_log import FORMATS, MAX_BYTES, is_imported_log, log_format, open_log
+from logs.importers.open_log import FORMATS, MAX_BYTES, detect_log_format, is_imported_log, open_log
 from tests.logs.importers.written_logs import columns, dataflash, gpx, igc, kml, px4, telemetry
 from world.errors import LogError
 
@@ -48,7 +48,7 @@ def test_by_what_is_in_it_whatever_it_is_called(tmp_path: Path, name: str) -> No
     ],
 )
 def test_the_suffix_decides_where_the_first_bytes_do_not(name: str, head: bytes, format_name: str) -> None:
-    assert log_format(Path(name), head).name == format_name
+    assert detect_log_format(Path(name), head).name == format_name
 
 
 def test_a_log_whose_first_page_is_lost_is_read(tmp_path: Path) -> None:

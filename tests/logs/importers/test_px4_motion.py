@@ -102,7 +102,7 @@ def test_a_vtols_throttle_is_that_of_the_rotors_that_push(tmp_path: Path) -> Non
     vtol = {"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": 5, "CA_ROTOR4_AX": 1.0, "CA_ROTOR4_AZ": 0.0}
     topics = with_motors((0, 0.2), (1, 0.2), (2, 0.2), (3, 0.2), (4, 0.7))
     assert changed(tmp_path, topics, vtol).controls.values[:, 3] == pytest.approx(0.7)
-    with pytest.raises(LogError, match="CA_ROTOR_COUNT 5 is of rotors of which none pushes forward") as refused:
+    with pytest.raises(LogError, match="CA_ROTOR_COUNT 5: no rotor pushes forward") as refused:
         changed(tmp_path, topics, vtol | {"CA_ROTOR4_AX": 0.0, "CA_ROTOR4_AZ": -1.0})
     assert "\n" not in str(refused.value)
 
@@ -118,7 +118,7 @@ def test_ailerons_that_flaps_move_as_well_are_refused_where_they_do(
     topics[topic] = (time, {"normalized_setpoint": np.linspace(0.0, 1.0, len(time))})
     with pytest.raises(LogError) as refused:
         changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.5})
-    said = f"CA_SV_CS1_{name} 0.5 is of a surface that {title} move in flight, and no model is estimated for that"
+    said = f"CA_SV_CS1_{name} 0.5: {title} deflect this surface in flight, which the model does not represent"
     assert str(refused.value).endswith(said)
     # Neither where they stay in, nor where nothing of them reaches a surface.
     changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.0})
@@ -261,10 +261,10 @@ def test_the_wind_of_releases_before_1_14_is_read(tmp_path: Path, topic: str) ->
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
-        ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": -1}, "CA_ROTOR_COUNT 0 is of rotors of which none pushes forward"),
-        ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7 is a V-tail: its mix is not modelled"),
-        ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10 is flap moves in flight"),
-        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: expected a plane"),
+        ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": -1}, "CA_ROTOR_COUNT 0: no rotor pushes forward"),
+        ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7: a V-tail, whose mix is not modelled"),
+        ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10: the flap moves in flight"),
+        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3: a tiltrotor; expected a plane"),
         ({"CA_SV_CS_COUNT": 2}, "no surface controls the elevator"),
     ],
 )

@@ -67,7 +67,7 @@ def test_a_message_without_a_time_of_its_own_comes_as_much_later_as_it_was_recei
     found = SystemMessages()
     found.add(1000.0, attitude(500))
     found.add(1000.25, link.heartbeat_encode(1, 3, 81, 10, 4))
-    clock = found.boot_times()
+    clock = found.boot_clock()
     assert clock.offset == 999.5
     assert clock.time.tolist() == [0.5, 0.75]
 

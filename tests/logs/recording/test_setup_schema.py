@@ -100,9 +100,9 @@ def test_numbers_stand_under_the_unit_that_they_have() -> None:
         ({"fly_over": [False]}, r"route\.fly_over: 1 values: expected 4"),
         ({"items": []}, r"route\.items: 0 values: expected 4"),
         ({"arcs_m": [0.0]}, r"route\.arcs_m: 1 values: expected 4"),
-        ({"return_from_waypoint": 1}, r"route\.return_from_waypoint: 1: a waypoint before the last, with its target"),
-        ({"return_from_waypoint": 3} | RETURN, r"route\.return_from_waypoint: 3: a waypoint before"),
-        (RETURN, r"route\.return_from_waypoint: -1: a waypoint before"),
+        ({"return_from_waypoint": 1}, r"route\.return_from_waypoint: 1: expected a waypoint before the last, and a"),
+        ({"return_from_waypoint": 3} | RETURN, r"route\.return_from_waypoint: 3: expected a waypoint before"),
+        (RETURN, r"route\.return_from_waypoint: -1: expected a waypoint before"),
     ],
 )
 def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:

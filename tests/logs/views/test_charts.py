@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logs.views.charts import Chart, Layer, Panel, chart_json, nice_step, numbers, outline_rows, telling_digits
+from logs.views.charts import Chart, Layer, Panel, chart_json, nice_step, numbers, outline_rows, screen_decimals
 
 
 def test_numbers_are_rounded_and_what_is_none_is_null() -> None:
@@ -17,10 +17,10 @@ def test_numbers_are_rounded_and_what_is_none_is_null() -> None:
 
 def test_digits_show_a_ten_thousandth_of_the_range() -> None:
     for span in (0.003, 1.0, 85.0, 25_000.0):
-        step = 10.0 ** -telling_digits(np.array([5.0, 5.0 + span]))
+        step = 10.0 ** -screen_decimals(np.array([5.0, 5.0 + span]))
         assert span / 1e5 <= step <= max(span / 1e3, 1.0)
-    assert telling_digits(np.array([np.nan])) == 4
-    assert telling_digits(np.array([200.0, 200.0])) == 2
+    assert screen_decimals(np.array([np.nan])) == 4
+    assert screen_decimals(np.array([200.0, 200.0])) == 2
 
 
 def test_layers_without_values_and_limits_that_are_none_are_left_out() -> None:

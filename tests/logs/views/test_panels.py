@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.views.charts import Chart, Layer, Panel, held_band, leg_marks, series
+from logs.views.charts import Chart, Layer, Panel, leg_marks, saturation_band, series
 from logs.views.drawing import draw_chart
 from tests.logs.views.figure_data import make_track
 
@@ -44,7 +44,7 @@ def test_a_quiet_series_is_not_blown_up() -> None:
 
 def test_rows_at_a_limit_are_shaded() -> None:
     panel = one("throttle", ALONG)
-    band = held_band((ALONG > 20.0) & (ALONG < 40.0), ALONG, panel.shown_span())
+    band = saturation_band((ALONG > 20.0) & (ALONG < 40.0), ALONG, panel.shown_span())
     shaded, plain = drawn(replace(panel, layers=(band, *panel.layers)), panel).axes
     (area,) = shaded.collections
     corners = area.get_paths()[0].vertices

@@ -11,9 +11,9 @@ from logs.views.threats_and_zones import (
     outline_label_position,
     sphere_cuts,
     zone_bands,
-    zone_label,
-    zone_names,
+    zone_labels,
     zone_shapes,
+    zone_text,
 )
 from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
 
@@ -85,7 +85,7 @@ KEEP_OUT, STAY_IN = Zone("town", "exclusion", SQUARE), Zone("fence", "inclusion"
     ],
 )
 def test_labels_say_the_heights(floor: ZoneLevel | None, ceiling: ZoneLevel | None, text: str) -> None:
-    assert zone_label(Zone("town", "exclusion", SQUARE, floor, ceiling)) == text
+    assert zone_text(Zone("town", "exclusion", SQUARE, floor, ceiling)) == text
 
 
 def test_shapes_are_drawn_where_they_are() -> None:
@@ -99,11 +99,11 @@ def test_shapes_are_drawn_where_they_are() -> None:
     )
     assert (inclusion.kind, inclusion.legend) == ("line", "edge of a zone to stay in")
     assert (inclusion.x.min(), inclusion.x.max()) == pytest.approx((100.0, 2900.0))
-    assert zone_shapes(()) == zone_names(()) == ()
+    assert zone_shapes(()) == zone_labels(()) == ()
 
 
 def test_names_stand_in_exclusions_and_at_an_inclusions_edge() -> None:
-    town, fence = zone_names((KEEP_OUT, STAY_IN))
+    town, fence = zone_labels((KEEP_OUT, STAY_IN))
     assert (town.x, town.y, town.prefer) == (pytest.approx(1500.0), pytest.approx(0.0), (0, 0))
     assert (fence.y, fence.prefer) == (pytest.approx(1400.0), (0, 1))
 

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 import planfly
-from logs.importers.columns.guesses import guess_table
+from logs.importers.columns.guesses import guess_column_table
 from logs.importers.motion_log import read_motion
 from tests.logs.importers.columns.column_files import circle, write_log
 from world.errors import LogError
@@ -49,7 +49,7 @@ def test_units_are_taken_from_names_and_from_a_row_below_the_header(tmp_path: Pa
         "Time (ms),Roll_deg,Airspeed [kt],alt,p\n,,,ft,deg/s\n"
         + "".join(f"{1e3 * t},{0.5 * w},{35 + w},{900 + w},{w}\n" for t, w in zip(time, wave, strict=True))
     )
-    table = toml_table(guess_table([tmp_path / "a.csv"], tmp_path / "columns.toml"))
+    table = toml_table(guess_column_table([tmp_path / "a.csv"], tmp_path / "columns.toml"))
     assert table["clocks"]["main"] == {"column": "Time (ms)", "unit": "ms"}
     units = {name: entry["unit"] for name, entry in table["columns"].items()}
     assert units == {"roll": "deg", "airspeed": "kt", "altitude": "ft", "roll_rate": "deg/s"}
@@ -60,7 +60,7 @@ def test_a_quaternion_is_guessed_without_unit(tmp_path: Path) -> None:
     time = np.arange(0.0, 20.0, 0.1)
     columns = {f"q[{k}]": np.sin(time + k) for k in range(4)}
     pd.DataFrame({"timestamp": 1e6 * time} | columns).to_csv(tmp_path / "a.csv", index=False)
-    text = guess_table([tmp_path / "a.csv"], tmp_path / "columns.toml")
+    text = guess_column_table([tmp_path / "a.csv"], tmp_path / "columns.toml")
     table = toml_table(text)
     assert table["clocks"]["main"] == {"column": "timestamp", "unit": "us"}
     assert table["columns"]["quaternion_w"] == {"column": "q[0]", "frame": "NED"}
@@ -69,7 +69,7 @@ def test_a_quaternion_is_guessed_without_unit(tmp_path: Path) -> None:
 
 
 def test_each_guess_is_marked_and_what_is_missing_is_listed(tmp_path: Path) -> None:
-    text = guess_table([REAL / "thor75" / "thor_flight75.mat"], tmp_path / "columns.toml")
+    text = guess_column_table([REAL / "thor75" / "thor_flight75.mat"], tmp_path / "columns.toml")
     body = text[text.index("[columns]") :].splitlines()[1:]
     entries = [line for line in body if line and not line.startswith("#")]
     assert len(entries) == 25
@@ -93,7 +93,7 @@ def test_two_files_are_aligned_by_a_throttle_that_both_have(tmp_path: Path) -> N
     pd.DataFrame({"time": time, "roll": np.sin(time), "dthr": throttle}).to_csv(tmp_path / "a.csv", index=False)
     motor = {"t_ms": 500 * np.arange(80), "throttle_us": 1000.0 + 1000.0 * throttle[::25][:80], "amp": 9.0 + time[:80]}
     pd.DataFrame(motor).to_csv(tmp_path / "motor.csv", index=False)
-    table = toml_table(guess_table([tmp_path / "a.csv", tmp_path / "motor.csv"], tmp_path / "columns.toml"))
+    table = toml_table(guess_column_table([tmp_path / "a.csv", tmp_path / "motor.csv"], tmp_path / "columns.toml"))
     assert table["columns"]["throttle"] == {"column": "dthr", "unit": "fraction"}
     assert table["columns"]["current"]["clock"] == "motor"
     assert table["clocks"]["motor"] == {
@@ -105,7 +105,7 @@ def test_two_files_are_aligned_by_a_throttle_that_both_have(tmp_path: Path) -> N
 
 
 def test_messages_of_one_file_share_the_clock_of_the_longest(tmp_path: Path) -> None:
-    table = toml_table(guess_table([REAL / "arduplane2013" / "TestLog2.mat"], tmp_path / "columns.toml"))
+    table = toml_table(guess_column_table([REAL / "arduplane2013" / "TestLog2.mat"], tmp_path / "columns.toml"))
     # GPS.TimeMS counts from the start of the week, GPS.T from the start of the vehicle, as all others do.
     assert table["clocks"]["GPS"] == {"column": "GPS.T", "unit": "ms"}
     assert table["columns"]["voltage"]["unit"] == "cV"
