@@ -208,7 +208,7 @@ def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[di
     for name, given in missions.items():
         with (
             running(folder, given) as (address, _),
-            tempfile.TemporaryDirectory() as profile,
+            tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
             Browser(Path(profile), 1400, 900) as browser,
         ):
             drawn(browser, address)
@@ -232,7 +232,10 @@ def measure_opening(folder: Path) -> None:
     with running(folder, ("demo.json",)) as (address, _):
         time.sleep(3.0)
         for how in ("cold", "cold", "cold"):
-            with tempfile.TemporaryDirectory() as profile, Browser(Path(profile), 1400, 900) as browser:
+            with (
+                tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
+                Browser(Path(profile), 1400, 900) as browser,
+            ):
                 browser.call("Page.addScriptToEvaluateOnNewDocument", source=OPENED)
                 drawn(browser, address)
                 seen = browser.value("window.opened")
