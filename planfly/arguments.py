@@ -118,8 +118,8 @@ def check_arguments(**given: Any) -> None:
         if value is None:
             continue
         if name in CHOICES:
-            values = value if isinstance(value, tuple | list) else (value,)
-            if all(choice in CHOICES[name] for choice in values):
+            values = value if isinstance(value, tuple) else (value,)
+            if values and all(choice in CHOICES[name] for choice in values):
                 continue
             allowed = f"expected {', '.join(map(str, CHOICES[name]))}"
         elif RANGES[name].allows(value):

@@ -11,6 +11,7 @@ from flight.autopilots.catalog import program_class_for
 from flight.simulation.setup import EngineChoice, VerticalDatum
 from planfly.arguments import check_arguments, is_wind
 from planfly.workflow.file_autopilots import with_file_autopilot
+from world.argument_types import check_types
 from world.errors import ArgumentError
 from world.files import absolute_path, did_you_mean
 from world.scenario import Scenario, load_scenario, with_flight, with_flight_time, with_terrain, with_wind
@@ -41,7 +42,7 @@ class FlightOptions(TypedDict, total=False):
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     autopilot: the simulated autopilot: "ardupilot" (in the release that saved the parameter file, or else the newest),
-    "ardupilot-4.6", "ardupilot-4.7", "px4" (the newest release), "px4-1.16", "px4-1.17" or "planfly".
+    "ardupilot-4.6", "ardupilot-4.7", "px4" (its release likewise), "px4-1.16", "px4-1.17" or "planfly".
     nav: "perfect", "rtk" or "gnss".
     """
 
@@ -173,6 +174,8 @@ _Given = TypeVar("_Given")
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
     """Decorate a function: list the options of its ``Unpack[...]`` parameter in its signature, with their defaults.
 
+    Raises the ArgumentError of `world.argument_types.check_types`.
+
     >>> from typing import Unpack
     >>> @takes_options
     ... def fly(mission: str, **options: Unpack[MissionOptions]) -> object:
@@ -198,6 +201,7 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
             if name not in signature.parameters:
                 hint = did_you_mean(name, signature.parameters)
                 raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
+        check_types(signature, args, keywords)
         return function(*args, **{**defaults, **keywords})  # type: ignore[arg-type]
 
     with_defaults.__signature__ = signature  # type: ignore[attr-defined]

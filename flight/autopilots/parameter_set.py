@@ -21,6 +21,9 @@ from world.files import TextLine
 # File in an aircraft's folder with ArduPlane's parameters of the aircraft.
 AIRCRAFT_FILE = "ardupilot.parm"
 
+# Relative tolerance within which two values are one value, because autopilots store values in single precision.
+_SAME_VALUE_TOLERANCE = 1e-6
+
 # Values by name, and the source that states them.
 Stated = tuple[Origin, Mapping[str, float]]
 
@@ -85,6 +88,7 @@ class ParameterTable:
         Raises ParameterError if a value is not accepted, or if one parameter has two values.
         """
         values: dict[str, float] = {}
+        entry_by_present_name: dict[str, Entry] = {}
         unused = []
         for name, entry in entries.items():
             if name not in self.by_any_name:
@@ -95,8 +99,11 @@ class ParameterTable:
             if not definition.low <= value <= definition.high:
                 allowed = f"allowed {definition.low / unit_factor:g}..{definition.high / unit_factor:g}"
                 raise _value_error(entry.where, name, entry.value, allowed)
-            if values.setdefault(definition.name, value) != value:
-                allowed = "the same parameter has a different value under its other name"
+            first = entry_by_present_name.setdefault(definition.name, entry)
+            if not math.isclose(values.setdefault(definition.name, value), value, rel_tol=_SAME_VALUE_TOLERANCE):
+                first_text = f"{first.name} {first.value:g} on line {first.where.number}"
+                expected = values[definition.name] / unit_factor
+                allowed = f"expected {expected:g}, because {first_text} is the same parameter under its other name"
                 raise _value_error(entry.where, name, entry.value, allowed)
         return values, tuple(unused)
 

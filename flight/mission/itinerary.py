@@ -157,6 +157,10 @@ class OpenItem(NamedTuple):
     text: str
 
 
+# Why a survey of gates alone is not flown.
+GATES_ARE_NO_WAYPOINTS = "no autopilot flies to a gate (CONDITION_GATE): a survey with gates needs turn-arounds"
+
+
 class Gate(NamedTuple):
     """A CONDITION_GATE on the leg to a stop: later commands take effect when the aircraft passes the gate.
 
@@ -296,7 +300,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     for seq in unreached:
         builder.notes.add(NEVER_REACHED, seq)
     if not builder.stops:
-        raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
+        raise _error_without_position(mission)
     return Itinerary(
         stops=tuple(builder.stops),
         home=builder.first_home,
@@ -825,4 +829,13 @@ def _first_position(mission: Mission) -> Home:
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)
-    raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
+    raise _error_without_position(mission)
+
+
+def _error_without_position(mission: Mission) -> MissionError:
+    """Return the error for a mission without a position to fly to; it says that a gate is none."""
+    has_gates = any(item.command == Command.CONDITION_GATE for item in mission.items)
+    reason = f"; {GATES_ARE_NO_WAYPOINTS}" if has_gates else ""
+    return MissionError(
+        f"{mission.source}: no item has a position to fly to; expected at least two{reason}", file=mission.source
+    )

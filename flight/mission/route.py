@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
-from flight.mission.itinerary import NEVER_REACHED, Itinerary, OpenItem, RoutePoint, stated_loiter
+from flight.mission.itinerary import (
+    GATES_ARE_NO_WAYPOINTS,
+    NEVER_REACHED,
+    Itinerary,
+    OpenItem,
+    RoutePoint,
+    stated_loiter,
+)
 from flight.mission.loiter_circles import (
     DEFAULT_LOITER_RULES,
     DEFAULT_SPIRAL_SLOPE,
@@ -647,6 +654,10 @@ def _append_return(
     return {"rtl_start": start_index, "rtl_loiter": circle}, landing
 
 
+# Distance of a gate from its leg beyond which the aircraft misses the place where the camera is to be switched, m.
+_MAX_GATE_DISTANCE_M = 10.0
+
+
 def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
     """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed or the camera.
 
@@ -667,7 +678,10 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                     notes.add(text, gate.item)
                 continue
             start, end = np.array(previous.map_position), np.array(next_stop.map_position)
-            fraction = _gate_fraction(start, end, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg))
+            gate_position = to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
+            if gate.switches_camera and _distance_to_line(start, end, gate_position) > _MAX_GATE_DISTANCE_M:
+                notes.add(f"passed beside it: {GATES_ARE_NO_WAYPOINTS}", gate.item)
+            fraction = _gate_fraction(start, end, gate_position)
             east, north, up = (start + fraction * (end - start)).tolist()
             is_apart = (
                 min(math.dist((east, north), leg_end.map_position[:2]) for leg_end in (placed_stops[-1], next_stop))
@@ -681,6 +695,12 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                 placed_stops.append(gate_stop.at((east, north, up)))
         placed_stops.append(next_stop)
     return placed_stops
+
+
+def _distance_to_line(a: Floats, b: Floats, position: tuple[Any, Any]) -> float:
+    """Return the horizontal distance of a position, east and north, m, from the line through a and b, m."""
+    (east, north), (offset_east, offset_north) = (b - a)[:2], np.array(position, dtype=float) - a[:2]
+    return abs(float(east * offset_north - north * offset_east)) / max(math.hypot(east, north), 1e-9)
 
 
 def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:

@@ -4,7 +4,7 @@ Items outside the survey are unchanged, and each line keeps its items, including
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -52,10 +52,19 @@ class SurveyLayout(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """A line to fly: corners (k, 2) m in flying order, and the items from its first waypoint to its last."""
+    """A line to fly: corners (k, 2) m in flying order, and the items from its first waypoint to its last.
+
+    flown: numbers of the items that the route leads to.
+    """
 
     corners: Floats
     items: tuple[MissionItem, ...]
+    flown: frozenset[int]
+
+    @property
+    def steps(self) -> list[MissionItem]:
+        """The items that are points of the line."""
+        return [item for item in self.items if _is_step(item, self.flown)]
 
 
 class _SurveyItems(NamedTuple):
@@ -113,13 +122,13 @@ def with_layout(
     """
     if layout_obstacle(mission, route, survey):
         return None
-    items, lines = _survey_items(mission, route, survey), list[_Line]()
+    items, lines, flown = _survey_items(mission, route, survey), list[_Line](), _flown_items(route)
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
         corners, line_items = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
-        steps = [item for item in line_items if _is_step(item)]
-        if _waypoint_of_item(mission, route)[steps[0].seq] != photo_line.first:
-            line_items = (_make_waypoint(steps[0], corners[0], origin), *line_items)
-        lines.append(_Line(corners, line_items))
+        line = _Line(corners, line_items, flown)
+        if _waypoint_of_item(mission, route)[line.steps[0].seq] != photo_line.first:
+            line = line._replace(items=(_make_waypoint(line.steps[0], corners[0], origin), *line_items))
+        lines.append(line)
     if layout.course is not None:
         turned_lines = _lines_on_course(lines, survey, layout.course, origin)
         if turned_lines is None:
@@ -139,9 +148,18 @@ def with_layout(
     return renumber_items(replace(mission, items=tuple(numbered)))
 
 
-def _is_step(item: MissionItem) -> bool:
-    """Return True if an item is a point of a line: a navigation item, or a gate that switches the camera."""
-    return is_navigation(item.command) or item.command == Command.CONDITION_GATE
+def _flown_items(route: Route) -> frozenset[int]:
+    """Return the numbers of the items that a route leads to."""
+    return frozenset(int(seq) for seq in route.items)
+
+
+def _is_step(item: MissionItem, flown: Collection[int]) -> bool:
+    """Return True if an item is a point of a line: a navigation item, or a gate on the route.
+
+    flown: numbers of the items that the route leads to.  A gate that is not flown, such as any gate of ArduPlane's, is
+        kept like a command.
+    """
+    return is_navigation(item.command) or (item.command == Command.CONDITION_GATE and item.seq in flown)
 
 
 def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
@@ -153,7 +171,7 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
         {item.seq: item_index for item_index, item in enumerate(mission.items)},
         len(mission.items),
     )
-    seqs = [int(seq) for seq in route.items]
+    seqs, flown = [int(seq) for seq in route.items], _flown_items(route)
 
     def index(waypoint: int) -> int:
         return index_by_seq.get(seqs[waypoint], item_count) if 0 <= waypoint < len(seqs) else item_count
@@ -164,12 +182,12 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
         first = max(
             item_index
             for item_index in range(index(line.first), index(line.first + 1))
-            if _is_step(mission.items[item_index])
+            if _is_step(mission.items[item_index], flown)
         )
         if mission.items[first].command not in (Command.NAV_WAYPOINT, Command.CONDITION_GATE):
             first += 1
         end_index = index(line.last) + 1
-        while end_index < item_count and not _is_step(mission.items[end_index]):
+        while end_index < item_count and not _is_step(mission.items[end_index], flown):
             end_index += 1
         lines.append((first, end_index))
     first_line, last_line = survey.lines[0], survey.lines[-1]
@@ -184,7 +202,7 @@ def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
     """
     waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
-        if _is_step(item):
+        if _is_step(item, waypoint_by_seq):
             waypoint = waypoint_by_seq.get(item.seq, waypoint)
             waypoints[item.seq] = waypoint
     return waypoints
@@ -236,13 +254,14 @@ def _reverse_line(line: _Line) -> _Line:
 
     Its waypoints are reversed; the commands between them keep their positions in the list.
     """
-    reversed_steps = iter([item for item in reversed(line.items) if _is_step(item)])
-    return _Line(line.corners[::-1], tuple(next(reversed_steps) if _is_step(item) else item for item in line.items))
+    reversed_steps = reversed(line.steps)
+    items = tuple(next(reversed_steps) if _is_step(item, line.flown) else item for item in line.items)
+    return _Line(line.corners[::-1], items, line.flown)
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
     """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
-    steps = [item for item in line.items if _is_step(item)]
+    steps = line.steps
     entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     entry_direction, exit_direction = (
         direction / max(float(np.hypot(*direction)), 1e-9) for direction in (entry_direction, exit_direction)
@@ -253,7 +272,7 @@ def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, or
         exit_waypoint = _make_waypoint(steps[-1], line.corners[-1] + turn_around * exit_direction, origin)
         return [*items, *line.items, exit_waypoint]
     # Without waypoints beyond them, gates lead to no end of the line.
-    return [*items, *(_as_waypoint(item) for item in line.items)]
+    return [*items, *(_as_waypoint(item) if _is_step(item, line.flown) else item for item in line.items)]
 
 
 def _as_waypoint(item: MissionItem) -> MissionItem:
@@ -272,7 +291,7 @@ def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin)
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
     """Return lines on another course over the hull of the present lines, or None if that is impossible."""
-    waypoint_items = [item for line in lines for item in line.items if _is_step(item)]
+    waypoint_items = [item for line in lines for item in line.steps]
     if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
     hull = convex_hull(np.concatenate([line.corners for line in lines]))
@@ -298,7 +317,7 @@ def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, orig
         line_ends.reverse()
     if math.dist(line_ends[0][1], start) < math.dist(line_ends[0][0], start):
         line_ends = [ends[::-1] for ends in line_ends]
-    return [_Line(ends, _move_items(first_line.items, ends, origin)) for ends in line_ends]
+    return [_Line(ends, _move_items(first_line, ends, origin), first_line.flown) for ends in line_ends]
 
 
 def convex_hull(points: Floats) -> Floats | None:
@@ -350,21 +369,21 @@ def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -
     return (min(crossings), max(crossings)) if len(crossings) >= 2 else None
 
 
-def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
+def _move_items(line: _Line, ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
     """Return a line's items moved to another line; its waypoints between the first and the last are left out.
 
     ends: ends of the other line, (2, 2) m.
     """
-    waypoint_indices = [index for index, item in enumerate(items) if _is_step(item)]
+    waypoint_indices = [index for index, item in enumerate(line.items) if _is_step(item, line.flown)]
     moved = []
-    for index, item in enumerate(items):
+    for index, item in enumerate(line.items):
         if index in (waypoint_indices[0], waypoint_indices[-1]):
             lat, lon = (
                 round_to_grid(float(value))
                 for value in to_geo(origin, *ends[0 if index == waypoint_indices[0] else 1].tolist())
             )
             item = replace(item, lat_deg=lat, lon_deg=lon)
-        elif _is_step(item):
+        elif _is_step(item, line.flown):
             continue
         moved.append(item)
     return tuple(moved)

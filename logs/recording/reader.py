@@ -48,6 +48,7 @@ from logs.recording.state_channel import (
 )
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.reference_flights import parse_reference_flights
+from world.argument_types import checks_types
 from world.errors import LogError
 from world.html_table import html_table
 
@@ -280,6 +281,7 @@ class _MessageCollector:
         return join_records(self.parts, RECORD)
 
 
+@checks_types
 def read_log(path: Path | str) -> FlightLog:
     """Read a flight log.
 

@@ -18,6 +18,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import check_level_flight
 from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
+from world.argument_types import checks_types
 from world.errors import PlanflyError
 from world.files import absolute_path, write_atomically
 from world.scenario_tables import names_folder
@@ -53,6 +54,7 @@ class AircraftNumbers:
 def aircraft() -> dict[str, Aircraft]: ...
 @overload
 def aircraft(name: str | Path) -> Aircraft: ...
+@checks_types
 def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     """Return an aircraft by name or folder, with its masses, speeds and limits in SI units and radians.
 
@@ -153,6 +155,7 @@ def new_aircraft(
 
 
 @with_warm_up()
+@checks_types
 def describe_aircraft(
     name: str | Path, *, motor_braking: bool = False, out: str | Path | None = None, overwrite: bool = False
 ) -> AircraftNumbers:

@@ -11,6 +11,7 @@ from flight.mission_files.formats import read_mission
 from planfly.arguments import check_arguments
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file
+from world.argument_types import checks_types
 from world.errors import ArgumentError, PlanflyError
 from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
@@ -21,6 +22,7 @@ _DEGREE_KM = 111.2
 _MAX_LATITUDE_DEG = 84.0
 
 
+@checks_types
 def terrain(
     out: str | Path,
     *,

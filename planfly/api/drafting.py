@@ -10,6 +10,7 @@ from aircraft.catalog import find_aircraft
 from planfly.arguments import check_arguments, is_valid_position
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file
+from world.argument_types import checks_types
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, PlanflyError
 from world.files import absolute_path, write_atomically
@@ -20,6 +21,7 @@ from world.scenario_file import parse_scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, names_folder
 
 
+@checks_types
 def new_scenario(
     folder: str | Path,
     start: Sequence[float],

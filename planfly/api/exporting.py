@@ -37,6 +37,7 @@ from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import check_output_file
 from planner.plan import Plan, plan_json
+from world.argument_types import checks_types
 from world.errors import MissionError, ParameterError, PlanflyError
 from world.extras import require_extra
 from world.files import temporary_folder, write_atomically
@@ -104,6 +105,7 @@ class _SourceContent:
 
 
 @with_warm_up()
+@checks_types
 def export(
     source: FlightLog | FlownMission | Plan | str | Path,
     *files: str | Path,
@@ -143,9 +145,7 @@ def export(
             if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
                 _check_suffix(target)
             check_output_file(target, overwrite, path)
-        options = MissionOptions(fence=fence, at=at, scenario=scenario, autopilot=None, params=None)
-        if any(target.suffix.lower() in PARAMETER_SUFFIXES for target in targets):
-            options |= {"autopilot": autopilot, "params": params}
+        options = MissionOptions(fence=fence, at=at, scenario=scenario, autopilot=autopilot, params=params)
         source_content = _read_source(path, targets, options)
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, named_autopilot, fence)
@@ -247,6 +247,9 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
                 allowed = f"a log is exported with the {name} that it was flown with"
                 raise MissionError.of_argument(name, value, allowed, file=path)
         return _read_log(path, needs_returns=_needs_kml(targets))
+    if not any(target.suffix.lower() in PARAMETER_SUFFIXES for target in targets):
+        # Only the parameters of a .parm file need the autopilot itself; a .plan states its name.
+        options = options | {"autopilot": None, "params": None}
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOG_SUFFIXES:

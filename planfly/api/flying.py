@@ -185,7 +185,7 @@ def fly(
     The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     autopilot: the simulated autopilot: "ardupilot" (in the release that saved the parameter file, or else the newest),
-    "ardupilot-4.6", "ardupilot-4.7", "px4" (the newest release), "px4-1.16", "px4-1.17" or "planfly".
+    "ardupilot-4.6", "ardupilot-4.7", "px4" (its release likewise), "px4-1.16", "px4-1.17" or "planfly".
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     nav: "perfect", "rtk" or "gnss".
     sitl: the program of ArduPlane or PX4 built for software in the loop (SITL), which then flies the mission.
@@ -259,7 +259,7 @@ def fly_by_each(
     names = list(dict.fromkeys(autopilots))
     if not names:
         raise ArgumentError.of_argument("autopilots", "", "expected at least one autopilot")
-    check_arguments(autopilot=names)
+    check_arguments(autopilot=tuple(names))
     per_autopilot_options = {
         name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")
     }

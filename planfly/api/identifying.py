@@ -35,6 +35,7 @@ from planfly.identification.wide_numbers import WideNumber, wide_numbers
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.data_sheets import parse_sheet
+from world.argument_types import checks_types
 from world.arrays import Floats
 from world.errors import FlightError, LogError, PlanflyError
 from world.extras import requires_extra
@@ -93,6 +94,7 @@ class IdentifiedAircraft:
 
 @requires_extra("identification")
 @with_warm_up()
+@checks_types
 def identify_aircraft(
     logs: str | Path | Sequence[str | Path],
     folder: str | Path,

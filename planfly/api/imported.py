@@ -26,6 +26,7 @@ from planfly.workflow.output_paths import (
     check_output_folder,
     clean_folder,
 )
+from world.argument_types import checks_types
 from world.errors import LogError, ScenarioError
 from world.extras import requires_extra
 from world.files import write_atomically
@@ -102,6 +103,7 @@ class ColumnGuesses:
 
 
 @requires_extra("data-logs")
+@checks_types
 def guess_columns(
     files: str | Path | Sequence[str | Path], table: str | Path, *, overwrite: bool = False
 ) -> ColumnGuesses:
@@ -144,6 +146,7 @@ def _write_log(target: Path, flight: ImportedFlight) -> None:
 
 
 @with_warm_up(*FLYING)
+@checks_types
 def refly(
     log: FlightLog | str | Path,
     out: str | Path | None = None,
@@ -222,6 +225,7 @@ def _record_simulation(folder: Path, reflight: Reflight, log: FlightLog, ending:
 # Recover damaged logs.
 
 
+@checks_types
 def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool = False) -> FlightLog | None:
     """Write the readable part of an unfinished or damaged flight log as a new log.
 

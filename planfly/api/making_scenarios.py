@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from planfly.flight_options import load_scenario_with_options
 from planfly.runtime.stages import report_line
 from planner.search.algorithms import find_algorithm
+from world.argument_types import checks_types
 from world.errors import ArgumentError
 from world.scenario import Scenario, scenario_from_spec
 from world.scenario_tables import SCALE_RATIOS
@@ -28,6 +29,7 @@ _THREATS_EXPECTED = (
 )
 
 
+@checks_types
 def make_scenario(
     base: Scenario | str | Path,
     *,
@@ -57,7 +59,10 @@ def make_scenario(
     for name, values in tables.items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         spec[name] = _with_changes(spec[name], values) if is_merged else values
-    if spec["terrain"].get("path") != base_scenario.to_json()["terrain"].get("path") and "origin" not in tables:
+    terrain_table, base_table = spec["terrain"], base_scenario.to_json()["terrain"]
+    # The check of the whole scenario refuses a terrain that is no mapping.
+    is_other_file = isinstance(terrain_table, Mapping) and terrain_table.get("path") != base_table.get("path")
+    if is_other_file and "origin" not in tables:
         spec.pop("origin", None)
     if threats is not None:
         spec["threats"] = _threat_tables(threats)

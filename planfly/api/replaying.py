@@ -13,6 +13,7 @@ from logs.views.replay.timeline import timeline as list_timeline
 from planfly.api.serving import link_access
 from planfly.arguments import check_arguments
 from planfly.runtime.first_start import with_warm_up
+from world.argument_types import checks_types
 from world.errors import LogError
 from world.extras import requires_extra
 from world.running_clock import RunningClock
@@ -50,6 +51,7 @@ def replay_interval(log: FlightLog, start: float | None, end: float | None) -> t
 
 
 @with_warm_up()
+@checks_types
 def timeline(
     log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
 ) -> tuple[TimelineEntry, ...]:
@@ -72,6 +74,7 @@ def timeline(
 
 
 @with_warm_up()
+@checks_types
 def instruments(log: FlightLog | str | Path) -> Instruments:
     """Return the instruments of a recorded flight, whose readings `Instruments.frame` formats as text lines.
 
@@ -83,6 +86,7 @@ def instruments(log: FlightLog | str | Path) -> Instruments:
     return make_instruments(_read_log_if_path(log))
 
 
+@checks_types
 def replay(
     log: FlightLog | str | Path,
     *,
@@ -127,6 +131,7 @@ def _play_frames(
 
 
 @with_warm_up()
+@checks_types
 def movie(
     log: FlightLog | str | Path,
     out: str | Path,
@@ -165,6 +170,7 @@ def _ignore_message(_text: str) -> None:
 
 @requires_extra("foxglove", "--foxglove needs")
 @with_warm_up()
+@checks_types
 def play_to_foxglove(
     log: FlightLog | str | Path,
     *,
@@ -220,6 +226,7 @@ def _check_origin(text: str) -> str:
 
 @requires_extra("live", "playing to ground stations needs")
 @with_warm_up()
+@checks_types
 def play_to_stations(
     log: FlightLog | str | Path,
     to: str | Sequence[str],

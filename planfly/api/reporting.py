@@ -19,6 +19,7 @@ from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
+from world.argument_types import checks_types
 from world.files import write_atomically
 from world.html_table import html_table
 
@@ -59,6 +60,7 @@ class _ReportContent(NamedTuple):
 
 
 @with_warm_up()
+@checks_types
 def figures(source: Source) -> "dict[str, Figure]":
     """Return the pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
 
@@ -81,6 +83,7 @@ def figures(source: Source) -> "dict[str, Figure]":
 
 
 @with_warm_up()
+@checks_types
 def report(
     source: Source,
     out: str | Path,
@@ -128,6 +131,7 @@ def report(
     return WrittenReport(folder / "report.html", tuple(files), content.verdict)
 
 
+@checks_types
 def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
     """Write the layout file with which Foxglove shows flight logs.
 
@@ -145,6 +149,7 @@ def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
 
 
 @with_warm_up()
+@checks_types
 def compare(
     first: FlightLog | str | Path,
     second: FlightLog | str | Path,

@@ -9,7 +9,8 @@ from flight.autopilots.parameter_edits import px4_parameter_text, with_parameter
 from flight.autopilots.parameter_files import MAX_BYTES, parameters_text
 from flight.autopilots.parameter_origin import PX4
 from flight.autopilots.parameter_set import ParameterSet
-from flight.mission.items import Camera, SurveyPlan
+from flight.mission.items import Camera, Command, SurveyPlan
+from flight.mission.itinerary import GATES_ARE_NO_WAYPOINTS
 from flight.mission.surveys import Survey
 from flight.mission_files.formats import FileKind, mission_text
 from flight.simulation.setup import FlightSetup
@@ -254,8 +255,8 @@ def _parameter_file_text(setup: FlightSetup, remedy: SurveyRemedy) -> str:
         file, names = Path(params), parameters.table.by_any_name
         text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
         definition = parameters.table.by_name[remedy.name]
-        other_names = [name for name, (known, _) in names.items() if known == definition and name != remedy.name]
-        return with_parameter(text, params, remedy.name, remedy.value, other_names)
+        units = {name: factor for name, (known, factor) in names.items() if known == definition}
+        return with_parameter(text, params, {name: remedy.value / factor for name, factor in units.items()})
     if setup.autopilot.name == PX4:
         return px4_parameter_text(remedy.name, remedy.value, setup.autopilot.version)
     return parameters_text({remedy.name: remedy.value}, "suggested by planfly survey")
@@ -271,8 +272,10 @@ def _check_has_survey(setup: FlightSetup) -> None:
     """Raise MissionError for a mission without a survey."""
     if not judged_surveys(setup):
         source = setup.mission.source
+        has_gates = any(item.command == Command.CONDITION_GATE for item in setup.mission.items)
+        reason = f"; {GATES_ARE_NO_WAYPOINTS}" if has_gates else ""
         raise MissionError(
-            f"{source}: no survey found; expected at least three parallel lines, or two with photos along them",
+            f"{source}: no survey found; expected at least three parallel lines, or two with photos along them{reason}",
             file=source,
         )
 

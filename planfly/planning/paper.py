@@ -22,6 +22,7 @@ from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.output_paths import check_output_folder, prepare_folder
 from planner.plan import Objectives, Violations
 from planner.search.algorithms import find_algorithm
+from world.argument_types import checks_types
 from world.arrays import Floats
 from world.files import lock_path, write_atomically
 from world.interruption import children_ignore_sigint, delay_signals, end_children, end_with_parent
@@ -413,6 +414,7 @@ class PaperTables:
     plans: tuple[SeededPlan, ...]
 
 
+@checks_types
 def paper_tables(
     problems: Sequence[int] = PROBLEMS,
     *,

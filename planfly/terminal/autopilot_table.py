@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 
 from logs.verdict.conditions import flown_lines
-from logs.verdict.presentation import RuleFindings
-from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.presentation import RuleFindings, findings_by_rule
 from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 
@@ -27,11 +26,13 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     px4: not flyable: speed; NAV_ACC_RAD 10
     """
     rows = [("", *verdicts), ("verdict", *(_answer_text(verdict) for verdict in verdicts.values()))]
-    rules_by_name = [{rule.words.name: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
-    for rule_words in RULE_WORDS.values():
-        findings_by_autopilot = [rules.get(rule_words.name) for rules in rules_by_name]
-        if any(findings_by_autopilot):
-            rows.append((rule_words.title, *map(_rule_summary, findings_by_autopilot)))
+    # Keyed by title: photo lines and their overlap are shown apart, and have the rule "survey" in common.
+    rules_by_title = [{rule.words.title: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
+    all_findings = [finding for verdict in verdicts.values() for finding in verdict.findings]
+    rows += [
+        (title, *(_rule_summary(rules.get(title)) for rules in rules_by_title))
+        for title in [rule.words.title for rule in findings_by_rule(all_findings)]
+    ]
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = []
     for title, *cells in rows:

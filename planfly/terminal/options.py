@@ -186,7 +186,7 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         choices=CHOICES["autopilot"],
         help=(
             "simulated autopilot: ArduPlane (ardupilot, the default: the release that saved the parameter file, or the "
-            "newest; ardupilot-4.6, ardupilot-4.7), PX4 for fixed wing (px4, the newest release; px4-1.16, px4-1.17), "
+            "newest; ardupilot-4.6, ardupilot-4.7), PX4 for fixed wing (px4, its release likewise; px4-1.16, px4-1.17) "
             "or planfly's own guidance (planfly)"
         ),
     )

@@ -90,7 +90,10 @@ def apply_suggestion(
 
 
 def item_moves(context: MissionContext, before: Mission, after: Mission) -> tuple[ItemMove, ...]:
-    """Return the moves of the items between two missions; () if items were inserted, as for a change of airspeed."""
+    """Return the moves of the items between two missions; () if items were inserted, as for a change of airspeed.
+
+    A change of altitude is 0 if the altitude is unknown.
+    """
     if len(before.items) != len(after.items):
         return ()
     offsets = context.item_positions(after) - context.item_positions(before)
@@ -101,7 +104,7 @@ def item_moves(context: MissionContext, before: Mission, after: Mission) -> tupl
             # The altitude of a stop above terrain changes with the ground, although its item states the same height.
             up = new.alt - old.alt
         if (old.lat_deg, old.lon_deg, old.alt) != (new.lat_deg, new.lon_deg, new.alt):
-            moves.append(ItemMove(old.seq, east, north, up))
+            moves.append(ItemMove(old.seq, east, north, up if math.isfinite(up) else 0.0))
     return tuple(moves)
 
 
@@ -160,26 +163,29 @@ class _EditedMission:
         return np.asarray(self.route.waypoints[waypoint] + offset)
 
     def move_items(self, waypoints: Sequence[int], offset: Floats) -> None:
-        """Move the items of waypoints, except landings, each item once.  offset: east, north and up, m.
+        """Move the items of waypoints, except landings, each item once.
 
+        offset: east, north and up, m.
         Raises MissionError for a move to a side of an item of a landing sequence.
         """
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
-            if (offset[0] or offset[1]) and index in self.approach_indices:
+            if offset[:2].any() and index in self.approach_indices:
                 raise MissionError(
                     f"{self.mission.source}: this suggestion moves item {self.mission.items[index].seq} of the landing"
                     " sequence to a side: change it by hand",
                     field="suggestion",
                 )
             position = self.context.item_positions(self.mission)[movable_indices(self.mission).index(index)]
-            if offset[0] or offset[1]:
-                self.mission = move_item(
-                    self.mission, index, *self.context.to_geographic(*(position[:2] + offset[:2]).tolist())
-                )
+            moved = self.mission
+            if offset[:2].any():
+                moved = move_item(moved, index, *self.context.to_geographic(*(position[:2] + offset[:2]).tolist()))
             if offset[2] and math.isfinite(position[2]):
-                self.mission = set_altitude(self.mission, index, float(position[2] + offset[2]), float(position[2]))
+                moved = set_altitude(moved, index, float(position[2] + offset[2]), float(position[2]))
+            if moved.items[index] == self.mission.items[index]:
+                continue
+            self.mission = moved
             self.offsets[index] = self.offsets.get(index, np.zeros(3)) + offset
             self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
@@ -234,7 +240,7 @@ def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) 
         legs = range(max(0, place.index - 1), min(route.legs, place.index + 1))
     for leg in reversed(legs):
         index = edited.item_index(leg + 1)
-        if index is not None:
+        if index is not None and airspeed != route.airspeed[leg]:
             edited.mission = set_airspeed(edited.mission, index, airspeed, float(route.airspeed[leg]))
             edited.is_changed = True
 

@@ -652,6 +652,17 @@ _README_ROWS = (
 )
 
 
+def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Performance) -> list[str]:
+    """Return a line of ``README.md`` on the file's TRIM_THROTTLE if the model's throttle in level flight differs."""
+    throttle, stated = 100.0 * performance.level.throttle, file_parameters.get("TRIM_THROTTLE")
+    if stated is None or round(throttle) == round(stated):
+        return []
+    return [
+        f"`ardupilot.parm` keeps the file's TRIM_THROTTLE {stated:g}, although the model needs {throttle:.0f} % in"
+        " level flight."
+    ]
+
+
 def _readme_text(
     name: str,
     sized: SizedAircraft,
@@ -685,6 +696,7 @@ def _readme_text(
         f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
         f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
         f" {performance.slowest.airspeed:.1f} m/s.",
+        *_trim_throttle_lines(file_parameters, performance),
         "",
         "## Uncertainties",
         "",

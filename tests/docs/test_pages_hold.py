@@ -17,6 +17,7 @@ from logs.recording.reader import read_log
 from logs.verdict import tolerances
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
+from planfly.cli import main
 from planfly.commands.registry import build_parser
 from planfly.terminal.exit_codes import EXIT_CODES
 from tests.docs.page_blocks import PAGES, ROOT
@@ -183,3 +184,22 @@ def test_links_lead_to_files(page: Path) -> None:
 def test_pages_are_named_in_the_index() -> None:
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     assert [page.name for page in PAGES if page.stem != "index" and f"\n{page.stem}\n" not in index] == []
+
+
+def test_the_page_on_mission_files_shows_what_its_flight_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """But for "...", and for where its lines break."""
+    page = (ROOT / "docs" / "your-mission-file.md").read_text(encoding="utf-8")
+    mission = re.search(r"<!-- test: file survey.waypoints -->\n```text\n(.*?)```", page, re.DOTALL)
+    run = re.search(r"<!-- test: exit 4 -->\n```sh\nplanfly (fly .*?)\n```\n\n```text\n(.*?)```", page, re.DOTALL)
+    assert mission is not None
+    assert run is not None
+    monkeypatch.chdir(tmp_path)
+    Path("survey.waypoints").write_text(mission[1], encoding="utf-8")
+    assert main(run[1].split()) == 4
+    printed = " ".join(capsys.readouterr().out.split())
+    assert re.search(".*".join(map(re.escape, " ".join(run[2].split()).split("..."))), printed)
+    depths = re.findall(r"(\d+) m (?:below the leg|too low)", page)
+    assert len(depths) == 2
+    assert len(set(depths)) == 1

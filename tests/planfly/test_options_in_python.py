@@ -2,8 +2,9 @@
 
 import argparse
 import inspect
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, get_args, get_origin
 
 import pytest
 
@@ -103,3 +104,43 @@ def test_a_default_is_the_same_in_python(command: str, action: argparse.Action) 
 def test_check_takes_what_judge_takes() -> None:
     check, judge = (list(inspect.signature(function).parameters) for function in (planfly.check, planfly.judge))
     assert check == judge
+
+
+def text_parameters() -> Iterator[tuple[str, str]]:
+    """Parameters of the public functions whose annotation names `str`: texts, paths, and data that a path may name."""
+    for name in planfly.__all__:
+        function = getattr(planfly, name)
+        if inspect.isfunction(function):
+            for parameter in inspect.signature(function).parameters.values():
+                members = get_args(parameter.annotation) or (parameter.annotation,)
+                # An array like numpy's may be of texts, too.
+                is_of_classes = all(isinstance(one, type) or get_origin(one) is Sequence for one in members)
+                if str in members and is_of_classes and get_origin(parameter.annotation) is not Sequence:
+                    yield name, parameter.name
+
+
+@pytest.mark.parametrize(("function", "keyword"), list(text_parameters()))
+def test_an_argument_of_a_wrong_type_is_refused_in_a_line(function: str, keyword: str) -> None:
+    """The check comes before all else, also before other arguments are missed."""
+    is_several = (
+        inspect.signature(getattr(planfly, function)).parameters[keyword].kind is inspect.Parameter.VAR_POSITIONAL
+    )
+    for value in (7, object(), {}, b"x"):
+        with pytest.raises(planfly.PlanflyError, match=f"^{keyword} {type(value).__name__}: expected ") as refused:
+            getattr(planfly, function)(
+                *(["a.waypoints", value] if is_several else []), **({} if is_several else {keyword: value})
+            )
+        assert "\n" not in str(refused.value)
+
+
+def test_a_sequence_of_files_is_taken_and_one_of_numbers_is_refused() -> None:
+    with pytest.raises(planfly.PlanflyError, match=r"^fence list: expected text, a path or a list of these$"):
+        planfly.check("a.waypoints", fence=[7])
+    with pytest.raises(planfly.PlanflyError, match=r"none\.waypoints: cannot be read"):
+        planfly.check("none.waypoints", fence=["none.fence", Path("none.kml")])
+
+
+@pytest.mark.parametrize("value", [[], [10], ()])
+def test_a_choice_is_one_word_or_number(value: object) -> None:
+    with pytest.raises(planfly.PlanflyError, match=r"^log_hz .*: expected 60, 30, 20, 10$"):
+        planfly.fly("a.waypoints", log_hz=value)

@@ -135,8 +135,6 @@ _LEG_FIELDS = (
 class Px4(Autopilot):
     """Simulated PX4 for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
-    notes: notes on a parameter file that another release wrote; not stored in a log.
-
     >>> made = Px4(Px4Parameters.defaults("1.16"))
     >>> made.turns.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).turns.acceptance_radius
     (33.6, 10.0)
@@ -145,7 +143,6 @@ class Px4(Autopilot):
     name: ClassVar = "px4"
     title: ClassVar = "PX4"
     parameters: Px4Parameters = field()
-    notes: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
@@ -159,7 +156,7 @@ class Px4(Autopilot):
             text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
             found = commented_release(text, "PX4")
         version, notes = choose_for_file(_VERSIONS, table.px4_version, found, str(table.params), "PX4")
-        return cls(Px4Parameters.load(aircraft, table.params, version), notes=notes)
+        return cls(Px4Parameters.load(aircraft, table.params, version, notes))
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
@@ -225,7 +222,7 @@ class Px4(Autopilot):
             feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
             battery_failsafes=self._battery_failsafes(),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
-            parameter_notes=self.notes,
+            parameter_notes=parameters.notes,
         )
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:

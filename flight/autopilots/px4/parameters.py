@@ -10,7 +10,7 @@ PX4.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, get_args
 
 import numpy as np
@@ -227,6 +227,7 @@ class Px4Parameters(ParameterSet):
     r"""Parameters of PX4.
 
     version: release of PX4.
+    notes: notes on a parameter file that another release wrote; not stored in a log.
 
     >>> default = Px4Parameters.defaults()
     >>> round(default["FW_R_LIM"], 3), default["NAV_ACC_RAD"], Px4Parameters.defaults("1.16").uses_switch_distance
@@ -247,6 +248,7 @@ class Px4Parameters(ParameterSet):
     table: ClassVar[ParameterTable] = TABLE
     not_simulated: ClassVar[tuple[str, ...]] = NOT_SIMULATED
     version: Px4Version = NEWEST_PX4
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         """Raise ParameterError if the version of PX4 is unknown."""
@@ -293,8 +295,8 @@ class Px4Parameters(ParameterSet):
     def record(self) -> Record:
         """Return the parameters for compiled code, as a record of `PX4_PARAMETERS`."""
         record: Record = np.zeros(1, PX4_PARAMETERS)[0]
-        for (field, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
-            setattr(record, field, parameter.value * definition.to_si)
+        for (field_name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=False):
+            setattr(record, field_name, parameter.value * definition.to_si)
         record.uses_switch_distance = self.uses_switch_distance
         gains = speed_filter_gains(
             record.airspeed_std_dev, record.airspeed_rate_std_dev, record.airspeed_rate_noise_std_dev

@@ -232,7 +232,8 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
         plan_text = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
         if plan.algorithm == GIVEN_WAYPOINTS:
             plan_text = "given waypoints, not searched"
-        status = "planner's margins not met" if plan.unmet_margins else _plan_status(plan.feasible, plan.safe)
+        has_only_unmet_margins = bool(plan.unmet_margins) and not plan.failures
+        status = "planner's margins not met" if has_only_unmet_margins else _plan_status(plan.feasible, plan.safe)
         facts.append(("Plan", f"{plan_text}; {status}"))
     if end_reason:
         facts.append(("Flight ended", end_reason))

@@ -13,6 +13,7 @@ from flight.mission.route import Route, RouteRules, make_route
 from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
 from flight.mission.surveys import LineAxis, Survey, camera_spacing, find_surveys, survey_plan
 from tests.mission_lines import ORIGIN, mission, wp
+from world.errors import MissionError
 
 Place = tuple[float, float]
 
@@ -578,3 +579,37 @@ def test_a_mission_that_jumps_keeps_its_layout() -> None:
     found = find_surveys(route, camera_spacing(read, route))
     assert with_layout(read, route, found[0], SurveyLayout(50.0), ORIGIN) is None
     assert layout_obstacle(read, route, found[0]) == "the mission contains jumps"
+
+
+def test_a_gate_that_is_not_flown_is_no_point_of_a_line() -> None:
+    """ArduPlane flies to no gate: the gates on and after its lines are kept like the commands of the camera."""
+    items: list[str] = []
+    for k, (east, north) in enumerate(grid(count=3)):
+        items += [wp(east, north), wp(east, 400, command=4501), f"2 206 {0 if k % 2 else 25} 0 1 0 0 0 0"]
+    read = mission(*items, home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert layout_obstacle(read, route, found) == ""
+    for turn_around, commands in ((0.0, [16, 4501, 206] * 2), (100.0, [16, 16, 4501, 206, 16, 4501, 206, 16])):
+        made = with_layout(read, route, found, SurveyLayout(turn_around, every=2), ORIGIN)
+        assert made is not None
+        assert [item.command for item in made.items] == commands * 3
+    turned = with_layout(read, route, found, SurveyLayout(0.0, course=math.pi / 2.0), ORIGIN)
+    assert turned is not None
+    assert [item.command for item in turned.items][:6] == [16, 4501, 206] * 2
+
+
+def test_a_survey_of_gates_alone_is_told_that_none_is_flown() -> None:
+    """QGroundControl writes no waypoints for lines without turn-arounds."""
+    gates: list[str] = []
+    for k, (east, north) in enumerate(grid(count=3)):
+        gates += [wp(east, north, command=4501), f"2 206 {0 if k % 2 else 25} 0 1 0 0 0 0"]
+    rules = RouteRules(reads_as_px4=True)
+    with pytest.raises(MissionError, match=r"gate \(CONDITION_GATE\): a survey with gates needs turn-arounds$"):
+        make_route(mission(*gates, home="36.5 -84.2 0"), ORIGIN, None, 15.0, False, rules=rules)
+    between = mission(wp(-300, 0), *gates, wp(-300, 900), home="36.5 -84.2 0")
+    notes = make_route(between, ORIGIN, None, 15.0, False, rules=rules).notes
+    said = "passed beside it: no autopilot flies to a gate (CONDITION_GATE): a survey with gates needs turn-arounds"
+    assert f"items 2, 4, 6, 8, 10, 12: {said}" in notes
+    _, route = gated_grid()
+    assert not any("gate" in note for note in route.notes)

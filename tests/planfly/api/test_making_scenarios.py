@@ -74,6 +74,10 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
         ({"threats": [{**ROWS[0], "colour": "red"}]}, "colour"),
         ({"wind": {"speed_mps": 400.0}}, "wind.speed_mps: 400"),
         ({"winds": {"speed_mps": 4.0}}, "winds"),
+        ({"terrain": "field.tif"}, 'terrain: "field.tif": expected a table'),
+        ({"terrain": None}, "terrain: "),
+        ({"wind": [4.0, 270.0]}, "wind: "),
+        ({"name": 7}, "name: 7"),
         ({"wind": {"speed": 4.0}}, "wind.speed: unknown key: did you mean 'speed_mps'"),
         (
             {"threats": [[900.0, 90.0, 60.0, 0.0], [9.0, 9.0, -60.0, 0.0]]},

@@ -154,9 +154,17 @@ def test_a_value_with_which_the_autopilot_does_not_arm_is_not_written(
     assert "RTL_AUTOLAND" not in read_parameter_file(target)
 
 
-def test_a_log_has_its_own_parameters(log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", str(log_file), str(tmp_path / "a.parm"), "--autopilot", "px4"]) == 2
-    assert "a log is exported with the autopilot that it was flown with" in capsys.readouterr().err
+@pytest.mark.parametrize("suffix", ["parm", "plan", "waypoints", "kml", "csv"])
+def test_a_log_has_its_own_autopilot_and_parameters(
+    suffix: str, log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target, params = tmp_path / f"a.{suffix}", tmp_path / "px4.params"
+    params.write_text("NAV_ACC_RAD 20\n", encoding="ascii")
+    for option, value in (("autopilot", "px4"), ("params", str(params))):
+        assert main(["export", str(log_file), str(target), f"--{option}", value]) == 2
+        [line] = capsys.readouterr().err.splitlines()
+        assert line.endswith(f"a log is exported with the {option} that it was flown with")
+    assert not target.exists()
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])

@@ -130,6 +130,21 @@ def test_a_user_who_can_write_no_cache_gets_results_and_the_way_out(given: dict[
     assert not Path(made).exists()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="temporary files are where Linux has them")
+def test_a_command_leaves_no_temporary_folder_behind() -> None:
+    """A command ends without the handlers of `atexit`."""
+    code = f"{OWNS_NOTHING}sys.argv = ['planfly', 'check', 'none.waypoints']\nfrom planfly.cli import main\nmain()\n"
+    path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    environment = {"PATH": os.environ["PATH"], "PYTHONPATH": path, "HOME": "/nonexistent"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd="/", env=environment, capture_output=True, text=True, check=False
+    )
+    made, *_, said = done.stderr.splitlines()
+    assert (done.returncode, made.partition(" ")[0]) == (2, "made")
+    assert said == "planfly: none.waypoints: cannot be read: No such file or directory"
+    assert not Path(made.removeprefix("made ")).exists()
+
+
 def test_where_nothing_can_be_written_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
     """The work is done all the same."""
     code = (

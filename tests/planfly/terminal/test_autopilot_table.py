@@ -23,3 +23,11 @@ def test_each_rule_has_a_row_and_each_autopilot_a_column() -> None:
         "ardupilot: in part",
         "px4-1.17: not flyable; 105 would pass",
     ]
+
+
+def test_photo_lines_and_their_overlap_have_a_row_each() -> None:
+    """Both are findings of the rule "survey"."""
+    overlap = make_finding("survey", Place("flight"), ok=True, reason="r", check="side overlap")
+    verdict = Verdict((of("survey", 0, False), overlap), False, True, ("not flyable",), "flown")
+    rows = autopilot_lines({"px4": verdict})
+    assert rows[2:4] == ["  photo lines    1 of 1 failed", "  photo overlap  1 ok"]

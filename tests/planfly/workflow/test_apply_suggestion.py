@@ -1,6 +1,8 @@
 """The moves of items with which a suggestion is tried, applied in the studio, and stated in its text."""
 
+import math
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -90,3 +92,31 @@ def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did()
         assert (east, north) == pytest.approx(offset[:2].tolist(), abs=0.06)
         told.append(trial.suggestion[0].what)
     assert "length" in told
+
+
+@pytest.mark.parametrize(
+    ("what", "wanted"), [("length", 80.004), ("rise", 0.0), ("height", 0.0), ("north", 0.0), ("airspeed", None)]
+)
+def test_a_suggestion_that_would_change_nothing_is_refused(what: str, wanted: float | None) -> None:
+    """Leg 1 is 80 m long and level; items are rounded to a centimetre."""
+    context, judged = judged_mission()
+    place = Place("leg", 1)
+    wanted = float(judged.setup.route.airspeed[1]) if wanted is None else wanted
+    finding = make_finding("slope", place, ok=False, reason="")
+    with pytest.raises(MissionError, match="no item at the place of this suggestion"):
+        apply_suggestion(context, judged, finding, (Change(what, place, None, wanted, "m"),))
+
+
+def test_a_move_to_a_side_of_an_item_without_altitude_has_no_change_of_altitude() -> None:
+    context, judged = judged_mission()
+    items = list(judged.mission.items)
+    # An item that no flight reaches, because the mission jumps past it.
+    jump = MissionItem(2, int(Command.DO_JUMP), int(Frame.MISSION), (4.0, -1.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    items[1:2] = [jump, replace(items[1], seq=3, alt=math.nan, params=(0.0,) * 4)]
+    before = replace(judged.mission, items=tuple(replace(item, seq=seq) for seq, item in enumerate(items, 1)))
+    moved_item = replace(before.items[2], lat_deg=before.items[2].lat_deg + 0.001)
+    after = replace(before, items=(*before.items[:2], moved_item, *before.items[3:]))
+    [move] = item_moves(context, before, after)
+    assert (move.item, move.up) == (3, 0.0)
+    # A thousandth of a degree of latitude.
+    assert (move.east, move.north) == pytest.approx((0.0, 111.0), abs=0.5)

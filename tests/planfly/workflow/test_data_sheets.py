@@ -1,6 +1,7 @@
 """A folder from a data sheet: it does what the sheet says, flies by both laws, and is made whole or not at all."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -157,6 +158,22 @@ def test_parameters_are_data(tmp_path: Path) -> None:
     assert known is not None
     assert math.degrees(known.climb_sd) == pytest.approx(1.5, abs=0.1)
     assert "TECS_CLMB_MAX 4\n" in (made.folder / "ardupilot.parm").read_text()
+
+
+@pytest.mark.parametrize("stated", [30.0, 0.0])
+def test_another_trim_throttle_than_the_models_is_explained(tmp_path: Path, stated: float) -> None:
+    file = tmp_path / "mine.parm"
+    file.write_text(
+        "AIRSPEED_CRUISE 16\nAIRSPEED_MIN 12\nTECS_CLMB_MAX 4\n" + (f"TRIM_THROTTLE {stated:g}\n" if stated else "")
+    )
+    made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
+    readme, parameters = (made.folder / "README.md").read_text(), (made.folder / "ardupilot.parm").read_text()
+    model, kept = re.search(r"with (\d+) % throttle", readme), re.search(r"TRIM_THROTTLE (\d+)\n", parameters)
+    assert model is not None
+    assert kept is not None
+    is_explained = f"keeps the file's TRIM_THROTTLE {kept[1]}, although the model needs {model[1]} %" in readme
+    assert is_explained is (model[1] != kept[1])
+    assert is_explained or not stated
 
 
 def test_an_angle_that_is_not_flown_is_no_small_change() -> None:

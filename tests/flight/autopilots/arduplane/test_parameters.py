@@ -70,8 +70,17 @@ def test_one_parameter_under_both_names_must_agree() -> None:
     assert ArduPilotParameters.of_text("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 35\n", "a").roll_limit == pytest.approx(
         math.radians(35.0)
     )
-    with pytest.raises(ParameterError, match=r"a:2: ROLL_LIMIT_DEG: 36: the same parameter has a different value"):
-        ArduPilotParameters.of_text("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 36\n", "a")
+    # 3530 times 0.01 is not exactly 35.3 in floating point.
+    assert ArduPilotParameters.of_text("LIM_ROLL_CD 3530\nROLL_LIMIT_DEG 35.3\n", "a").roll_limit < math.radians(35.31)
+    for text, said in (
+        ("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 36", "ROLL_LIMIT_DEG: 36: expected 35, because LIM_ROLL_CD 3500 on line 1"),
+        (
+            "ROLL_LIMIT_DEG 36\nLIM_ROLL_CD 3500",
+            "LIM_ROLL_CD: 3500: expected 3600, because ROLL_LIMIT_DEG 36 on line 1",
+        ),
+    ):
+        with pytest.raises(ParameterError, match=f"^a:2: {said} is the same parameter under its other name$"):
+            ArduPilotParameters.of_text(text, "a")
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,10 @@ def test_the_head_of_a_parameter_file_selects_the_release(
     scenario = with_flight(load_scenario("tight"), autopilot="px4", params=str(file), px4_version=named)
     made = load_autopilot(scenario, aerosonde)
     assert made.version == flown
-    assert made.checks.parameter_notes == ((f"{file} {note}",) if note else ())
+    assert isinstance(made, Px4)
+    program = Px4Sitl.with_model(made, Path("px4"))
+    for copy in (made, made.with_parameters(NAV_ACC_RAD=30.0), made.in_release("1.17"), program, program.model):
+        assert copy.checks.parameter_notes == ((f"{file} {note}",) if note else ())
     # A plan states the release only if the file does not decide it.
     assert scenario.flight.with_stated_defaults().px4_version == named
 

@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import planfly
 from logs.views.report.tables import (
     LEG_COLUMNS,
     PASSAGE_COLUMNS,
     energy_facts,
+    flight_facts,
     flight_sentence,
     leg_rows,
     passage_rows,
     saturation_rows,
 )
 from logs.views.report.text import number
+from planner.plan import GIVEN_WAYPOINTS, Certificate
 from tests.logs.views.report.report_data import make_setup, make_track
 
 
@@ -61,3 +64,24 @@ def test_nothing_is_said_of_a_battery_that_the_log_does_not_hold() -> None:
     silent = replace(track, energy=np.full(len(track), np.nan))
     assert "Wh" not in flight_sentence(setup, silent)
     assert energy_facts(setup, silent) == []
+
+
+@pytest.mark.parametrize(
+    ("problems", "status"),
+    [
+        (("leg 1: 420 m long",), "planner's margins not met"),
+        (("landing: none of 3 paths is clear",), "not feasible"),
+        (("leg 1: 420 m long", "landing: none of 3 paths is clear"), "not feasible"),
+    ],
+)
+def test_a_plan_that_no_flight_mends_is_not_feasible(problems: tuple[str, ...], status: str) -> None:
+    """Given waypoints that also miss margins of the planner."""
+    certificate = Certificate(0.1, 20.0, 0.2, 9.0, 10.0, 50.0, problems)
+    plan = replace(
+        planfly.plan("tight", seed=1, budget=200),
+        certificate=certificate,
+        algorithm=GIVEN_WAYPOINTS,
+        violations=np.zeros(4),
+    )
+    facts = dict(flight_facts(replace(make_setup(), plan=plan), ""))
+    assert facts["Plan"] == f"given waypoints, not searched; {status}"
