@@ -57,7 +57,7 @@ LONGER = {
     "planner/evaluation/travel_cost.py:model_leg": 62,
     "planner/search/plan_path.py:plan_path": 67,
     "planner/search/replan.py:replan": 73,
-    "planner/seeding/airspace_grids.py:_relax_stage": 62,
+    "planner/seeding/airspace_grids.py:_relax_airspace_stage": 62,
     "planner/seeding/pattern_search.py:_continue_search": 67,
     "tests/instrumented_flights.py:px4_topics": 70,
     "world/scenario.py:scenario_from_spec": 64,

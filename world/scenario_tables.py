@@ -36,8 +36,8 @@ def in_range(
     """
 
     def check(value: float) -> float:
-        # The comparisons are written so that NaN fails.
         """Return the value; raise ValueError outside the range."""
+        # The comparisons are written so that NaN fails.
         if (min_value < value if exclude_min else min_value <= value) and (
             value < max_value if exclude_max else value <= max_value
         ):

@@ -73,8 +73,7 @@ def replan(
     remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)
 
     def search(changed_scenario: Scenario, changed_limits: Limits) -> Plan:
-        # A search with another number of waypoints cannot start from the old plan.
-        """Plan the path ahead, from the remaining path if its number of waypoints fits."""
+        """Plan the path ahead; the search starts from the remaining path if its number of waypoints fits."""
         previous_path = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
         return plan_path(
             changed_scenario,

@@ -200,13 +200,11 @@ def _relax_airspace_stage(
 ) -> None:
     """Compute the costs of the routes to a stage's cells from those of the previous stage; store parents.
 
-    previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this one.
-    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and of this one.
-    previous_parents, parents: parents of the cells of both stages.
+    columns: `COLUMN` records (across,). cost, next_cost: (across, layers), of the previous stage and of this one.
 
     Changes of course are counted along the cheapest route to a cell only, so the result is not exactly the optimum.
     """
-    step, width, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
+    step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
     # No tracking error at a fixed end.
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
     turn_cost, slope_fraction = (TURN_COST * step, GENTLE_SLOPE_FRACTION) if grid.gentle else (0.0, 1.0)
@@ -231,18 +229,16 @@ def _relax_airspace_stage(
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
-                height = first_height + z * grid.layer_spacing
+                height = first_height + z * spacing
                 course_change = 0 if stage == 1 else side - (y - previous_parents[y, z] // grid.layers)
                 base_cost = cost[y, z] + turn_cost * course_change * course_change
-                lowest_layer = max(0, math.ceil((height - dive - target_first_height) / grid.layer_spacing))
-                highest_layer = min(
-                    grid.layers - 1, math.floor((height + climb - target_first_height) / grid.layer_spacing)
-                )
+                lowest_layer = max(0, math.ceil((height - dive - target_first_height) / spacing))
+                highest_layer = min(grid.layers - 1, math.floor((height + climb - target_first_height) / spacing))
                 for next_z in range(lowest_layer, highest_layer + 1):
                     # A step is at least as long as a level step; most cost too much even then, and need no square root.
                     if base_cost + horizontal_length * cell_costs[target, next_z] >= next_cost[target, next_z]:
                         continue
-                    altitude_change = target_first_height + next_z * grid.layer_spacing - height
+                    altitude_change = target_first_height + next_z * spacing - height
                     end_height = height + altitude_change
                     if max(height, end_height) > closed_heights.low and min(height, end_height) < closed_heights.high:
                         continue

@@ -285,8 +285,7 @@ def _continue_search(
 ) -> _State:
     """Continue a search until `pause_count` evaluations, or to its end at `max_evaluations`.
 
-    moves: (k, d).
-    initial_steps: (k,) initial steps of the moves.
+    moves, initial_steps: moves (k, d), and their initial steps (k,).
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state

@@ -185,11 +185,9 @@ def _extend_paths(
     """Extend partial paths to candidate k of waypoint i; return the number of legs evaluated.
 
     step: 1 for paths from the start, -1 for paths from the destination.
-    cost: (w, k) costs of the partial paths.
-    link: (w, k) neighbouring candidate of each partial path.
+    cost, link: (w, k) cost and neighbouring candidate of each partial path.
     max_cost: upper limit on the cost of a partial path.
     open_ends: candidates of the previous waypoint with partial paths.
-    lower_bounds, corners: scratch.
     """
     previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:

@@ -171,7 +171,7 @@ def test_layers_follow_the_ground_where_there_is_a_greatest_height(
     assert grid.follows
     assert grid.layers >= MIN_LAYERS
     # The layers reach from what is cleared to what is not exceeded, and further where an end leaves more.
-    assert (grid.layers - 1) * grid.pitch >= 200.0 - data.airspace.buffer - 60.0 - data.buffer
+    assert (grid.layers - 1) * grid.layer_spacing >= 200.0 - data.airspace.buffer - 60.0 - data.buffer
     assert 0.0 in grid.across
 
 
@@ -183,7 +183,7 @@ def test_layers_lie_level_without_one_and_the_grid_is_not_too_large(
     frame = rotated_frame(data.start, data.destination)
     grid = airspace_grid(data, frame, SPAN, 60)
     assert not grid.follows
-    assert grid.floor + (grid.layers - 1) * grid.pitch <= data.ceiling
+    assert grid.floor + (grid.layers - 1) * grid.layer_spacing <= data.ceiling
     large = airspace_grid(data, frame, SPAN, 5000)
     assert large.stages < 5000
     assert (large.stages + 1) * large.across.size * large.layers <= MAX_CELLS

@@ -42,9 +42,9 @@ def make_data(small: Callable[..., Scenario], make_limits: Callable[[Scenario], 
     return make
 
 
-def lattice(layers: int = 1, goal_layer: int = 0, pitch: float = 100.0) -> Lattice:
+def lattice(layers: int = 1, goal_layer: int = 0, layer_spacing: float = 100.0) -> Lattice:
     """Steps of 500 m: two places behind the start, two to either side, and two beyond the destination 3 km on."""
-    return Lattice(500.0, 2, 2, 11, 5, 8, 150.0, pitch, layers, 0, goal_layer)
+    return Lattice(500.0, 2, 2, 11, 5, 8, 150.0, layer_spacing, layers, 0, goal_layer)
 
 
 def route_of(data: ProblemArrays, made: Lattice, courses: int = 2) -> Records:
@@ -73,7 +73,7 @@ def test_the_way_out_of_a_trap_leads_back(make_data: MakeData) -> None:
 def test_a_climb_without_enough_way_goes_round(make_data: MakeData) -> None:
     # A step of 500 m climbs 176 m at 19.5 degrees: one layer of 170 m, and 12 of them take 12 steps, not 6.
     data = make_data([], ceiling=5000.0)
-    cells = route_of(data, lattice(layers=13, goal_layer=12, pitch=170.0))
+    cells = route_of(data, lattice(layers=13, goal_layer=12, layer_spacing=170.0))
     assert cells["layer"].tolist()[-1] == 12
     assert (np.diff(cells["layer"]) <= 1).all()
     assert len(cells) >= 13
@@ -157,9 +157,9 @@ def test_a_lattice_covers_the_map_and_stands_on_both_ends(pocket: Problem, step:
     for covered, edge in ((west, data.west), (-east, -data.east), (south, data.south), (-north, -data.north)):
         away = covered - (edge - (data.start[0] if edge in (data.west, -data.east) else 0.0))
         assert 0.0 <= away + 1e-6 < lattice.step + 4000.0
-    heights = lattice.low + lattice.pitch * np.arange(lattice.layers)
+    heights = lattice.low + lattice.layer_spacing * np.arange(lattice.layers)
     assert heights[lattice.start_layer] == pytest.approx(data.start[2])
-    assert abs(heights[lattice.goal_layer] - data.destination[2]) <= 0.5 * lattice.pitch
+    assert abs(heights[lattice.goal_layer] - data.destination[2]) <= 0.5 * lattice.layer_spacing
     assert heights[-1] <= data.ceiling
 
 
