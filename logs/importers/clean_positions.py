@@ -172,7 +172,9 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
 
 
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
-    """Return the gaps between rows: pauses longer than `MAX_STEP_S` and than `MAX_STEP_RATIO` median steps.
+    """Return the gaps between rows.
+
+    A gap is a pause longer than `MAX_STEP_S` and than `MAX_STEP_RATIO` median steps.
 
     time: increasing times of the rows, s, (n,).
     """
@@ -237,7 +239,12 @@ def _find_glitches(time: Floats, values: Floats) -> Flags:
 
 
 def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_speed: float) -> bool:
-    """Return True if a vehicle can get from one row to another at `max_speed` (m/s), horizontally and vertically."""
+    """Return True if a vehicle can get from one row to another at `max_speed` (m/s).
+
+    The speed limits both the horizontal and the vertical motion.
+
+    first, second: numbers of the rows.
+    """
     pair = [first, second]
     distance = float(metres_between(values[pair, 0], values[pair, 1])[0])
     rise = abs(float(values[second, 2] - values[first, 2]))

@@ -288,7 +288,10 @@ class _Reader:
         return wind if wind is not None and np.any(wind.values) else None
 
     def _airspeed(self) -> LogSeries | None:
-        """Return the true airspeed, m/s, (n, 1), converted from ArduPilot's equivalent airspeed; None if unknown."""
+        """Return the true airspeed, m/s, (n, 1); None if unknown.
+
+        It is converted from the equivalent airspeed that ArduPilot logs.
+        """
         sensor = self._messages("ARSP")
         airspeed = self._message_table("ARSP", ("Airspeed",))
         if airspeed is not None and sensor.has("U"):

@@ -120,7 +120,9 @@ def find_flight_parts(
 
 
 def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
-    """Return the periods of a flight in a mode that follows the mission, or the whole flight without modes.
+    """Return the periods of a flight in a mode that follows the mission.
+
+    Without modes, the period is the whole flight.
 
     last: time of the last row of the log, s.
     """
@@ -425,10 +427,10 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """Return the mean wind while the flight followed its mission, or over the whole flight if it never did.
+    """Return the mean wind while the flight followed its mission, or None if the log contains no wind.
 
-    The first fifth of the rows is left out, because the estimate starts from zero and converges in the first turns.
-    Return None if the log contains no wind.
+    It is the mean over the whole flight if the flight never followed a mission.  The first fifth of the rows is left
+    out, because the estimate starts from zero and converges in the first turns.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

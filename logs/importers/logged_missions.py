@@ -109,7 +109,10 @@ def _is_same_mission(first: LoggedItemGroup, second: LoggedItemGroup) -> bool:
 
 
 def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
-    """Return True if two items have the same number, command, parameters and position, regardless of their frames."""
+    """Return True if two items have the same number, command, parameters and position.
+
+    Their frames may differ.
+    """
     return _comparison_key(first) == _comparison_key(second)
 
 

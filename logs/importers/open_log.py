@@ -77,7 +77,9 @@ def _suffix(path: Path) -> str:
 
 
 def open_log(path: Path) -> "RawLog":
-    """Read a log of another program.  Raises LogError for other files, and for logs without positions and times.
+    """Read a log of another program.
+
+    Raises LogError for other files, and for logs without positions and times.
 
     >>> open_log(Path("nothing.BIN"))  # doctest: +ELLIPSIS
     Traceback (most recent call last):

@@ -63,7 +63,10 @@ class MessageFormats:
         return self._count(name, frozenset())
 
     def _count(self, name: str, outer_names: frozenset[str]) -> int:
-        """Return the number of fields of a format that is nested in the formats ``outer_names``; 1 for a plain type."""
+        """Return the number of fields of a format; 1 for a plain type.
+
+        outer_names: names of the formats in which the format is nested.
+        """
         if name in _PLAIN or name not in self._formats:
             return 1
         if name in outer_names:

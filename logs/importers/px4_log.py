@@ -228,7 +228,10 @@ def _instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[st
 
 
 class Topics:
-    """Topics of one log: the first instance of each, but all instances of batteries, whose currents are added up."""
+    """Topics of one log.
+
+    Each has the values of its first instance, except batteries, whose currents are added up.
+    """
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
         self._log, self._source, self._damage = log, source, damage

@@ -250,7 +250,10 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
 
 
 def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
-    """Return the indices of the motors that push forward.  Raises LogError for a VTOL without such a motor."""
+    """Return the indices of the motors that push forward.
+
+    Raises LogError for a VTOL without such a motor.
+    """
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:
         # The axis of a rotor is up by default.
@@ -277,7 +280,10 @@ def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: in
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Return the outputs of a topic's actuators, (n, size), sorted by time; NaN for unused or stopped actuators."""
+    """Return the outputs of a topic's actuators, (n, size), sorted by time.
+
+    NaN stands for an unused or stopped actuator.
+    """
     table = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, size)))

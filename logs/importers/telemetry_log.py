@@ -120,7 +120,10 @@ class TelemetryReader:
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
     def _record_length(self, position: int) -> int:
-        """Return the length of the record at a position, including its time, bytes; 0 if no record begins there."""
+        """Return the length of the record at a position, including its time, bytes.
+
+        Return 0 if no record begins there.
+        """
         stamp = _STAMP.unpack_from(self.data, position)[0]
         if not _EARLIEST_US <= stamp <= _LATEST_US:
             return 0
@@ -213,7 +216,10 @@ class SystemMessages:
         rows.extend(float(getattr(message, field)) for field in fields)
 
     def table(self, name: str) -> Floats:
-        """Return the messages of a kind in `NUMBERS` as rows, (n, 1 + fields): message number, then the fields."""
+        """Return the messages of a kind in `NUMBERS` as rows, (n, 1 + fields).
+
+        A row is the message's index, then its fields.
+        """
         rows = self._rows.get(name)
         return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
 
@@ -321,7 +327,10 @@ class VehicleMessages:
     """Messages of one vehicle, by name, on its own clock."""
 
     def __init__(self, messages: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
-        """Take the vehicle's messages, and the messages on missions with their times of reception, s since 1970."""
+        """Take the messages of the vehicle, and the messages on missions.
+
+        items: messages on missions with their times of reception, s since 1970.
+        """
         self._source, self._found = source, messages
         clock = messages.boot_clock()
         self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
@@ -358,7 +367,7 @@ class VehicleMessages:
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return columns of a message in the units as sent, on the vehicle's clock; None without such messages."""
+        """Return columns of a message in the units as sent, on the vehicle's clock; None if never sent."""
         rows = self._found.table(name)
         if not len(rows):
             return None
@@ -411,7 +420,7 @@ class VehicleMessages:
         return LogSeries("GPS_RAW_INT", table.time[has_fix], scaled)
 
     def _wind(self) -> LogSeries | None:
-        """Return the wind's velocity to east and north, m/s, (n, 2); None if no wind was sent or all of it is 0."""
+        """Return the wind velocity to east and north, m/s, (n, 2); None if no wind was sent or all of it is 0."""
         wind = self.table("WIND", ("direction", "speed"))
         if wind is not None and np.any(wind.values[:, 1]):
             # The direction is the direction from which the wind blows.

@@ -378,9 +378,12 @@ def _write_message_header(buffer: Bytes, position: int, size: int, channel: int,
 
 @compiled
 def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
-    """Encode messages with their log times before their bodies; return all bytes, and the offset of each message.
+    """Encode messages with their log times before their bodies.
 
-    The last offset is the end of the bytes.
+    Return all bytes, and the offset of each message, (n + 1,); the last offset is the end of the bytes.
+
+    tag: protobuf tag of the timestamp.
+    bodies: (n, size) bytes after the timestamp.
     """
     count, body_size = bodies.shape
     # The timestamp takes at most 2 + 12 bytes: tag and length, then two tags and two varints of five bytes.

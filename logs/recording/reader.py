@@ -283,11 +283,10 @@ class _MessageCollector:
 
 @checks_types
 def read_log(path: Path | str) -> FlightLog:
-    """Read a flight log.
+    """Read a flight log; a damaged or unfinished log is read up to its damage (``complete`` is False).
 
-    A damaged or unfinished log is returned up to its damage, with ``complete`` False.  Raises LogError, in one line,
-    for a file that is missing, empty, not an MCAP file or not a planfly log, or that contains no complete second of
-    flight.
+    Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
+    contains no complete second of flight.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log

@@ -116,7 +116,9 @@ class NotebookFigure(Figure):
 
 
 def new_figure(height: float) -> Figure:
-    """Make an empty figure of the common width, `height` inches tall, with its own canvas (no pyplot state).
+    """Make an empty figure of the common width, with its own canvas (no pyplot state).
+
+    height: height of the figure, inches.
 
     >>> new_figure(4.0).get_size_inches().tolist()
     [10.0, 4.0]
@@ -333,7 +335,10 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
 
 
 def _title_lines(panel: Panel) -> list[str]:
-    """Wrap a panel's title and unit to at most two lines; a third is cut off at the left edge of the picture."""
+    """Wrap a panel's title and unit to at most two lines.
+
+    A third line would be cut off at the left edge of the picture.
+    """
     title = panel.title.replace(" +", "\N{NO-BREAK SPACE}+")
     text = f"{title} ({panel.unit})" if panel.unit else title
     wrappings = (textwrap.wrap(text, width) for width in range(_PANEL_TITLE_WIDTH, len(text) + _PANEL_TITLE_WIDTH))

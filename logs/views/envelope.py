@@ -41,7 +41,12 @@ def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
 
 @dataclass(frozen=True, slots=True)
 class FlownMoments:
-    """True airspeed (m/s), air-relative path angle and absolute bank (°) at moments of a flight, (n,) each."""
+    """Moments of a flight in the aircraft's envelope, (n,) each.
+
+    airspeed: true airspeed, m/s.
+    angle: air-relative path angle, degrees.
+    bank: absolute bank angle, degrees.
+    """
 
     airspeed: Floats
     angle: Floats

@@ -46,7 +46,12 @@ _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 @dataclass(frozen=True, slots=True)
 class PaperPath:
-    """One path: its waypoints, m, (w, 3), its length ratio, and True if it is safe at the paper's sample points."""
+    """One path of the experiment.
+
+    waypoints: (w, 3), m.
+    length_ratio: length relative to the straight line from start to destination.
+    safe: True if the path is safe at the paper's sample points.
+    """
 
     waypoints: Floats
     length_ratio: float
@@ -130,7 +135,7 @@ def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: floa
 
 
 def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
-    """Draw the start and the destination, with labels clear of the paths; return their handles for the legend."""
+    """Draw start and destination, with labels clear of the paths; return their handles for the legend."""
     placer = LabelPlacer(axes)
     for path in paths:
         placer.avoid(path[:, 0], path[:, 1])

@@ -54,9 +54,8 @@ def profile_chart(
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
-    >>> route = setup.route.waypoints
     >>> chart = profile_chart(
-    ...     setup.scenario, plan_waypoints=None, route_waypoints=route, track=None, verdict=None
+    ...     setup.scenario, plan_waypoints=None, route_waypoints=setup.route.waypoints, track=None, verdict=None
     ... )
     >>> chart.unit, [layer.name for layer in chart.panels[0].layers][-2:]
     ('km', ['planned', 'waypoint, numbered'])

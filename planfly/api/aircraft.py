@@ -73,7 +73,7 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
 
 
 class DataSheetOptions(TypedDict, total=False):
-    """Numbers of the data sheet of an aircraft, and a file of autopilot parameters; see `new_aircraft`."""
+    """Numbers of an aircraft's data sheet, and a file of autopilot parameters; see `new_aircraft`."""
 
     mass: float | None
     span: float | None
@@ -199,7 +199,10 @@ def describe_aircraft(
 
 
 def _load_aircraft(name: str | Path) -> Aircraft:
-    """Load an aircraft by its name or folder.  Raises PlanflyError for an unknown name or a missing folder."""
+    """Load an aircraft by its name or folder.
+
+    Raises PlanflyError for an unknown name or a missing folder.
+    """
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):
         return find_aircraft(text)
@@ -216,7 +219,7 @@ def _draw_pictures(
     modes: Mapping[float, tuple[Mode, ...]],
     steps: tuple[StepResponse, ...],
 ) -> dict[str, bytes]:
-    """Return the pictures of an aircraft as PNG, keyed by file name."""
+    """Draw the pictures of an aircraft, and return them as PNG by file name."""
     # Imported here: only pictures need matplotlib.
     from logs.views.aircraft import draw_envelope, draw_step_responses, draw_trims
     from logs.views.drawing import png_bytes

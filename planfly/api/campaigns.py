@@ -7,7 +7,7 @@ from typing import Unpack
 
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
-from planfly.campaigns.campaign_result import CampaignResult, campaign_line, make_goal, winds_line
+from planfly.campaigns.campaign_result import CampaignResult, campaign_command_line, make_goal, winds_command_line
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
@@ -42,7 +42,9 @@ from world.extras import require_extra, requires_extra
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again, with the same result.
+    """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again.
+
+    Its result is the same as in the campaign.
 
     row: outcome, reason for the end, and failed rules.
     log: the file of the flight log.
@@ -77,12 +79,15 @@ def _open_base(
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
-    """Return the target for the command line that repeats a campaign; a `Plan` is named by its file in `folder`."""
+    """Return the target as it stands in the command line that repeats a campaign.
+
+    A `Plan` is named by its file in `folder`.
+    """
     return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
 
 
 def _command_line_options(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
-    """Return the options of the command line that repeats a campaign, keyed by name."""
+    """Return the options of the command line that repeats a campaign, by name."""
     return {"seed": base.seed, "spread": spread} | {
         **select_mission_options(options),
         "fence": fence_file_names(options),
@@ -93,6 +98,8 @@ def _make_workers(count: int | None, scheduler: str | None, seed: int | None) ->
     """Check the number of workers, the scheduler and the seed, and return the workers.
 
     Raises PlanflyError for invalid arguments, before anything is planned.
+
+    count: number of processes on this machine; None for one per core.
     """
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
@@ -102,7 +109,7 @@ def _make_workers(count: int | None, scheduler: str | None, seed: int | None) ->
 
 
 def _read_spread(file: str | Path | None) -> Dispersions:
-    """Read a dispersions file, or return planfly's own dispersions for None."""
+    """Read a dispersions file; for None, return planfly's default dispersions."""
     return default_dispersions() if file is None else read_dispersions(Path(file))
 
 
@@ -113,9 +120,10 @@ def _read_spread(file: str | Path | None) -> Dispersions:
 def continued_goal(
     folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
 ) -> Goal:
-    """Return the goal of a resumed campaign: the requested goal, or the earlier goal if none is requested.
+    """Return the goal of a resumed campaign.
 
-    Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
+    It is the requested goal, or the earlier goal if none is requested.  Raises PlanflyError for numbers outside their
+    ranges, and for a folder without a campaign.
     """
     requested_goal = make_goal(flights, prove, at_least, confidence)
     return resumed_goal(
@@ -165,7 +173,7 @@ def campaign(
         if resume:
             goal = continued_goal(directory.folder, *requested)
         base = _open_base(target, options, _read_spread(spread), directory)
-        command_line = campaign_line(
+        command_line = campaign_command_line(
             _command_line_target(target, directory.folder), goal, _command_line_options(base, options, spread)
         )
         return _fly_and_summarise(base, goal, workers_used, directory, command_line, keep=out is not None)
@@ -218,7 +226,10 @@ def campaign_flight(
 
 
 def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
-    """Return a flight of a campaign's table.  Raises PlanflyError if the table has no flight with this index."""
+    """Read a flight from a campaign's table.
+
+    Raises PlanflyError if the table has no flight with this index.
+    """
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
@@ -275,7 +286,7 @@ def winds(
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
-            command_line = winds_line(
+            command_line = winds_command_line(
                 _command_line_target(target, folder), goal, _command_line_options(base, options, spread)
             )
             write_winds(folder, base, winds_found, command_line)

@@ -73,7 +73,10 @@ def terrain(
 
 
 def _parse_box(edges: Sequence[float]) -> Box:
-    """Convert south, west, north and east edge, degrees, to a box.  Raises ArgumentError for invalid edges."""
+    """Convert the edges of an area to a box.  Raises ArgumentError for invalid edges.
+
+    edges: south, west, north and east edge, degrees.
+    """
     try:
         south, west, north, east = (float(value) for value in edges)
     except (TypeError, ValueError):
@@ -91,7 +94,7 @@ def _parse_box(edges: Sequence[float]) -> Box:
 
 
 def _mission_box(file: Path) -> Box:
-    """Return the smallest box around all items, home, fences and rally points of a mission.
+    """Return the smallest box that contains all items, home, fences and rally points of a mission.
 
     Raises PlanflyError for a mission without positions, or with positions too far apart or too close to a pole.
     """

@@ -104,7 +104,10 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
 
 
 def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
-    """Parse latitude and longitude of a position.  Raises ArgumentError for invalid coordinates."""
+    """Convert latitude and longitude to a position.  Raises ArgumentError for invalid coordinates.
+
+    keyword: name of the argument, for the message.
+    """
     try:
         lat, lon = (float(value) for value in coordinates)
     except (TypeError, ValueError):
@@ -115,7 +118,10 @@ def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
 
 
 def _absolute_path(path: str | Path, *, is_name: bool) -> str:
-    """Return the absolute path of a file, or a built-in terrain's name unchanged."""
+    """Return the absolute path of a file or a folder as text; a name is returned unchanged.
+
+    is_name: True if `path` is the name of a built-in terrain or aircraft.
+    """
     return str(path) if is_name else absolute_path(Path(path))
 
 

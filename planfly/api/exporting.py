@@ -138,7 +138,7 @@ def export(
     if not files:
         raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
-    named_autopilot = _named_autopilot(autopilot, params)
+    chosen_autopilot = _chosen_autopilot(autopilot, params)
     with contextlib.ExitStack() as temporary_folders:
         path = _source_path(source, temporary_folders)
         for target in targets:
@@ -148,7 +148,7 @@ def export(
         options = MissionOptions(fence=fence, at=at, scenario=scenario, autopilot=autopilot, params=params)
         source_content = _read_source(path, targets, options)
         if any(target.suffix.lower() == ".plan" for target in targets):
-            source_content = _with_plan_notes(source_content, named_autopilot, fence)
+            source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
         contents = [_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
@@ -163,10 +163,11 @@ def export(
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
 
 
-def _named_autopilot(autopilot: str | None, params: str | Path | None) -> str:
-    """Return the name of the autopilot that the user names, or whose parameter file is given; "" for neither.
+def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
+    """Return the name of the autopilot that the user names, or that a parameter file is for.
 
-    Raises ArgumentError for an unknown autopilot, and ParameterError for a file that is clearly of no autopilot.
+    Return "" for neither.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that is clearly
+    of no autopilot.
     """
     check_arguments(autopilot=autopilot)
     if autopilot is not None:
@@ -182,9 +183,10 @@ def _named_autopilot(autopilot: str | None, params: str | Path | None) -> str:
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Return a source with the autopilot for which a .plan is written, and with notes on what the .plan lacks.
+    """Return a source with the autopilot that a .plan is for, and with notes on what the .plan lacks.
 
     autopilot: name of the autopilot; "" if the user named none.
+    fence: files of fences that the user named.
     """
     notes = list(source.notes)
     own_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.name
@@ -206,7 +208,11 @@ def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) 
 
 
 def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack) -> Path:
-    """Return the path of a source; a plan is written to a file that exists while `temporary_folders` is open."""
+    """Return the path of a source's file.
+
+    A plan is written to a file that exists while `temporary_folders` is open.  Raises PlanflyError for a flight without
+    a log.
+    """
     if isinstance(source, Plan):
         file = temporary_folders.enter_context(temporary_folder("planfly-export-")) / "plan.json"
         write_atomically(file, plan_json(source))
@@ -265,7 +271,11 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
 
 
 def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
-    """Return a source with the returns and glides from a few points of the flight or path, if they can be judged."""
+    """Return a source with the returns and glides from a few points, for a map.
+
+    The points are on the flight, or on the planned path if `track` is None.  The source is unchanged if they cannot be
+    judged.
+    """
     with stage("flying returns for the map"):
         drawn_returns = return_summary(setup, track).data_for_pictures()
     if drawn_returns is None:
@@ -290,7 +300,13 @@ def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
 
 
 def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, needs_returns: bool) -> _SourceContent:
-    """Read a plan or a mission file; load its scenario if a target, a plan or a fence needs it."""
+    """Read a plan or a mission file.
+
+    Its scenario is loaded only if a target, a plan, a fence or a time needs it.
+
+    needs_world: True if a target needs the scenario.
+    needs_returns: True to add returns from a few points of the planned path.
+    """
     if not path.is_file():
         raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
@@ -323,7 +339,7 @@ def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
 
 
 def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
-    """Return the content of a target file, and a description of this content."""
+    """Return the content of a target file, and a description of the content, such as "23 items"."""
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in LOG_SUFFIXES and source.log is not None:
         return _flight_content(source.log, suffix)
@@ -351,11 +367,12 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
 def judging_parameters_text(
     mission: Mission, autopilot: Autopilot, *, has_own_parameters: bool = True
 ) -> tuple[str, str]:
-    """Return the text of a parameter file for take-off, landing and returns, and a description of its content.
+    """Return a parameter file for take-off, landing and returns, and a description of its content.
 
     A value with which the autopilot does not arm is left out.
 
     has_own_parameters: False if no parameter was given, and the values are planfly's defaults for the mission.
+
     Raises MissionError for an autopilot without such parameters.
     """
     parameters = () if autopilot.parameters is None else autopilot.parameters.values
@@ -377,7 +394,7 @@ def judging_parameters_text(
 
 
 def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
-    """Return the rows of a flight in the format of another program, and a description of the content."""
+    """Return a flight in the log format with this suffix, and a description of the content."""
     description = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
         require_extra("live", ".tlog needs")

@@ -224,7 +224,7 @@ def fly(
 
 
 def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
-    """Return the result of a flight; a flight that did not start has no log and no flight model."""
+    """Convert a judged flight to its result; a flight that did not start has no log and no flight model."""
     log = log if len(flight.track) else None
     program_log = None if log is None or program is None else autopilot_log(log, program)
     return FlownMission(
@@ -356,7 +356,7 @@ def check(
 
 
 def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
-    """Return the name of the judged source for messages."""
+    """Return the name of a flight, plan or mission, for messages."""
     if isinstance(what, FlightLog):
         return what.source
     if isinstance(what, FlownMission):
@@ -365,7 +365,7 @@ def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
 
 
 def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: str) -> None:
-    """Raise ScenarioError if one of some keywords was given, because these keywords do not apply to the source.
+    """Raise ScenarioError if one of the keywords was given, because it does not apply to the source.
 
     source: name of the source, for the message.
     keywords: value of each keyword; None if it was not given.
@@ -392,7 +392,11 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
-    """Judge a recorded flight.  terrain: replaces the terrain of the flight unless None.  fences: additional fences."""
+    """Judge a flight that was flown before.
+
+    terrain: elevation file that replaces the terrain of the flight; None keeps the terrain.
+    fences: additional fences.
+    """
     setup = flight.setup
     if terrain is not None:
         setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
@@ -408,7 +412,7 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
 
 
 def named_program(sitl: str | Path | None) -> Path | None:
-    """Return the path of the autopilot program, or None if no program is named.
+    """Return the checked path of the autopilot program, or None if no program is named.
 
     Raises FlightError for a file that cannot be run, and MissingExtraError if a package for programs is missing.
     """

@@ -84,7 +84,10 @@ def plan_front(
 
 
 def _write_front(front: Front, world: Scenario, folder: Path) -> None:
-    """Write the plans, tables and pictures of a front into a folder; a front without plans has only empty tables."""
+    """Write the plans, tables and pictures of a front into a folder.
+
+    For a front without plans, only the tables are written, without rows.
+    """
     for number, front_plan in enumerate(front.plans, 1):
         write_atomically(folder / f"plan-{number}.json", plan_json(front_plan.plan))
     rows = table_rows(front)

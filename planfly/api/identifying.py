@@ -128,7 +128,7 @@ def identify_aircraft(
     prior = _load_base(base)
     area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
     stated_numbers = {"mass": mass, "span": span, "area": area}
-    _check_stated(stated_numbers, prior)
+    _check_stated_numbers(stated_numbers, prior)
     volts, energy = _find_battery(prior, battery)
     base_numbers = scale_model(base_model(prior), **stated_numbers, volts=volts)
     check_base(prior)
@@ -160,7 +160,7 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
-    """Return the result of an identification: aircraft, estimate, performance, predictions, and gaps in the logs."""
+    """Return the result of an identification, with the performance and the gaps in the logs."""
     climb, sink, power = _performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
@@ -177,7 +177,10 @@ def _make_result(
 
 
 def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
-    """Return voltage (V) and energy (J) of a battery such as "44.4V,888Wh", or of the base's battery for None."""
+    """Return voltage (V) and energy (J) of the battery.
+
+    battery: volts and capacity, such as "44.4V,888Wh"; None takes the battery of the base.
+    """
     if battery is None:
         return prior.battery_voltage, prior.battery_energy
     sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
@@ -200,8 +203,11 @@ def _load_base(base: str | Path) -> Aircraft:
     return aircraft
 
 
-def _check_stated(stated_numbers: dict[str, float], prior: Aircraft) -> None:
-    """Raise FlightError for numbers outside the range of small aircraft, and for a base of a very different size."""
+def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> None:
+    """Raise FlightError for stated numbers that are not those of a small aircraft similar to the base.
+
+    Each must be in `_RANGES`, and mass and span within a factor of `_MAX_SIZE_RATIO` of the base.
+    """
     for name, value in stated_numbers.items():
         min_value, max_value, unit = _RANGES[name]
         if isinstance(value, bool) or not min_value <= value <= max_value:
@@ -220,7 +226,7 @@ def _check_stated(stated_numbers: dict[str, float], prior: Aircraft) -> None:
 
 
 def _check_distinct(logs: Sequence[MotionLog]) -> None:
-    """Raise LogError if two logs, of which the last may be the check log, contain the same rows."""
+    """Raise LogError if two logs, including the check log, contain the same rows."""
     for number, log in enumerate(logs):
         for other in logs[:number]:
             overlap = min(log.span[1], other.span[1]) - max(log.span[0], other.span[0])
@@ -234,7 +240,7 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
 def records_and_outputs(
     log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS, until: float | None = None
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
-    """Return the flight records of a log, and the servo outputs of the aircraft.
+    """Return the flight records of a log, and the servo outputs with which they were read.
 
     The servo outputs are those of the base if all of them match the log, otherwise those of the log.  With PX4, and
     with elevons, whose mixer is part of the model, they are always those of the base.
@@ -251,7 +257,7 @@ def records_and_outputs(
     if LEFT in outputs:
         return flight_records(log, prior, outputs, min_seconds, end), dict(base_outputs)
     is_same = base_outputs.keys() == outputs.keys() and all(
-        _is_same_output(base_outputs[name], output) for name, output in outputs.items()
+        _agree(base_outputs[name], output) for name, output in outputs.items()
     )
     used_outputs = dict(base_outputs) if is_same else outputs
     return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
@@ -264,7 +270,7 @@ def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
     return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
-def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
+def _agree(first: ServoOutput, second: ServoOutput) -> bool:
     """Return True if two servo outputs have the same number, pulse range and direction."""
     (first_low, *_, first_high), (second_low, *_, second_high) = first.value, second.value
     has_same_range = (first.pulse[0], first.pulse[-1]) == (second.pulse[0], second.pulse[-1])
@@ -310,7 +316,10 @@ Interval = tuple[float, float, float]
 
 
 def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
-    """Return climb and sink, degrees, and power, W, each as lower end, estimate and upper end (95 %)."""
+    """Return the intervals of climb angle (deg), sink angle (deg) and power (W).
+
+    Each is lower end, estimate and upper end (95 %).
+    """
     best, samples = identified.performance()
 
     def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
@@ -329,12 +338,15 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
 
 
 def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
-    """Return the names of the logs without battery current; empty if no log has battery current."""
+    """Return the names of the logs without battery current, if other logs have it.
+
+    They are empty if no log has battery current.
+    """
     lacking = {record.source: None for record in records if not record.has_current}
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Return the logs in which sensors or outputs have fewer than `AMPLE_HZ` rows per second."""
+    """Return the logs whose sensors or servo outputs have fewer than `AMPLE_HZ` rows per second."""
     rates = [(log, slowest_rows(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

@@ -107,10 +107,11 @@ class ColumnGuesses:
 def guess_columns(
     files: str | Path | Sequence[str | Path], table: str | Path, *, overwrite: bool = False
 ) -> ColumnGuesses:
-    """Write a starting table of columns for data files, guessed from names and values, to be checked by a person.
+    """Write a table of columns for data files, guessed from names and values, for a person to check.
 
     files: CSV, MAT, Parquet or HDF5 files of one flight, the main one first.
     table: the table to write, ``NAME.columns.toml`` or ``columns.toml``.  overwrite: True replaces an existing one.
+
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
     """
     from logs.importers.columns.guesses import guess_column_table
@@ -209,7 +210,7 @@ def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
 
 
 def _record_simulation(folder: Path, reflight: Reflight, log: FlightLog, ending: str) -> Path:
-    """Write the simulated flight as a log of its own, for `compare` and `replay`, and return the file.
+    """Write the simulated flight as a flight log, for `compare` and `replay`, and return the file.
 
     ending: added to the stem of the file name.
     """

@@ -148,7 +148,10 @@ def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Link
 
 
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
-    """Judge the radio link of a scenario along a track; without a track or terrain the result is undecided."""
+    """Judge the radio link of a scenario along a track.
+
+    Without a track or terrain the finding is undecided, and the result has no link along the path.
+    """
     with stage("computing the radio link"):
         requirements = route_requirements(setup)
         aligned = None if track is None else align_track(requirements, track)

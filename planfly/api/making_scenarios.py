@@ -58,7 +58,7 @@ def make_scenario(
     spec = base_scenario.to_json()
     for name, values in tables.items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
-        spec[name] = _with_changes(spec[name], values) if is_merged else values
+        spec[name] = _change_table(spec[name], values) if is_merged else values
     terrain_table, base_table = spec["terrain"], base_scenario.to_json()["terrain"]
     # The check of the whole scenario refuses a terrain that is no mapping.
     is_other_file = isinstance(terrain_table, Mapping) and terrain_table.get("path") != base_table.get("path")
@@ -75,8 +75,11 @@ def make_scenario(
     return scenario
 
 
-def _with_changes(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table with other values; if it then is of another kind or file, only its kind and the values."""
+def _change_table(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table of a scenario with changed values.
+
+    If the kind or the file of the table changes, its other values are not kept.
+    """
     if any(key in changes and changes[key] != table.get(key) for key in _SOURCE_KEYS):
         table = {key: table[key] for key in ("kind",) if key in table}
     return table | dict(changes)
@@ -108,7 +111,7 @@ def _threat_tables(threats: Any) -> list[dict[str, Any]]:
 
 
 def _raise_invalid_threats(threats: Any) -> Any:
-    """Raise ArgumentError for threats of a type that cannot be converted."""
+    """Raise ArgumentError for threats that are not in one of the expected forms."""
     raise ArgumentError.of_argument("threats", type(threats).__name__, _THREATS_EXPECTED)
 
 

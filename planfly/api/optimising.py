@@ -47,7 +47,10 @@ class BestFound:
 
 
 class Optimiser:
-    """A search within a box, made by `planfly.optimise`: `ask` returns points, and `tell` takes the points' values."""
+    """Search within a box, made by `planfly.optimise`.
+
+    `ask` returns points, and `tell` takes the values of these points.
+    """
 
     def __init__(
         self,
@@ -82,7 +85,9 @@ class Optimiser:
         values: values to minimise, (n,), or (n, m) for m objectives, which are compared by Pareto dominance.
         violations: amount by which each constraint is violated, (n,) or (n, v), 0 or less if the constraint is met; a
         smaller violation takes precedence over values.
+
         NaN is treated as the worst value.
+
         Raises ValueError if the number of rows differs from the number of points that `ask` returned, or if the number
         of columns differs from the previous call.
         """
@@ -223,7 +228,7 @@ def optimise(
 
 
 def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
-    """Return the priority levels of the scores: first the constraints with the goal 0, then the objectives.
+    """Return the priority levels by which scores are ranked: constraints with the goal 0, then objectives.
 
     violations, objectives: numbers of constraints and of objectives.
     """

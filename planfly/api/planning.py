@@ -92,7 +92,7 @@ _END_TOLERANCE_M = 1.0
 
 
 def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOptions) -> Floats:
-    """Return waypoints as an array (w, 3), m.
+    """Return the user's waypoints as an array (w, 3), m.
 
     Raises ArgumentError for another shape, for a value that is not finite or outside the map, naming its row and
     column, for ends that are not those of the scenario, and for an option of a search.
@@ -165,7 +165,7 @@ def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
 
 
 def _with_new_threats(scenario: Scenario, old_plan: Plan, threats: Sequence[Threat]) -> Scenario:
-    """Add new threats, and the threats that only the old plan has, to a scenario.
+    """Return a scenario with new threats, and with the threats that only the old plan has.
 
     Raises ScenarioError for a new threat outside the terrain data.
     """
@@ -225,10 +225,10 @@ def _write_plan(plan: Plan, target: Path | None) -> Plan:
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return a function that states the reason to stop a search, or "" to continue.
+    """Make the function that tells a search when to stop.
 
-    The reason is "interrupted" as soon as `stop` returns True, and "budget" after a number of seconds, of which the
-    compilation of kernels takes none.
+    The function returns "interrupted" as soon as `stop` returns True, "budget" after a number of seconds, and otherwise
+    "".  The time in which kernels are compiled does not count.
     """
 
     def working_time() -> float:

@@ -226,10 +226,11 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
 
 
 def _used_until(aircraft: Aircraft, sha256: str, start: float) -> float | None:
-    """Return the end of the parts of a log from which an aircraft was identified, s; infinity for the whole log.
+    """Return up to which time of a log an aircraft was identified from it, s; infinity for the whole log.
 
-    Returns None for a log of which no part was used.  Logs are identified by the hash of their data.
+    Returns None for a log of which no part was used.  Logs are recognised by the hash of their data.
 
+    sha256: hash of the log's data.
     start: first time that is read, s of the log; parts that end earlier are ignored.
     """
     file = aircraft.folder / "posterior.toml"
@@ -310,7 +311,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
 
 
 def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
-    """Return the band of each quantity over the distance along the legs."""
+    """Return the band of each quantity of simulated flights, over the distance along the legs."""
     flown_profile, bands = flights[0].flown, []
     for field, (name, unit, factor) in _PROFILE_QUANTITIES.items():
         low, high = band_limits(np.stack([factor * getattr(flight.model, field) for flight in flights]))
@@ -319,7 +320,7 @@ def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
 
 
 def _band_lines(bands: Sequence[Band]) -> list[str]:
-    """Return a line for each band: its width, and the fraction of the flight inside."""
+    """Return a line for each band: the fraction of the flight inside, and the width of the band."""
     lines = []
     for band in bands:
         if math.isnan(band.inside):

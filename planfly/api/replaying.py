@@ -29,7 +29,7 @@ _STATION_TIMEOUT_S = 10.0
 
 
 def _read_log_if_path(log: FlightLog | str | Path) -> FlightLog:
-    """Return a flight log, read from a file if its path is given."""
+    """Return the flight log; read it from its file if a path is given."""
     return log if isinstance(log, FlightLog) else read_log(log)
 
 
@@ -159,7 +159,7 @@ def movie(
 
 
 def _never_stop() -> bool:
-    """Return False, so that a replay runs to its end."""
+    """Return False; default condition of a replay that runs to its end."""
     return False
 
 
@@ -217,7 +217,10 @@ def play_to_foxglove(
 
 
 def _check_origin(text: str) -> str:
-    """Return the origin of a web page unchanged.  Raises LogError if it is not written as browsers write it."""
+    """Return the origin of a web page unchanged.
+
+    Raises LogError if it is not written as browsers write it.
+    """
     if not _ORIGIN.fullmatch(text):
         allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)

@@ -49,7 +49,10 @@ class WrittenReport:
 
 
 class _ReportContent(NamedTuple):
-    """Content of pictures and pages.  versions: package versions of the flight; None for the installed versions."""
+    """Flight or plan that a report shows.
+
+    versions: package versions of the flight; None for the installed versions.
+    """
 
     setup: FlightSetup
     verdict: Verdict
@@ -182,7 +185,10 @@ def compare(
 
 
 def _report_content(source: Source) -> _ReportContent:
-    """Return the setup, verdict and flight that a report shows, for a plan, a flight or a log."""
+    """Return the flight or plan that a report shows, with its setup and verdict.
+
+    A plan is judged by its geometry, a log by its rows.
+    """
     if isinstance(source, Plan):
         setup = open_flight(source, {})
         return _ReportContent(setup, judge_mission_geometry(setup))

@@ -237,12 +237,12 @@ def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
 
 
 def _with_terrain(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
-    """Replace the terrain of a setup, or return the setup unchanged if no terrain is named."""
+    """Return a setup with another terrain; unchanged if no terrain is named."""
     return setup if terrain is None else setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
 
 
 class _ReturnsRequest(NamedTuple):
-    """Options of `returns` for the returns themselves and their files."""
+    """Checked options of `returns`, other than those of the flight."""
 
     every: float
     suggest: bool
@@ -255,7 +255,7 @@ class _ReturnsRequest(NamedTuple):
 def _check_request(
     every: float, suggest: bool, out: str | Path | None, sitl: str | Path | None, points: int, *, overwrite: bool
 ) -> _ReturnsRequest:
-    """Check the options for the returns, and convert them.
+    """Check the options of `returns`, and convert them.
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """
@@ -281,7 +281,7 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
 
 
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
-    """Simulate and judge returns from points of a flight, look for remedies, and write the requested files."""
+    """Simulate and judge returns from points of a flight, with glides and requested remedies and files."""
     world = make_return_world(setup)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
@@ -319,7 +319,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
 def _suggest_remedies(
     world: ReturnWorld, starts: ReturnStarts, result: ReturnsResult, every: float
 ) -> tuple[RemedyTrial, ...]:
-    """Fly the returns again with each remedy, and return the remedies that help."""
+    """Fly the returns again with each possible remedy, and return the remedies that help."""
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged_times = [judged_return.time for judged_return in result.returns.each]
     airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))
@@ -335,7 +335,7 @@ def _suggest_remedies(
 
 
 def _draw_files(setup: FlightSetup, track: Track, returns: DrawnReturns) -> dict[str, bytes]:
-    """Return the pictures of returns, and the map with their lines and shapes, keyed by file name."""
+    """Draw the pictures and the KML map of returns; return the bytes by file name."""
     # Imported here: only pictures need matplotlib.
     from logs.views.figures import draw_pictures, return_views
 

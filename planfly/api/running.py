@@ -165,7 +165,7 @@ def run(
     scenario_name = world.name if isinstance(scenario, Scenario) else str(scenario)
     defaults = {"refine": 0, **option_defaults(RunOptions)}
     changed_options = {name: value for name, value in {"refine": refine, **options}.items() if value != defaults[name]}
-    repeat_command = command_line(scenario_name, chosen_seed, changed_options)
+    repeat_command = run_command_line(scenario_name, chosen_seed, changed_options)
     reference: FlyReference = "always" if options["levels"] else "failed"
     task = _RunTask(
         world,
@@ -183,10 +183,10 @@ def run(
         return _fly_rounds(task, refine, locks, on_round)
 
 
-def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
+def run_command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
     """Return the command line of ``planfly run`` with the given options, keyed by keyword.
 
-    >>> command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot": "px4", "params": "my file.parm"})
+    >>> run_command_line("tight", 3, {"wind": (8.0, 270.0), "autopilot": "px4", "params": "my file.parm"})
     "planfly run tight --seed 3 --wind 8,270 --autopilot px4 --params 'my file.parm'"
     """
     parts = [f"planfly run {shlex.quote(scenario)} --seed {seed}"]
@@ -202,14 +202,20 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
 def _fly_rounds(
     task: _RunTask, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly in rounds, with tightened limits after a failure, until one is flyable or none is left.
+    """Plan and fly rounds until one is flyable or none is left.
+
+    After a failure, the limits of the next round are tightened.
 
     locks: exit stack that holds the lock of the folder from the first plan on.
     """
     scenario, airframe, folder = task.scenario, task.airframe, task.folder
     flown_rounds: list[Round] = []
 
-    def fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
+    def plan_and_fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
+        """Plan and fly one round; return its verdict, and True if it was flown.
+
+        planning_scenario: scenario with the limits of this round.
+        """
         planning_airframe = (
             airframe if planning_scenario is scenario else tightened_airframe(airframe, planning_scenario)
         )
@@ -221,12 +227,14 @@ def _fly_rounds(
             if task.program is not None:
                 report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)
-        flown_rounds.append(_fly_round(task, plan, len(flown_rounds)))
+        flown_rounds.append(_record_round(task, plan, len(flown_rounds)))
         if on_round is not None:
             on_round(flown_rounds[-1])
         return flown_rounds[-1].verdict, flown_rounds[-1].flown
 
-    _, round_entries = refine_rounds(scenario, refine, fly_round, lambda number: _move_round_results(folder, number))
+    _, round_entries = refine_rounds(
+        scenario, refine, plan_and_fly_round, lambda number: _move_round_results(folder, number)
+    )
     if refine:
         write_atomically(folder / "rounds.json", json.dumps(round_entries, indent=1) + "\n")
     *earlier_rounds, last_round = (
@@ -240,8 +248,8 @@ def _fly_rounds(
     return RunResult(scenario.name, task.seed, folder, rounds, round_entries[-1]["next"])
 
 
-def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
-    """Write a plan and its mission, fly the plan if it is feasible, and write the report."""
+def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
+    """Write a plan and its mission, fly and record the plan if it is feasible, and write the report."""
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def _never_stop() -> bool:
-    """Return False, so that the vehicle is served until it is interrupted."""
+    """Return False; default condition of a vehicle that is served until it is interrupted."""
     return False
 
 
@@ -74,12 +74,14 @@ def serve(
 def link_access(
     to: str | Sequence[str], bind: str, allow: str | Sequence[str] | None = (), sign_key: str | Path | None = None
 ) -> "Access":
-    """Parse the addresses and the signing key of a link.
+    """Parse and check the addresses and the signing key of a link.
+
+    Several addresses are a sequence, or separated by commas.  Raises FlightError or PlanflyError for invalid addresses.
 
     to: IP:PORT of each station.
     bind: IP:PORT of the vehicle.
     allow: IP addresses of stations on other machines.
-    Several addresses are a sequence, or separated by commas.  Raises FlightError or PlanflyError for invalid addresses.
+    sign_key: a file with a MAVLink signing key.
 
     >>> link_access("127.0.0.1:14550", "127.0.0.1:0").to
     (('127.0.0.1', 14550),)
@@ -101,7 +103,10 @@ def _split_addresses(addresses: str | Sequence[str]) -> Sequence[str]:
 
 
 def _parse_address(argument: str, text: str) -> tuple[str, int]:
-    """Parse IP:PORT.  argument: name of the argument in the message.  Raises FlightError for invalid text."""
+    """Parse an address IP:PORT.  Raises FlightError for invalid text.
+
+    argument: name of the argument, for the message.
+    """
     host, colon, port = text.strip().rpartition(":")
     if not colon and port.isdigit():
         raise FlightError.of_argument(argument, text, f"expected IP:PORT, such as 127.0.0.1:{port}")
@@ -111,7 +116,7 @@ def _parse_address(argument: str, text: str) -> tuple[str, int]:
 
 
 def _parse_ip(argument: str, text: str) -> str:
-    """Return an IP address in its usual form.  Raises FlightError for invalid text."""
+    """Return an IP address in its normal form.  Raises FlightError for invalid text."""
     try:
         return str(ipaddress.ip_address(text))
     except ValueError as error:

@@ -171,7 +171,10 @@ def survey(
 
 
 def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
-    """Return the camera with the given numbers, or None for None.  Raises ArgumentError for invalid numbers."""
+    """Return the camera with the given numbers, or None without numbers.
+
+    Raises ArgumentError for invalid numbers.
+    """
     if numbers is None:
         return None
     try:
@@ -204,7 +207,7 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 
 
 def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
-    """Fly a mission, measure its photo lines, and look for remedies if they are requested."""
+    """Fly a mission, measure its photo lines, and look for remedies if requested."""
     _check_has_survey(setup)
     airframe = airframe_for_setup(setup)
     with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
@@ -221,7 +224,10 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
 
 
 def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool) -> SurveyResult:
-    """Write the picture of the lines and the missions of the remedies if a folder is named; return the result."""
+    """Write the picture of the photo lines and the files of the remedies into a folder.
+
+    Return the result with the written files; nothing is written if `out` is None.
+    """
     if out is None:
         return result
     folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(result.setup, result.track)
@@ -243,20 +249,23 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
             files.append(path)
         if remedy.kind == "parameter":
             path = folder / "parameter.param"
-            write_atomically(path, _parameter_file_text(result.setup, remedy))
+            write_atomically(path, _remedy_parameter_file(result.setup, remedy))
             files.append(path)
     return replace(result, files=tuple(files))
 
 
-def _parameter_file_text(setup: FlightSetup, remedy: SurveyRemedy) -> str:
-    """Return the user's own parameter file with the parameter of a remedy, or a file with this parameter only."""
-    params, parameters = setup.scenario.flight.params, setup.autopilot.parameters
-    if params is not None and isinstance(parameters, ParameterSet):
-        file, names = Path(params), parameters.table.by_any_name
+def _remedy_parameter_file(setup: FlightSetup, remedy: SurveyRemedy) -> str:
+    """Return the user's parameter file with the remedy's parameter set, as text.
+
+    Without a parameter file, return a new file with only that parameter.
+    """
+    params_path, parameter_set = setup.scenario.flight.params, setup.autopilot.parameters
+    if params_path is not None and isinstance(parameter_set, ParameterSet):
+        file, definitions = Path(params_path), parameter_set.table.by_any_name
         text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
-        definition = parameters.table.by_name[remedy.name]
-        units = {name: factor for name, (known, factor) in names.items() if known == definition}
-        return with_parameter(text, params, {name: remedy.value / factor for name, factor in units.items()})
+        definition = parameter_set.table.by_name[remedy.name]
+        units = {name: factor for name, (known, factor) in definitions.items() if known == definition}
+        return with_parameter(text, params_path, {name: remedy.value / factor for name, factor in units.items()})
     if setup.autopilot.name == PX4:
         return px4_parameter_text(remedy.name, remedy.value, setup.autopilot.version)
     return parameters_text({remedy.name: remedy.value}, "suggested by planfly survey")
@@ -281,14 +290,17 @@ def _check_has_survey(setup: FlightSetup) -> None:
 
 
 def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> SurveyResult:
-    """Judge and measure a flight that has already been flown."""
+    """Judge a survey that was flown before, and measure its photo lines."""
     _check_has_survey(setup)
     requirements = route_requirements(setup)
     return _measure_survey(requirements, track, judge_flight(setup, track, end_reason, requirements=requirements))
 
 
 def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyResult:
-    """Measure the photo lines and the overlap of a flight; without a track the measures are None."""
+    """Measure the photo lines of a flight and the overlap of its photos.
+
+    Without a track, each measure is None.
+    """
     setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None
     lines = tuple(

@@ -76,7 +76,10 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the flight setup without any variation. Raises PlanflyError for a mission without a valid route."""
+        """Return the flight setup without any variation.
+
+        Raises PlanflyError for a mission without a valid route.
+        """
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
@@ -170,7 +173,10 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
 
 
 def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
-    """Return the base of a campaign that flies the mission of a plan.  seed: seed of the campaign."""
+    """Return the base of a campaign that flies the mission of a plan.
+
+    seed: seed of the campaign.
+    """
     scenario = plan.scenario
     airframe = load_airframe(scenario)
     mission = fences.add_to_mission(mission_of_plan(plan, airframe))
@@ -180,7 +186,10 @@ def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersio
 
 
 def _make_base_from_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
-    """Return the base of a campaign that flies the mission of a setup.  source: name of the mission in messages."""
+    """Return the base of a campaign that flies the mission of a setup.
+
+    source: name of the mission in messages.
+    """
     mission = replace(setup.mission, source=source)
     scenario, airframe = setup.scenario, airframe_for_setup(setup)
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
@@ -229,7 +238,8 @@ def _check_draws(base: CampaignBase) -> None:
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
     """Return the dispersions with the draws stored next to the aircraft's model, if there are any.
 
-    A dispersions file that names other draws, or has its own dispersions of drag or control power, is used unchanged.
+    The draws are of aircraft properties.  A dispersions file that names other draws, or has its own dispersions of drag
+    or control power, is used unchanged.
     """
     file = aircraft.folder / DRAWS_FILE
     has_own_dispersions = dispersions.name != DEFAULT_DISPERSIONS_NAME and any(
@@ -252,7 +262,11 @@ MAX_WIND_GRADIENT = 0.05
 
 
 class GivenWind(NamedTuple):
-    """Mean wind that replaces the scenario's wind: speed, m/s, and the direction from which it blows, degrees."""
+    """Mean wind that replaces the scenario's wind.
+
+    speed: m/s.
+    from_deg: direction from which the wind blows, degrees.
+    """
 
     speed: float
     from_deg: float
@@ -272,9 +286,9 @@ class VariedFlight:
 
 
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """Return the varied flight for a draw: setup, airframe, and the variations that the autopilot does not know.
+    """Vary a flight by a draw: its setup, its airframe, and differences that the autopilot does not know.
 
-    Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`. The autopilot does not know
+    Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`.  The autopilot does not know
     the varied mass, drag, control power, aircraft properties and start position.
 
     wind: mean wind that the draw varies; None for the wind of the scenario.

@@ -24,12 +24,15 @@ from world.html_table import html_table
 _DEFAULTS = {"confidence": 0.95, "directions": 16, "most": 20.0}
 
 
-def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly campaign`` command line for a goal and options; options that are None are omitted.
+def campaign_command_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
+    """Return the ``planfly campaign`` command line for a goal and options.
+
+    Options that are None are omitted.
 
     target: scenario, plan or mission of the campaign.
 
-    >>> campaign_line("my plan.json", Goal(0.99, True, 5000), {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]})
+    >>> options = {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]}
+    >>> campaign_command_line("my plan.json", Goal(0.99, True, 5000), options)
     "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
     """
     target_option = {"prove" if goal.stops else "at_least": goal.target}
@@ -38,10 +41,12 @@ def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str
     )
 
 
-def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly winds`` command line for a goal and options; arguments as for `campaign_line`.
+def winds_command_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
+    """Return the ``planfly winds`` command line for a goal and options.
 
-    >>> winds_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
+    The arguments are as for `campaign_command_line`.
+
+    >>> winds_command_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
     """
     flights = None if goal.flights == DEFAULT_WIND_FLIGHTS else goal.flights
@@ -119,15 +124,17 @@ class CampaignResult:
             return dict(self.columns)
         return pd.DataFrame(dict(self.columns))
 
-    def shapes(self) -> dict[str, NDArray[np.float32]]:
-        """Read the path data of each flight from the campaign's folder; one row per flight, NaN if unknown.
+    def path_arrays(self) -> dict[str, NDArray[np.float32]]:
+        """Read clearance along the route and offset at each stop, of each flight, from the campaign's folder.
 
         "clearance": minimum height above ground on each of 150 equal pieces of the route, (n, 150), m.
         "crossings": distance right of and above each stop of the route at closest approach, (n, s, 2), m.
+        Unknown values are NaN.
+
         Raises ValueError for a campaign without a folder.
         """
         if self.table is None:
-            raise ValueError("shapes: the campaign has no folder; name one with `out`")
+            raise ValueError("path_arrays: the campaign has no folder; name one with `out`")
         return read_path_arrays(self.table)
 
     def __repr__(self) -> str:
@@ -142,7 +149,9 @@ class CampaignResult:
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """Return the goal for keyword arguments. Raises ArgumentError for numbers outside their ranges.
+    """Return the goal of a campaign from keyword arguments.
+
+    Raises ArgumentError for numbers outside their ranges, and if both `prove` and `at_least` are given.
 
     >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)

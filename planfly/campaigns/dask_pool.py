@@ -36,7 +36,9 @@ _TASK_NAME_COUNT = 4096
 
 
 def connect_client(address: str) -> Any:
-    """Return a `distributed.Client` of a scheduler, with the security settings of dask's configuration.
+    """Connect to a scheduler with the security settings of dask's configuration; return its client.
+
+    address: address of the scheduler.
 
     Raises OSError and ValueError if no scheduler answers.
     """

@@ -127,7 +127,9 @@ class VaryingQuantity:
         return upper_probability - lower_probability
 
     def value(self, fraction: float) -> float:
-        """Return the quantile of the distribution, truncated to the quantity's range.  fraction: 0 to 1.
+        """Return the quantile of the distribution, truncated to the quantity's range.
+
+        fraction: cumulative probability of the quantile, 0 to 1.
 
         >>> mass = VaryingQuantity(QUANTITY_BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
@@ -244,7 +246,11 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
 
 
 def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
-    """Return the aircraft's draws from the file that a dispersions file names, relative to the dispersions file."""
+    """Read the draws of aircraft properties from the file that a dispersions file names.
+
+    aircraft_table: table of the dispersions file; the path in it is relative to the dispersions file.
+    name: name of the dispersions file.
+    """
     file_name = aircraft_table.get("draws") if isinstance(aircraft_table, dict) else None
     if (
         not isinstance(file_name, str)
@@ -287,7 +293,12 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
 
 
 def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
-    """Raise SpreadError unless scipy.stats has the named distribution, discrete for a whole-number quantity."""
+    """Raise SpreadError unless scipy.stats has the named distribution.
+
+    A quantity of whole numbers needs a discrete distribution.
+
+    name: name of the file in messages.
+    """
     from scipy import stats
 
     kind = stats.rv_discrete if quantity.integer else stats.rv_continuous
@@ -387,9 +398,11 @@ def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
 
 
 def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -> Floats:
-    """Return the draws of flights, (stop - start, d), in standard deviations from the mean of each quantity.
+    """Return the draws of flights in standard deviations from each quantity's mean, (stop - start, d).
 
     The flights are drawn as in `draw_flight`.  d is the number of varying quantities that have more than one value.
+
+    start, stop: index of the first flight, and of the flight after the last.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
     >>> standard_draws(default_dispersions(), 1, 5, 7).shape
@@ -404,7 +417,8 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
     """Return points that cover the dispersions evenly, in the units of `standard_draws`, (count, d).
 
     The points are a Sobol sequence, each at the center of its cell.
-    count: a power of two.
+
+    count: number of points, a power of two.
 
     >>> from planfly.campaigns.dispersions import default_dispersions
     >>> bool(abs(standard_population(default_dispersions(), 1024).mean(axis=0)).max() < 0.01)
@@ -424,9 +438,9 @@ def _draw_fractions(seed: int, index: int) -> tuple[Floats, int]:
 
 
 def _standardise(dispersions: Dispersions, fractions: Floats) -> Floats:
-    """Convert cumulative probabilities of the varying quantities, (n, v), to deviations from the mean, (n, d).
+    """Convert cumulative probabilities of the varying quantities, (n, v), to standardised values, (n, d).
 
-    The deviations are in standard deviations.  A quantity with only one value has no column.
+    The values are in standard deviations from the mean.  A quantity with only one value has no column.
     """
     quantiles = (np.arange(_QUANTILE_COUNT) + 0.5) / _QUANTILE_COUNT
     columns = []

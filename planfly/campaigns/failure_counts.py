@@ -12,7 +12,10 @@ from logs.verdict.wording import place_text
 
 @dataclass(frozen=True)
 class RuleFailures:
-    """Numbers of flights that failed a rule, in total and at each place; a flight may fail at several places."""
+    """Numbers of flights that failed a rule, in total and at each place.
+
+    A flight may fail at several places.
+    """
 
     rule: str
     flights: int
@@ -20,7 +23,9 @@ class RuleFailures:
 
 
 def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[RuleFailures, ...]:
-    """Count flights by failed rule and place; the most urgent rules, which may cause other failures, come first.
+    """Count flights by failed rule and place.
+
+    The most urgent rules, which may cause other failures, come first.
 
     flights: failed rules and places of each flight.
 
@@ -62,7 +67,7 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
 
 
 def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
-    """Return a line for each failed rule, with the number of flights and the places where most of them failed."""
+    """Return a line for each failed rule: number of failed flights, and the three most frequent places."""
     lines = []
     for failures in by_rule:
         places_text = ", ".join(f"{place_text(place)} in {count}" for place, count in failures.places[:3])

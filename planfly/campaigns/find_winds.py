@@ -56,7 +56,14 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass(frozen=True)
 class WindsGoal:
-    """Goal of a search: probability, number of directions, maximum wind, m/s, and maximum number of flights."""
+    """Goal of a search for winds.
+
+    target: required probability of a flyable flight.
+    confidence: confidence of each boundary's interval.
+    directions: number of directions.
+    most: maximum wind of the search, m/s.
+    flights: maximum number of flights.
+    """
 
     target: float
     confidence: float
@@ -70,9 +77,10 @@ DEFAULT_WIND_FLIGHTS = 5000
 
 
 def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
-    """Return the maximum number of flights: the requested number, or the number stored in the folder, or the default.
+    """Return the maximum number of flights of a search.
 
-    Raises StoreError for a file that planfly did not write, or that another process has locked.
+    It is the requested number, or else the number stored in the folder of a resumed search, or else the
+    default.  Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     settings = read_stored_settings(folder / WINDS_DATABASE) if resume else {}
     return int(settings.get("flights", DEFAULT_WIND_FLIGHTS)) if requested is None else requested
@@ -175,7 +183,7 @@ def find_winds(
                     # Report before the workers start, because the start takes seconds.
                     progress.report_start(len(stored_flights.flown))
                     pool = stack.enter_context(worker_pool(workers, base, fly))
-                    calm_failures = None if stored_flights.flown else _failures_in_calm_air(pool, goal)
+                    calm_failures = None if stored_flights.flown else _fly_in_calm_air(pool, goal)
                     if calm_failures is not None:
                         return search.result_in_calm_air(calm_failures)
                 _fly_round(pool, search, missing_requests, stored_flights, progress)
@@ -241,8 +249,8 @@ class _Search:
         if flight.outcome == "lost":
             self.lost.append(request.number)
 
-    def request(self, requested_flight: RequestedFlight) -> FlightRequest:
-        """Make the request to a worker for a flight."""
+    def make_request(self, requested_flight: RequestedFlight) -> FlightRequest:
+        """Make the request to a worker for a flight of the search."""
         return FlightRequest(
             requested_flight.draw,
             GivenWind(requested_flight.speed, 360.0 * requested_flight.direction / self.goal.directions),
@@ -302,8 +310,8 @@ class _Search:
         return CalmFailures(min_speed, len(numbers), len(failed_findings), count_failures(failed_findings))
 
 
-def _failures_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | None:
-    """Fly the first draws in calm air, and return their failures if all of them fail, otherwise None.
+def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | None:
+    """Fly the first draws in calm air; return their failures if all of them fail, otherwise None.
 
     The number of flights is chosen so that, if the mission had the target probability, all of them would fail with a
     probability of at most 1 minus the confidence.
@@ -340,7 +348,7 @@ class _StoredFlights:
         self.flown = {number: flight for number, (_, flight) in requests_and_outcomes.items()}
 
     def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
-        """Return the requests whose flights are not in the table.
+        """Return the requests whose flights are not in the table, and which must be flown.
 
         Raises StoreError if the table has another request with the same number.
         """
@@ -375,7 +383,7 @@ def _fly_round(
         requested_flight = next(remaining_requests, None)
         if requested_flight is None:
             return None
-        request = search.request(requested_flight)
+        request = search.make_request(requested_flight)
         requested_by_request[request] = requested_flight
         return request
 
@@ -401,9 +409,10 @@ class _ProgressReport:
             self._advance(float(flight_count), float(total), remark)
 
     def report(self, flight_count: int, is_last: bool = False) -> None:
-        """Report the settled directions, the flights, the flights per minute, and the remaining time if it is known.
+        """Report the settled directions, the flights, the flights per minute, and the least remaining time.
 
         No remaining time is given beyond `MIN_FLIGHTS_PER_DIRECTION`, because the number of flights is then unknown.
+
         is_last: True reports even if no report is due.
         """
         if self._advance is None or not (self._rate.is_due() or is_last):

@@ -89,7 +89,9 @@ def fingerprint(aircraft: str) -> dict[str, str]:
 
 
 def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[str, str], worker: str) -> None:
-    """Raise WorkerError if a worker's fingerprint differs; the message names the worker and the first difference.
+    """Raise WorkerError if the fingerprint of a worker differs from this process's fingerprint.
+
+    The message names the worker and the first difference.
 
     >>> check_fingerprint({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):

@@ -41,10 +41,10 @@ MarginalPass = tuple[str, Place, float]
 
 
 def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
-    """Return rule, place and scaled margin of each marginal pass: a finding that passed by less than its rule's scale.
+    """Return the marginal passes of a flight: findings that passed by less than their rule's scale.
 
-    The margin is a fraction of the scale, 0 to 1; it is 0 if a rule accepts a value beyond its limit for another
-    reason.  Passes close to a missile's sphere follow at the end.
+    Each is given by rule, place and margin.  The margin is a fraction of the scale, 0 to 1; it is 0 if a rule accepts a
+    value beyond its limit for another reason.  Passes close to a missile's sphere follow at the end.
     """
     fractions: dict[tuple[str, Place], float] = {}
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
@@ -84,9 +84,10 @@ STATION_COUNT = 150
 
 
 def clearance_profile(route: Route, track: Track) -> Singles:
-    """Return the minimum height above ground on each equal piece of the route, m, (STATION_COUNT,); NaN if not flown.
+    """Return the minimum height above ground on each piece of the route, m, (STATION_COUNT,).
 
-    Each track point is assigned to the nearest point of the leg that was flown at that time.
+    The pieces are equally long; NaN for a piece that was not flown.  Each track point is assigned to the nearest point
+    of the leg that was flown at that time.
     """
     starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
@@ -102,10 +103,11 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
-    """Return the distance right of and above each of s stops at closest approach, m, (s, 2); NaN if not reached.
+    """Return the distance right of and above each of s stops at closest approach, m, (s, 2).
 
-    A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are omitted, because their
-    number differs between flights. Right is relative to the mean of the incoming and outgoing courses.
+    NaN for a stop that was not reached.  A stop is a waypoint, or the corner at which a loiter or a return starts;
+    later corners are omitted, because their number differs between flights.  Right is relative to the mean of the
+    incoming and outgoing courses.
     """
     points = route.waypoints
     crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
@@ -137,7 +139,10 @@ Outcome = Literal["flyable", "not flyable", "lost"]
 
 @dataclass(frozen=True, slots=True)
 class MinimumMargin:
-    """Value, unit and place of a rule's minimum margin in a flight; the value is None if no margin is a number."""
+    """Minimum margin of a rule in a flight, and its place.
+
+    value: the margin in `unit`; None if no margin is a number.
+    """
 
     value: float | None
     unit: str
@@ -162,12 +167,14 @@ class Column:
 
 
 def _failed_findings_text(failed_findings: Iterable[tuple[str, Place]]) -> str:
-    """Return the JSON text of failed rules and places, for a column of the table."""
+    """Return failed rules and places as JSON text for a column of the table."""
     return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed_findings])
 
 
 def parse_failed_findings(text: str) -> tuple[tuple[str, Place], ...]:
-    """Parse failed rules and places from the JSON text of a column; the inverse of `_failed_findings_text`.
+    """Parse failed rules and places from the JSON text of a column.
+
+    This is the inverse of `_failed_findings_text`.
 
     >>> parse_failed_findings('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
     3
@@ -228,7 +235,10 @@ class FlightRow:
 
 
 def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
-    """Return a margin divided by the scale of its rule, or None if the margin or the scale has no number."""
+    """Return a margin divided by the scale of its rule.
+
+    Return None if the margin is unknown or the rule has no scale.
+    """
     scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
 

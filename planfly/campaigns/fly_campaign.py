@@ -42,7 +42,10 @@ class _FlightTally:
             self.is_decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def next_request(self) -> FlightRequest | None:
-        """Return the request of the next missing flight, or None if the goal is decided or no flight is missing."""
+        """Return the request of the next missing flight, or None if no flight has to be requested.
+
+        None is returned if the goal is decided, or if all flights have been requested.
+        """
         self.next_index = max(self.next_index, self.tally.flown)
         while self.next_index in self.later_outcomes:
             self.next_index += 1
@@ -158,7 +161,7 @@ class _ProgressReport:
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, is_last: bool = False) -> None:
-        """Report the number of flights, the probability of success with its bounds, the rate and the remaining time.
+        """Report flights, probability of success with its bounds, rate of flights and remaining time.
 
         is_last: True reports even if no report is due.
         """

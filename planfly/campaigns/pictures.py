@@ -89,7 +89,12 @@ _MAX_BINS = 20
 
 @dataclass(frozen=True)
 class SpeedBin:
-    """Numbers of flights and flyable flights in a range of wind speeds, m/s, and Wilson's interval of their ratio."""
+    """Flights in a range of wind speeds.
+
+    low, high: range of wind speeds, m/s.
+    flights, flyable: number of flights and of flyable flights.
+    interval: Wilson's interval of their ratio.
+    """
 
     low: float
     high: float
@@ -100,7 +105,12 @@ class SpeedBin:
 
 @dataclass(frozen=True)
 class Bar:
-    """Title of a quantity, its first-order index (0 to 1), and its rank correlation with the margin (-1 to 1)."""
+    """Bar of the tornado chart, for one quantity.
+
+    title: title of the quantity.
+    index: first-order index, 0 to 1.
+    slope: rank correlation of the quantity with the margin, -1 to 1.
+    """
 
     title: str
     index: float
@@ -137,7 +147,7 @@ def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float 
 
 
 def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
-    """Draw the fraction of flyable flights against wind speed, with its interval and the number of flights.
+    """Draw the fraction of flyable flights against wind speed, with its interval and number of flights.
 
     target: required probability, drawn as a line, or None.
     """
@@ -247,7 +257,7 @@ _PANELS_PER_ROW = 5
 def draw_clearance_fan(
     clearance: Floats, has_failed: NDArray[np.bool_], terrain_altitudes: Floats, length: float, min_clearance: float
 ) -> Figure:
-    """Draw the height above ground of all flights along the path, as quantile bands, and below it the ground profile.
+    """Draw the height above ground of all flights along the path as quantile bands, and the ground below.
 
     clearance: minimum clearance of each flight on each of s equal pieces of the path, m, (n, s); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
@@ -303,7 +313,9 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
-    """Draw where the flights crossed each waypoint, seen along the path, with the 95 % ellipse; one panel for each.
+    """Draw where the flights crossed each waypoint, seen along the path, a panel for each waypoint.
+
+    The panels show the ellipse of 95 % of the flights.
 
     crossings: distance right of and above each waypoint, m, (n, w, 2); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,).
@@ -402,7 +414,7 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart of the winds in which a mission is flyable, north up, up to `max_speed` (m/s) at the edge.
+    """Draw a polar chart, north up, of the winds in which a mission is flyable; edge: `max_speed`, m/s.
 
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
@@ -529,7 +541,7 @@ _LINE_SPACING_RATIO = 1.3
 
 
 def narrow_figure(figure: Figure) -> Figure:
-    """Change a figure of this module to a narrow layout for phones (`NARROW_WIDTH_IN`), and return it.
+    """Change a figure of this module to a narrow layout for phones, `NARROW_WIDTH_IN` wide, and return it.
 
     >>> float(narrow_figure(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
@@ -593,13 +605,13 @@ def narrow_figure(figure: Figure) -> Figure:
 
 
 def _left_title(axes: Axes) -> list[Text]:
-    """Return the left title of a panel in a list, empty without a title."""
+    """Return the left title of a panel as a list of one text; empty without a title."""
     title = axes.get_title("left")
     return [child for child in axes.get_children() if isinstance(child, Text) and title and child.get_text() == title]
 
 
 def _wrap_text(text: Text, width: float) -> float:
-    """Break a text into lines of at most `width`, in; return the total height of the lines, in."""
+    """Break a text into lines of at most `width` (in), and return the total height of the lines, in."""
     size = float(text.get_fontsize()) / 72.0
     lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))

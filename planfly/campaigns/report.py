@@ -148,7 +148,7 @@ def _draw_both_widths(figure: Figure, caption: str) -> Markup:
 
 
 def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
-    """Draw the figures of the report; return each with its caption."""
+    """Draw the figures of a campaign's report; return each with its caption."""
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
     bins = group_by_speed(speed, flyable, summary.goal.confidence)
@@ -317,7 +317,10 @@ def write_files(
     command: str,
     advance: Advance | None = None,
 ) -> None:
-    """Write ``summary.json``, ``report.html`` and the logs of the three worst flights; remove logs of other flights."""
+    """Write ``summary.json``, ``report.html`` and the logs of the three worst flights.
+
+    Logs of other flights in the folder are removed.
+    """
     (folder / "worst").mkdir(exist_ok=True)
     logged_flights = [
         (row, folder / log) for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True) if log
@@ -375,20 +378,20 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
 
 
 def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: str) -> None:
-    """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
-    goal, spokes = winds.goal, chart_directions(winds)
+    """Write the files of a search for winds: ``winds.json``, ``winds.png`` and ``winds.html``."""
+    goal, directions = winds.goal, chart_directions(winds)
     wind = base.scenario.wind
     scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
-    figure = draw_go_no_go(spokes, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
+    figure = draw_go_no_go(directions, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
     rows = [
         (
-            f"{spoke.from_deg:g}°",
-            _speed_text(spoke.boundary, goal.most),
-            _interval_text(spoke.low, spoke.high, goal.most),
-            str(sum(count for _, count, _ in spoke.flights)),
+            f"{direction.from_deg:g}°",
+            _speed_text(direction.boundary, goal.most),
+            _interval_text(direction.low, direction.high, goal.most),
+            str(sum(count for _, count, _ in direction.flights)),
             RULE_WORDS[rule].title if rule else "",
         )
-        for spoke, rule in zip(spokes, _deciding_rules(winds), strict=True)
+        for direction, rule in zip(directions, _deciding_rules(winds), strict=True)
     ]
     data = {
         "schema": WINDS_SCHEMA,
@@ -401,17 +404,17 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
         "lost": list(winds.lost),
         "directions": [
             {
-                "from_deg": spoke.from_deg,
-                "boundary_mps": round(spoke.boundary, 3),
-                "interval_mps": [round(spoke.low, 3), round(spoke.high, 3)],
-                "beyond": spoke.is_beyond_search,
+                "from_deg": direction.from_deg,
+                "boundary_mps": round(direction.boundary, 3),
+                "interval_mps": [round(direction.low, 3), round(direction.high, 3)],
+                "beyond": direction.is_beyond_search,
                 "flown": [
                     {"speed_mps": round(speed, 3), "flights": count, "flyable": flyable}
-                    for speed, count, flyable in spoke.flights
+                    for speed, count, flyable in direction.flights
                 ],
                 "failed_by_rule": failures_document(winds.failures[k]) if winds.failures else [],
             }
-            for k, spoke in enumerate(spokes)
+            for k, direction in enumerate(directions)
         ],
         "calm": None if winds.calm is None else _calm_document(winds.calm),
         "spread": base.dispersions.to_json(),
@@ -435,12 +438,12 @@ def _calm_document(calm: CalmFailures) -> dict[str, Any]:
 
 
 def _speed_text(speed: float, max_speed: float) -> str:
-    """Describe a boundary, m/s; a boundary at the maximum wind of the search is only known to be above it."""
+    """Return a boundary as text; a boundary at the maximum wind of the search is "over" that wind."""
     return f"over {max_speed:g} m/s" if speed >= max_speed - 1e-9 else f"{speed:.1f} m/s"
 
 
 def _interval_text(lower: float, upper: float, max_speed: float) -> str:
-    """Describe an interval, m/s; bounds beyond the maximum wind of the search are unknown."""
+    """Return an interval of the boundary as text; bounds beyond the maximum wind are "over" that wind."""
     if lower >= max_speed - 1e-9:
         return f"over {max_speed:g}"
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
@@ -479,7 +482,7 @@ def answer_state(winds: WindsResult) -> str:
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return a line about directions with too few flights, if there are any."""
+    """Return a line about the directions with too few flights; [] if there are none."""
     unsettled = _unsettled_directions(winds)
     if not unsettled:
         return []
@@ -492,7 +495,7 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
 
 
 def _lost_lines(winds: WindsResult) -> list[str]:
-    """Return a line about flights that could not be flown, if there are any."""
+    """Return a line about the flights that could not be flown; [] if there are none."""
     if not winds.lost:
         return []
     flight_texts = ", ".join(
@@ -527,7 +530,7 @@ def _deciding_lines(winds: WindsResult) -> list[str]:
 
 
 def _lines_without_failures(winds: WindsResult) -> list[str]:
-    """Return a line about the directions in which no flight failed, if there are any.
+    """Return a line about the directions in which no flight failed; [] if there are none.
 
     The line states the probability of success that the flights in the maximum wind of these directions prove alone.
     """
@@ -557,7 +560,7 @@ def _winds_answer(winds: WindsResult) -> str:
     """Return one line with the answer of a search for winds: the lowest and the highest boundary."""
     directions, target = chart_directions(winds), winds.goal.target
     lowest_direction, highest_direction = (
-        select(directions, key=lambda spoke: spoke.boundary) for select in (min, max)
+        select(directions, key=lambda direction: direction.boundary) for select in (min, max)
     )
     max_speed, percent = winds.goal.most, f"{100 * winds.goal.confidence:g} %"
     best_text = f"{_speed_text(highest_direction.boundary, max_speed)} from {highest_direction.from_deg:g}°"
@@ -579,7 +582,7 @@ def _winds_answer(winds: WindsResult) -> str:
 
 
 def wind_lines(winds: WindsResult) -> list[str]:
-    """Summarise the result of a search in a few lines."""
+    """Return the result of a search for winds as a few lines of text."""
     percent = f"{100 * winds.goal.confidence:g} %"
     return [
         _winds_answer(winds),

@@ -37,9 +37,9 @@ LOGGED_FLIGHT_COUNT = 3
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Fraction of the variance of a rule's minimum margin that a quantity explains, and the sign of its effect.
+    """Dependence of a rule's minimum margin on a quantity.
 
-    index: first-order index, 0 to 1.
+    index: first-order index: fraction of the margin's variance that the quantity explains, 0 to 1.
     slope: rank correlation, negative if an increase of the quantity reduces the margin.
     """
 
@@ -217,7 +217,7 @@ def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
 
 
 def closest_text(row: FlightRow) -> str:
-    """Describe the minimum margin of a flight; return "" if no margin is known."""
+    """Return the minimum margin of a flight with its rule and place as text; "" if no margin is known."""
     scaled_margins = [
         (fraction, rule, margin) for rule, margin in row.margins if (fraction := scale_margin(rule, margin)) is not None
     ]
@@ -228,7 +228,10 @@ def closest_text(row: FlightRow) -> str:
 
 
 def worst_flight_logs(worst: Sequence[FlightRow]) -> list[str]:
-    """Return the path of each flight's log, relative to the campaign's folder, or "" for a flight without a log."""
+    """Return the path of each flight's log, relative to the campaign's folder.
+
+    The path is "" for a flight without a log.
+    """
     logged_indices = [row.draw.index for row in worst if row.duration > 0.0][:LOGGED_FLIGHT_COUNT]
     return [f"worst/flight-{row.draw.index:06d}.mcap" if row.draw.index in logged_indices else "" for row in worst]
 
@@ -263,7 +266,7 @@ def _answer_text(summary: CampaignSummary) -> str:
 
 
 def _drivers_text(summary: CampaignSummary) -> str:
-    """Describe the quantities that explain most of the deciding margin's variance, at most three."""
+    """Return a clause on the quantities that explain most of the deciding margin's variance."""
     if not summary.sensitivities:
         return f"at least {MIN_FLIGHTS_FOR_INDEX} flights would show what the margin depends on"
     drivers = [sensitivity for sensitivity in summary.sensitivities if sensitivity.index >= _MIN_NAMED_FRACTION][:3]
@@ -276,5 +279,8 @@ def _drivers_text(summary: CampaignSummary) -> str:
 
 
 def _to_plain_number(value: float | None) -> float | None:
-    """Return a number rounded for a JSON document, or None for NaN and infinity; a negative zero becomes 0."""
+    """Return a number rounded for a JSON document, or None for NaN and infinity.
+
+    A negative zero becomes 0.
+    """
     return None if value is None or not math.isfinite(value) else round(float(value), 9) + 0.0

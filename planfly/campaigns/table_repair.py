@@ -16,7 +16,11 @@ _MAX_LISTED = 8
 
 
 def stored_value(value: Any, kind: str) -> Any:
-    """Return a value as SQLite reads it from a column; numpy numbers become Python numbers, and NaN becomes None.
+    """Return a value as SQLite reads it from a column.
+
+    Numpy numbers become Python numbers, and NaN becomes None.
+
+    kind: SQL type of the column.
 
     >>> stored_value(3, "REAL NOT NULL"), stored_value(math.nan, "REAL"), stored_value(True, "INTEGER")
     (3.0, None, 1)
@@ -52,7 +56,7 @@ class Examination(NamedTuple):
     last_known: int | None = None
 
     def text(self) -> str:
-        """Describe the damage and its consequence.
+        """Return a clause on the damage of a table and on its consequence.
 
         >>> Examination([0, 1, 3], [2]).text()
         'flight 2 is damaged and was removed; intact flights: 3; --resume flies the missing ones'
@@ -124,7 +128,7 @@ def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
-    """Sort rows into undamaged and damaged by their checksum, the last value of each row."""
+    """Sort rows into undamaged and damaged ones, by the checksum at the end of each row."""
     examination = Examination([], [])
     for *values, stored_checksum in rows:
         (examination.undamaged if stored_checksum == checksum(values) else examination.damaged).append(values[0])
@@ -154,7 +158,7 @@ def copy_undamaged_rows(
     numbers: Sequence[int],
     entries: Mapping[str, str],
 ) -> None:
-    """Write a new database file with some rows of a campaign's table.
+    """Write a new database file with the undamaged rows of a campaign's table.
 
     target: the new file; an existing file is replaced.
     statements: SQL statements that create both tables.

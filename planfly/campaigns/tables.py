@@ -258,7 +258,7 @@ class LockedTable:
         report_line(f"{self.path}: {examination.text()}")
 
     def _last_number(self) -> int:
-        """Return the largest flight number that can be read from either end of the table, or -1 without flights."""
+        """Return the largest flight number that can be read from either end of the table, or -1 if none."""
         last_number = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
@@ -271,7 +271,10 @@ class LockedTable:
         return last_number
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
-        """Raise StoreError if the table contains more flights than requested; the base class accepts any number."""
+        """Raise StoreError if the table contains more flights than requested.
+
+        The base class accepts any number.
+        """
 
     def __enter__(self) -> Self:
         """Return the locked table."""
@@ -305,7 +308,10 @@ class LockedTable:
             self._connection.execute("DELETE FROM flights WHERE flight >= ?", (first_number,))
 
     def _check_not_removed(self) -> None:
-        """Raise OSError if the file was deleted; on POSIX, writing to it would succeed, but the data would be lost."""
+        """Raise OSError if the file was deleted or replaced.
+
+        On POSIX, writing to it would succeed, but the data would be lost.
+        """
         try:
             is_same_file = os.path.samestat(self.path.stat(), self._file)
         except OSError:
@@ -365,7 +371,10 @@ def check_not_locked(path: Path) -> None:
 
 
 class convert_errors:
-    """Context that converts SQLite errors about a file: to OSError for a full disk, otherwise to StoreError."""
+    """Context that converts SQLite errors about a file.
+
+    A full disk becomes OSError, any other error StoreError.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -406,10 +415,16 @@ _SELECT_ROWS = f"SELECT {', '.join(COLUMN_NAMES)} FROM flights"
 
 
 class Store(LockedTable):
-    """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
+    """Table of a campaign, locked by one process at a time.
+
+    The number of a flight is the index of its draw.
+    """
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume. Raises StoreError if it contains more flights than requested."""
+        """Create the table, or open it to resume.
+
+        Raises StoreError if the table contains more flights than requested.
+        """
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
@@ -444,7 +459,7 @@ class Store(LockedTable):
         return [value for (value,) in self._connection.execute(query, (max_count,))]
 
     def has_track(self) -> list[bool]:
-        """Return for each flight, in order, True if its path data are stored."""
+        """Return a list with True for each flight whose path data are stored, in the order of flights."""
         return [
             bool(size) for (size,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")
         ]
@@ -530,7 +545,10 @@ class WindsStore(LockedTable):
     """Table of a search, locked by one process at a time."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume the same search.  settings: must include `FIXED_SETTINGS`."""
+        """Create the table, or open it to resume the same search.
+
+        settings: settings of the search, which must include `FIXED_SETTINGS`.
+        """
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
@@ -584,10 +602,11 @@ _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": obje
 
 
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns (n,) of a campaign's table, keyed by name, in the order of flights; without array columns.
+    """Read the columns (n,) of a campaign's table, by name, in the order of flights.
 
-    Numbers are float64, NaN if missing, or int64. Texts are Python strings, None if missing; equal strings share
-    memory. The result takes about 60 MB for 100,000 flights.
+    Columns of arrays are left out.  Numbers are float64, NaN if missing, or int64.  Texts are Python strings, None if
+    missing; equal strings share memory.  The result takes about 60 MB for 100,000 flights.
+
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     names = tuple(name for name in CAMPAIGN_KIND.columns if name not in ARRAY_COLUMNS)
@@ -616,10 +635,11 @@ def count_flights(path: Path) -> int:
 
 
 def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
-    """Return the stored path data of each flight, in the order of flights; NaN for flights without them.
+    """Read the path data of each flight, in the order of flights; NaN for flights without them.
 
     "clearance": minimum height above ground on each of 150 equal pieces of the route, m, (n, 150).
     "crossings": distance right of and above each stop of the route at closest approach, m, (n, s, 2).
+
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     with _open_to_read(path) as connection:
@@ -639,7 +659,10 @@ def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[i
 
 @contextmanager
 def _open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
-    """Yield a connection for reading a table.  Raises StoreError for a locked file or another kind of file."""
+    """Yield a connection for reading a table.
+
+    Raises StoreError for a locked file or another kind of file.
+    """
     # Nothing is written, but a writable connection removes its -wal and -shm files when it closes.
     with (
         convert_errors(path),

@@ -45,9 +45,10 @@ class WorkerPool(Protocol):
 
 @contextlib.contextmanager
 def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[WorkerPool]:
-    """Yield the pool of a campaign; on exit, end local processes or remove the campaign from a cluster's workers.
+    """Yield the pool of workers that fly a campaign.
 
-    Raises SchedulerError for an address that is not allowed, and for a scheduler that does not answer.
+    On exit, local processes are ended, or the campaign is removed from a cluster's workers.  Raises SchedulerError for
+    an address that is not allowed, and for a scheduler that does not answer.
     """
     if workers.scheduler is None:
         with contextlib.closing(LocalPool(workers.count or os.cpu_count() or 1, base, fly)) as pool:
@@ -103,7 +104,10 @@ def _is_loopback(host: str) -> bool:
 
 
 class FlightRate:
-    """Rate of flights since this object was created.  stored_count: number of flights in the table at the start."""
+    """Rate of the flights since this object was created.
+
+    stored_count: number of flights in the table at the start.
+    """
 
     def __init__(self, stored_count: int) -> None:
         self._stored_count = stored_count

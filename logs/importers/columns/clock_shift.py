@@ -19,7 +19,11 @@ _MIN_OVERLAP_FRACTION = 0.5
 
 
 class ClockShift(NamedTuple):
-    """Shift to add to the times of the first signal, s, and the correlation of both signals after the shift."""
+    """Shift between the clocks of two signals.
+
+    shift: time to add to the times of the first signal, s.
+    correlation: correlation of both signals after the shift.
+    """
 
     shift: float
     correlation: float

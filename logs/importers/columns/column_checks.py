@@ -97,9 +97,9 @@ class _Pair(NamedTuple):
 
 
 def check_signs_and_units(log: ColumnLog) -> None:
-    """Raise LogError for the first quantity that contradicts the others, with the key of the table to check.
+    """Raise LogError for the first quantity that contradicts the others.
 
-    Nothing is checked for a log with too few rows in flight.
+    The message names the key of the table to check.  Nothing is checked for a log with too few rows in flight.
     """
     grid = _flying_grid(log)
     if len(grid) < _MIN_ROWS:
@@ -246,7 +246,7 @@ def _acceleration_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
 
 
 def _ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
-    """Return the ground velocity on the grid, m/s, (n,), north + i east as a complex number; None if unknown."""
+    """Return the ground velocity on the grid, m/s, (n,), north + i east; None if it is unknown."""
     if log.has("velocity_north", "velocity_east"):
         north, east = (_mean_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east"))
         return np.asarray(north + 1j * east)
@@ -297,7 +297,10 @@ def _correlate(values: Floats, expected: Floats) -> float:
 
 
 def _contradiction_error(log: ColumnLog, quantity: str, message: str, hint: str) -> LogError:
-    """Return the error for a quantity that contradicts the others.  hint: text on what to check in the table."""
+    """Return the error for a quantity that contradicts the others.
+
+    hint: text on what to check in the table.
+    """
     field = f"columns.{quantity}"
     text = f"{log.table_path}: {field}: {log.column(quantity)} {message}: {hint}"
     return LogError(text, file=log.table_path, field=field, allowed=hint)
@@ -434,7 +437,7 @@ def _check_throttle(log: ColumnLog, grid: Floats) -> None:
 
 
 def _check_heading(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError if the heading differs too much from the ground course, or turns in the opposite direction."""
+    """Raise LogError if the heading is far from the ground course, or turns in the opposite direction."""
     velocity = _ground_velocity(log, grid)
     if velocity is None:
         return

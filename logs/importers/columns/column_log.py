@@ -205,7 +205,7 @@ class ColumnLog:
         return LogError.at(self.table_path, field, value, allowed)
 
     def _file_of(self, clock: ClockTable) -> Path:
-        """Return the data file of a clock: its own file, or else the opened data file, or else the table's file."""
+        """Return the data file of a clock: its own, or else the opened data file, or else the table's file."""
         if clock.file is not None:
             return self.table_path.parent / clock.file
         if self.path != self.table_path:
@@ -295,7 +295,10 @@ class ColumnLog:
             raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
     def _own_times(self, name: str) -> Floats:
-        """Return the times of a clock before its alignment, s; dates become seconds since the main clock's start."""
+        """Return the times of a clock before its alignment, s.
+
+        Dates become seconds since the start of the main clock.
+        """
         time = self._clock(name).time
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
@@ -361,7 +364,12 @@ class ColumnLog:
                     self._column_by_name(data, entry.column, f"columns.{quantity}.column")
 
     def _column_by_name(self, data: DataFile, name: str, field: str = "") -> Column:
-        """Return a column by name.  Raises LogError, with a similar name as a hint, if the file does not have it."""
+        """Return a column of a data file by name.
+
+        Raises LogError, with a similar name as a hint, if the file does not have the column.
+
+        field: key of the table that names the column.
+        """
         if name not in data.columns:
             hint = did_you_mean(name, data.columns) or f": it has {', '.join(list(data.columns)[:12])}"
             raise self._error(field or "column", name, f"no such column in {data.path.name}{hint}")
@@ -380,9 +388,9 @@ class ColumnLog:
         return f"{data.path}: {name}"
 
     def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
-        """Return the series of one entry in SI units, radians and the default frame, within the span that is read.
+        """Return the series of one entry in SI units, radians and the default frame.
 
-        Rows that do not meet the entry's condition are NaN.
+        Only the span that the table names is read.  Rows that do not meet the entry's condition are NaN.
         """
         if entry.value is not None:
             time = self._times(self._main_clock)
@@ -416,7 +424,10 @@ class ColumnLog:
         return np.asarray(frame_factor * (factor * stated + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
 
     def _check_plausible(self, quantity: str, entry: ColumnTable, values: Floats) -> None:
-        """Raise LogError for values outside the plausible range, with the unit in which they would be plausible."""
+        """Raise LogError for values outside the plausible range of a quantity.
+
+        The message states the unit in which they would be plausible, if there is one.
+        """
         known = values[np.isfinite(values)]
         if not known.size:
             raise self._error(f"columns.{quantity}", entry.column, "holds no numbers in the rows that are read")
@@ -463,7 +474,9 @@ def text_of(value: Any) -> str:
 
 
 def _numbers(values: Column, place: str) -> Floats:
-    """Return a column as numbers; an empty text becomes NaN.  Raises LogError for a text that is not a number.
+    """Return a column as numbers; an empty text becomes NaN.
+
+    Raises LogError for a text that is not a number.
 
     place: file and column for the message.
     """

@@ -112,9 +112,10 @@ def _attitude(log: ColumnLog) -> Samples:
 
 
 def read_velocity(log: ColumnLog) -> Samples:
-    """Return the ground velocity to north, east and down, m/s, (n, 3), from components or from ground speed and course.
+    """Return the ground velocity to north, east and down, m/s, (n, 3).
 
-    Without a vertical velocity, it is computed from the altitude; there are no rows if the table lacks both.
+    It is from components, or from ground speed and course.  A vertical velocity that is not logged is computed from the
+    altitude; there are no rows if the table lacks both.
     """
     if log.has("velocity_north", "velocity_east"):
         parts = [log.series("velocity_north"), log.series("velocity_east")]

@@ -113,7 +113,7 @@ class LogTable(_Table):
 
     @model_validator(mode="after")
     def _check_entries(self) -> "LogTable":
-        """Raise ValueError for an unknown quantity, unit, frame or clock, and for clocks that cannot be aligned."""
+        """Raise ValueError for an unknown quantity, unit, frame or clock, and for an impossible alignment."""
         for quantity, entries in self.columns.items():
             if quantity not in QUANTITIES:
                 known = did_you_mean(quantity, QUANTITIES) or f": expected one of {', '.join(QUANTITIES)}"

@@ -155,7 +155,9 @@ def _read_mat(path: Path) -> DataFile:
 
 
 def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
-    """Yield the names and values of a variable's columns: the fields of a struct, or the columns of a matrix.
+    """Yield the names and values of a variable's columns.
+
+    They are the fields of a struct, or the columns of a matrix.
 
     labels: names of a matrix's columns, if known.
     """

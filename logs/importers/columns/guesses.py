@@ -174,7 +174,10 @@ class _Clock:
         return self.file, self.prefix, self.length
 
     def overlap(self, other: "_Clock") -> float:
-        """Return the duration that this clock has in common with another clock, s; negative without a common time."""
+        """Return the duration that this clock has in common with another clock, s.
+
+        The duration is negative without a common time.
+        """
         return min(self.span[1], other.span[1]) - max(self.span[0], other.span[0])
 
 

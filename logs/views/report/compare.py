@@ -292,10 +292,12 @@ _PICTURES = {
 
 
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
-    """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, created if missing.
+    """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder.
 
-    svg: True to write the pictures as SVG, too.  The map is omitted if the map origins of the flights differ.
-    Returns the paths written.  Raises OSError.
+    The folder is created if missing.  The map is omitted if the map origins of the flights differ.  Returns the paths
+    written.  Raises OSError.
+
+    svg: True to write the pictures as SVG, too.
 
     >>> import tempfile
     >>> from logs.recording.example_log import example_log

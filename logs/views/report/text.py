@@ -148,7 +148,7 @@ def headline_without_answer(badge: Badge, headline: str) -> str:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text: failing first, then those that leave the verdict open, passed, and not judged.
+    """Return all findings as text: failed, then those that leave the verdict open, passed, not judged.
 
     Within each state, the order of the verdict is kept.
 

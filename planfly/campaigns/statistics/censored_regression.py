@@ -248,7 +248,7 @@ def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, cov
 
 @lru_cache
 def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
-    """Return (count, size) points of the standard t distribution, and the log-density (count,) there."""
+    """Return points of the standard t distribution, (count, size), and their log-density, (count,)."""
     from scipy.stats import chi2, norm, qmc
 
     # With a power of two points, Sobol's sequence is balanced.
@@ -310,7 +310,7 @@ class Outcomes:
 
     @property
     def marginal(self) -> Bools:
-        """True for each flight, (n,), that passed by a known margin of less than a scale."""
+        """Mask (n,): True for flights that passed by a known margin of less than a scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
     def as_pass_or_fail(self) -> "Outcomes":
@@ -341,12 +341,17 @@ class RegressionFit:
     _mode: Floats
 
     def sample(self) -> Floats:
-        """Return s equally likely sets of coefficients from the posterior, (s, 2 + d); the wind's is positive."""
+        """Return s equally likely sets of coefficients from the posterior, (s, 2 + d).
+
+        The coefficient of the wind is positive.
+        """
         return self._posterior.sample(self._mode)
 
 
 def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionFit | None = None) -> RegressionFit:
-    """Fit the regression of flight outcomes with each prior of the draws' coefficients; return the most probable fit.
+    """Fit the regression of flight outcomes, and return the most probable fit.
+
+    A fit is made with each prior of the draws' coefficients.
 
     link: link function between the predictor and the probability of failure.
     nearby_fit: a fit of the same coefficients, whose mode is an additional start; the posterior of margins only may
@@ -462,7 +467,7 @@ class _Posterior:
         return self.coefficients(constants(points))[:, : self.size]
 
     def slope_and_curvature(self, point: Floats) -> tuple[Floats, Floats]:
-        """Return the gradient (k,) and the Hessian (k, k) of the negative log-density at a point (k,)."""
+        """Return the gradient (k,) and Hessian (k, k) of the negative log-density at a point (k,)."""
         beta, scale = self.coefficients(point), np.ones(point.size)
         predictor, terms = self._terms @ beta, self._terms
         first, second = self._link.derivatives(predictor, self._outcomes.failed)

@@ -45,7 +45,9 @@ class Tally(NamedTuple):
 
 
 def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return the exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934), of at least ``confidence``.
+    """Return the exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934).
+
+    Its coverage is at least ``confidence``.
 
     >>> [round(bound, 4) for bound in clopper_pearson(299, 299)]
     [0.9877, 1.0]
@@ -54,7 +56,9 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return Wilson's score interval (JASA 22, 1927), for pictures: its mean coverage is near ``confidence``.
+    """Return Wilson's score interval (JASA 22, 1927), which is used in pictures.
+
+    Its mean coverage is near ``confidence``.
 
     >>> [round(bound, 4) for bound in wilson(8, 10)]
     [0.4902, 0.9433]
@@ -63,7 +67,9 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
 
 
 def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
-    """Return Clopper and Pearson's one-sided lower bound: 299 flights without failure give P >= 0.99 at 95 %.
+    """Return Clopper and Pearson's one-sided lower bound of the probability of success.
+
+    299 flights without a failure give P >= 0.99 at 95 %.
 
     >>> round(lower_bound(Tally(299, 0)), 4), round(lower_bound(Tally(298, 0)), 4)
     (0.99, 0.99)
@@ -74,7 +80,7 @@ def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
 
 
 def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
-    """Return Clopper and Pearson's one-sided upper bound.
+    """Return Clopper and Pearson's one-sided upper bound of the probability of success.
 
     >>> round(upper_bound(Tally(0, 10)), 4)
     0.2589
@@ -85,7 +91,10 @@ def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
 
 
 def _binomial_interval(successes: int, trials: int, confidence: float, method: str) -> Interval:
-    """Return a two-sided interval of a success probability; 0 to 1 without trials.  method: as in scipy's binomtest."""
+    """Return a two-sided interval of a success probability; 0 to 1 without trials.
+
+    method: method of the interval, as in scipy's binomtest.
+    """
     from scipy.stats import binomtest
 
     if not trials:
@@ -156,7 +165,12 @@ class StoppingBound:
 
     @staticmethod
     def _mixture_parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
-        """Return weight, a and b of two beta distributions: one for a high success probability, and Jeffreys' prior."""
+        """Return the two parts of the mixture: a beta distribution near 1, and Jeffreys' prior.
+
+        A part is weight, a and b.
+
+        scale, failures: a and b of the first part.
+        """
         return (1.0 - _JEFFREYS_WEIGHT, scale, max(failures, 1e-9)), (_JEFFREYS_WEIGHT, 0.5, 0.5)
 
     def evidence(self, successes: int, failures: int, p: float) -> float:
@@ -169,7 +183,7 @@ class StoppingBound:
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded, and the fraction of successes is above p, or below p if `above` is False."""
+        """Return True if p is excluded by a fraction of successes above p, or below p if `above` is False."""
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
@@ -198,7 +212,10 @@ class StoppingBound:
         return excluded
 
     def bounds(self, tally: Tally) -> Interval:
-        """Return the interval for a tally: from lost flights as failures up to lost flights as successes."""
+        """Return the interval for a tally, in which lost flights count against either bound.
+
+        Lost flights are failures for the lower bound, and successes for the upper bound.
+        """
         lower = self.interval(tally.flyable, tally.failed + tally.lost).low
         upper = self.interval(tally.flyable + tally.lost, tally.failed).high
         return Interval(lower, upper)
@@ -330,9 +347,11 @@ _MAX_GROUPS = 64
 
 
 def first_order_index(x: Floats, y: Floats) -> float:
-    """Return the first-order sensitivity index: the fraction of the variance of y (n,) that x (n,) explains, 0 to 1.
+    """Return the first-order sensitivity index: the fraction of y's variance that x explains, 0 to 1.
 
     Returns 0 for fewer than `MIN_FLIGHTS_FOR_INDEX` values, or if x or y does not vary.
+
+    x, y: (n,).
 
     >>> random = np.random.default_rng(1)
     >>> x = random.random((4000, 2))

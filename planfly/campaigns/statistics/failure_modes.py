@@ -41,12 +41,12 @@ _GRID_ABOVE_MPS = 10.0
 
 
 @dataclass(frozen=True)
-class FailureLaws:
-    """Distributions of the wind at which a flight fails, on the grid: n distributions, the normal ones first.
+class FailureWindDistributions:
+    """Distributions of the wind at which a flight fails, on a grid of parameters.
 
-    location, scale: parameters of the distributions, m/s, (n,); mean and standard deviation of a normal distribution.
-    normal_count: number of normal distributions; the others are Gumbel distributions with the same means and standard
-        deviations.
+    location, scale: parameters of the n distributions, m/s, (n,); mean and standard deviation of a normal distribution.
+    normal_count: number of normal distributions, which come first; the others are Gumbel distributions with the same
+        means and standard deviations.
     """
 
     location: Floats
@@ -54,8 +54,8 @@ class FailureLaws:
     normal_count: int
 
     @classmethod
-    def for_winds_up_to(cls, max_speed: float) -> "FailureLaws":
-        """Return normal and Gumbel distributions of the wind at which a flight fails, on a grid of parameters.
+    def on_grid(cls, max_speed: float) -> "FailureWindDistributions":
+        """Return normal and Gumbel distributions on a grid of mean and standard deviation.
 
         max_speed: strongest wind of the search, m/s.
         """
@@ -173,7 +173,10 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
 
 
 def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
-    """Return a failure mode with the coefficients of a fit.  log_evidence: evidence of failures and margins."""
+    """Return a failure mode with the coefficients of a fit.
+
+    log_evidence: evidence of failures and margins.
+    """
     return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.margin_coefficient)
 
 
@@ -182,9 +185,9 @@ WIND_ORIGIN_MPS = 10.0
 
 
 def make_regressors(speeds: Floats | float, draws: Floats) -> Floats:
-    """Return the regressors of n flights: a constant 1, the wind speed minus an origin, and the draws, (n, 2 + d).
+    """Return the regressors of n flights, (n, 2 + d).
 
-    The origin is `WIND_ORIGIN_MPS`.
+    They are a constant 1, the wind speed minus `WIND_ORIGIN_MPS`, and the draws.
 
     speeds: wind speeds, m/s, (n,) or a single value for all flights.
     draws: drawn quantities, in standard deviations from their means, (n, d).
@@ -242,9 +245,11 @@ def fit_modes(
 
 
 def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats:
-    """Return the probability that each flight fails in any mode, (n,), from the mean coefficients of the modes.
+    """Return the probability that each flight fails in any mode, (n,).
 
-    terms: terms of each flight, (n, 2 + d).
+    It follows from the mean coefficients of the modes.
+
+    terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
     success: Floats = np.ones(len(terms))
     for mode in modes:
@@ -253,9 +258,11 @@ def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats
 
 
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> float:
-    """Find by bisection the wind, m/s, in which a fraction of the draws (m, d) is expected to fail.
+    """Find by bisection the wind in which a fraction of the draws is expected to fail, m/s.
 
     Returns `max_speed` if a smaller fraction is expected to fail there.
+
+    draws: (m, d).
     """
     mode_predictors = [
         (mode.link, make_regressors(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
@@ -304,9 +311,9 @@ def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) 
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
-    """Return the derivatives of the boundary with respect to the coefficients of each mode, arrays (2 + d,), m/s.
+    """Return the derivatives of the boundary with respect to each mode's coefficients.
 
-    The derivatives follow from the implicit function theorem.
+    They are arrays (2 + d,), m/s, and follow from the implicit function theorem.
 
     draws: (m, d).
     speed: wind speed at the boundary, m/s.

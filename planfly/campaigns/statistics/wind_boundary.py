@@ -3,7 +3,7 @@
 If some flights were flyable and some failed, the fraction of flights that fail in a wind is the mean of the failure
 modes over the possible draws, and the boundary is the wind in which this fraction is 1 - P (`boundary_quantiles`).  The
 links are equally likely a priori, and are weighted by their evidence.  If all flights were flyable, or all failed,
-`FailureLaws` are used.
+`FailureWindDistributions` are used.
 """
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
@@ -15,8 +15,8 @@ import numpy as np
 from planfly.campaigns.statistics.censored_regression import LINKS
 from planfly.campaigns.statistics.failure_modes import (
     WIND_ORIGIN_MPS,
-    FailureLaws,
     FailureMode,
+    FailureWindDistributions,
     boundary_slopes,
     boundary_speed,
     failure_probabilities,
@@ -134,7 +134,9 @@ class _FailureFractions:
 
 @dataclass
 class DrawnNumbers:
-    """Draws of the quantities that vary between flights, other than the wind, in standard deviations from the means.
+    """Draws of the quantities that vary between flights, other than the wind.
+
+    Draws are in standard deviations from the means.
 
     population: (m, d) evenly spread possible draws; each represents the same share of flights.
     draw: function of start and stop index that returns the draws of these flights, (stop - start, d).
@@ -144,8 +146,8 @@ class DrawnNumbers:
     draw: Callable[[int, int], Floats]
     _known: list[Floats] = field(default_factory=list)
 
-    def first(self, count: int) -> Floats:
-        """Return the first `count` draws, (count, d); draws are computed once and kept."""
+    def first_draws(self, count: int) -> Floats:
+        """Return the first `count` draws, (count, d); each draw is computed only once."""
         known_count = sum(len(block) for block in self._known)
         if known_count < count:
             self._known.append(self.draw(known_count, max(count, known_count + 500)))
@@ -225,7 +227,7 @@ class Direction:
         self.margin.append(margin)
 
     @property
-    def all_flew(self) -> bool:
+    def all_flyable(self) -> bool:
         """True if no flight failed."""
         return not any(self.failed_modes)
 
@@ -240,7 +242,7 @@ class Direction:
         The direction must have both failed and flyable flights.
         """
         if self._fits is None or self._fits[0] != len(self.speeds):
-            terms = make_regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
+            terms = make_regressors(np.array(self.speeds), self.numbers.first_draws(max(self.draws) + 1)[self.draws])
             modes_by_link = [fit_modes(terms, self.failed_modes, link, self.margin) for link in LINKS]
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
@@ -254,7 +256,10 @@ class Direction:
         return self._fits[1]
 
     def _make_fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
-        """Return a fit with its boundary and the boundary's derivatives.  weight: probability of the link function."""
+        """Return the fit of a link with its boundary and the boundary's derivatives.
+
+        weight: probability of the link function.
+        """
         draws = self.numbers.population
         speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
         return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
@@ -272,9 +277,9 @@ class Direction:
         """
         tail, failing_fraction = 0.5 * (1.0 - self.confidence), 1.0 - self.target
         probabilities = (tail, 0.5, 1.0 - tail)
-        if self.all_flew or self.all_failed:
-            is_flyable = np.full(len(self.speeds), self.all_flew)
-            lower, median, upper = self._failure_laws.posterior_quantiles(
+        if self.all_flyable or self.all_failed:
+            is_flyable = np.full(len(self.speeds), self.all_flyable)
+            lower, median, upper = self._failure_distributions.posterior_quantiles(
                 failing_fraction, np.array(self.speeds), is_flyable, np.array(probabilities)
             )
         else:
@@ -285,13 +290,13 @@ class Direction:
         return WindBoundary(median, lower, upper, median >= self.max_speed - 1e-9)
 
     @cached_property
-    def _failure_laws(self) -> FailureLaws:
+    def _failure_distributions(self) -> FailureWindDistributions:
         """Distributions that replace the regression while all flights have the same outcome."""
-        return FailureLaws.for_winds_up_to(self.max_speed)
+        return FailureWindDistributions.on_grid(self.max_speed)
 
 
 def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, min_flights: int) -> bool:
-    """Return True if a direction needs more flights: too few, or an interval wider than twice the accuracy.
+    """Return True if a direction has too few flights, or an interval wider than twice the accuracy.
 
     >>> needs_more_flights(WindBoundary(9.0, 8.8, 9.2, False), 40, 0.5, 30)
     False
@@ -334,7 +339,7 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     As long as all flights have the same outcome, the wind is found by bisection; after that, the flights are chosen
     that are expected to reduce the variance of the boundary most.
     """
-    if direction.all_flew or direction.all_failed:
+    if direction.all_flyable or direction.all_failed:
         speed = _bisect_speed(direction)
         draws = _extreme_draws(direction) if speed == direction.max_speed else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
@@ -370,13 +375,16 @@ def _next_draws(direction: Direction, count: int, other_draws: list[int]) -> lis
 
 def _extreme_draws(direction: Direction) -> list[int]:
     """Return the draws with the largest and the smallest value of each quantity that have not been flown."""
-    numbers = direction.numbers.first(_EXTREME_DRAW_POOL)
+    numbers = direction.numbers.first_draws(_EXTREME_DRAW_POOL)
     extreme_draws = [int(select(numbers[:, k])) for k in range(numbers.shape[1]) for select in (np.argmax, np.argmin)]
     return [draw for draw in dict.fromkeys(extreme_draws) if draw not in set(direction.draws)]
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return the wind (m/s) and the draw of `count` flights; each is chosen as if the previous ones had been flown."""
+    """Return the wind (m/s) and the draw of the `count` most informative flights of a direction.
+
+    Each flight is chosen as if the previous ones had been flown.
+    """
     fits, max_speed, flown_count = direction.fits(), direction.max_speed, len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
@@ -392,7 +400,7 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
     for number in range(flown_count, flown_count + count):
         used_draws = [draw for _, draw in flights]
         draws = _next_draws(direction, 1 if number % _NEXT_DRAW_INTERVAL == 0 else draw_count, used_draws)
-        draw_values = direction.numbers.first(max(draws) + 1)[draws]
+        draw_values = direction.numbers.first_draws(max(draws) + 1)[draws]
         terms = make_regressors(np.repeat(speeds, len(draws)), np.tile(draw_values, (speeds.size, 1)))
         best_index = int(
             np.argmax(sum(posterior.expected_gains(terms) for posterior in posteriors) + _gains_between(fits, terms))
@@ -404,11 +412,12 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return the expected reduction of the boundary's variance between fits by each flight, (n,), (m/s)^2.
+    """Return by how much each flight is expected to reduce the variance between the fits, (n,).
 
-    The outcome of a flight makes one of the fits more likely.  The reduction is the variance of the mean boundary
-    given the outcome.
-    terms: terms of each flight, (n, 2 + d).
+    The outcome of a flight makes one of the fits more likely.  The reduction, (m/s)^2, is the variance of the mean
+    boundary given the outcome.
+
+    terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
     weights, speeds = (np.array(column) for column in zip(*((fit.weight, fit.speed) for fit in fits), strict=True))
     deviations = speeds - weights @ speeds
@@ -427,9 +436,11 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return the expected reduction of the boundary's variance within the fit by each flight, (n,), (m/s)^2.
+        """Return by how much each flight is expected to reduce the boundary's variance, (n,), (m/s)^2.
 
-        terms: terms of each flight, (n, 2 + d).
+        Only the variance within the fit is considered.
+
+        terms: regressors of each flight, (n, 2 + d).
         """
         expected_gains: Floats = np.zeros(len(terms))
         for k, information in enumerate(self._mode_information(terms)):
@@ -451,7 +462,10 @@ class _ExpectedPosterior:
             )
 
     def _mode_information(self, terms: Floats) -> Iterator[Floats]:
-        """Yield for each mode the Fisher information of flights, (n,); a failure in an earlier mode leaves none."""
+        """Yield for each mode the Fisher information of flights, (n,).
+
+        A failure in an earlier mode leaves no information on a later mode.
+        """
         reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
             predictor = terms @ mode.mean

@@ -14,9 +14,9 @@ from planfly.campaigns.campaign_result import (
     DEFAULT_FLIGHTS,
     MAX_FLIGHTS,
     CampaignResult,
-    campaign_line,
+    campaign_command_line,
     make_goal,
-    winds_line,
+    winds_command_line,
 )
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.flight_row import STATION_COUNT
@@ -45,7 +45,7 @@ def test_a_campaigns_line_is_read_as_the_same_options(words: str) -> None:
     parse = build_parser().parse_args
     asked = parse(["campaign", "my plan.json", *shlex.split(words)])
     goal = make_goal(asked.flights, asked.prove, asked.at_least, asked.confidence)
-    line = shlex.split(campaign_line(asked.target, goal, repeated_options(asked)))
+    line = shlex.split(campaign_command_line(asked.target, goal, repeated_options(asked)))
     again = parse(line[1:])
     assert line[:3] == ["planfly", "campaign", "my plan.json"]
     assert make_goal(again.flights, again.prove, again.at_least, again.confidence) == goal
@@ -59,7 +59,7 @@ def test_a_searchs_line_is_read_as_the_same_options(words: str) -> None:
     parse = build_parser().parse_args
     asked = parse(["winds", "jacksboro-air", *shlex.split(words)])
     goal = WindsGoal(asked.prove, asked.confidence, asked.directions, asked.most, asked.flights or 5000)
-    again = parse(shlex.split(winds_line(asked.target, goal, repeated_options(asked)))[1:])
+    again = parse(shlex.split(winds_command_line(asked.target, goal, repeated_options(asked)))[1:])
     assert (again.prove, again.confidence, again.directions, again.most) == (
         asked.prove,
         asked.confidence,
@@ -107,9 +107,9 @@ def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     assert list(flights["flight"]) == list(range(60))
     assert list(flights["outcome"]).count("lost") == 1
     assert "clearance" not in flights
-    assert result.shapes()["clearance"].shape == (60, STATION_COUNT)
+    assert result.path_arrays()["clearance"].shape == (60, STATION_COUNT)
     with pytest.raises(ValueError, match="has no folder; name one with `out`"):
-        CampaignResult(summary, result.columns).shapes()
+        CampaignResult(summary, result.columns).path_arrays()
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def fly(direction: Direction, flights: int, outcome: Fly, together: int = 3) -> 
     """Fly so many more, a few at a time."""
     for _ in range(flights // together):
         for speed, draw in next_flights(direction, together):
-            direction.add(speed, draw, outcome(speed, direction.numbers.first(draw + 1)[draw]))
+            direction.add(speed, draw, outcome(speed, direction.numbers.first_draws(draw + 1)[draw]))
 
 
 def above(limit: Callable[[], float]) -> Fly:

@@ -9,8 +9,8 @@ from scipy.stats import gumbel_l, norm
 
 from planfly.campaigns.statistics.censored_regression import LINKS, PROBIT, BinaryLink, Outcomes, fit_regression
 from planfly.campaigns.statistics.failure_modes import (
-    FailureLaws,
     FailureMode,
+    FailureWindDistributions,
     boundary_slopes,
     boundary_speed,
     failure_fraction,
@@ -26,7 +26,7 @@ PARTS = np.array([0.025, 0.5, 0.975])
 @pytest.mark.parametrize("speed", [6.0, 12.0, 19.0])
 def test_the_laws_are_scipys(speed: float) -> None:
     """Means, spreads, probabilities and quantiles of both."""
-    laws = FailureLaws.for_winds_up_to(20.0)
+    laws = FailureWindDistributions.on_grid(20.0)
     fails, flies = laws.log_probabilities(speed)
     assert laws.location.size == 2 * laws.normal_count
     for k in range(0, laws.normal_count, 997):
@@ -43,13 +43,13 @@ def test_a_law_that_flights_follow_is_found() -> None:
     law = norm(9.0, 1.0)
     speeds = np.repeat(np.arange(4.0, 14.0, 0.5), 100)
     flew = speeds < law.rvs(speeds.size, random_state=np.random.default_rng(2))
-    low, middle, high = FailureLaws.for_winds_up_to(20.0).posterior_quantiles(0.1, speeds, flew, PARTS)
+    low, middle, high = FailureWindDistributions.on_grid(20.0).posterior_quantiles(0.1, speeds, flew, PARTS)
     assert low < law.ppf(0.1) < high
     assert middle == pytest.approx(law.ppf(0.1), abs=0.25)
 
 
 def test_the_more_flew_the_further_the_boundary() -> None:
-    laws = FailureLaws.for_winds_up_to(20.0)
+    laws = FailureWindDistributions.on_grid(20.0)
     few, many = (laws.posterior_quantiles(0.01, np.full(n, 20.0), np.full(n, True), PARTS) for n in (10, 300))
     assert (many > few).all()
     # 299 of 299 show a share of 1 % with 95 % confidence: by any law the boundary is beyond, or as good as.

@@ -165,7 +165,7 @@ def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
         together = 12 if SOAK else 30
         for _ in range(300 // together):
             for speed, draw in next_flights(direction, together):
-                drawn = direction.numbers.first(draw + 1)[draw]
+                drawn = direction.numbers.first_draws(draw + 1)[draw]
                 failed = drawn[0] + 0.1 * random.normal() > 2.0 - 0.25 * (speed - 10.0)
                 margin = abs(random.normal(0.8, 0.2))
                 direction.add(

@@ -37,7 +37,7 @@ def test_draws_are_the_next_ones_and_none_twice() -> None:
     direction = Direction(20.0, 0.99, normal_numbers(2, 1))
     fly(direction, 45, lambda *_: frozenset())
     assert direction.draws[:18] == list(range(18))
-    numbers = direction.numbers.first(2000)
+    numbers = direction.numbers.first_draws(2000)
     extreme = {int(pick(numbers[:, k])) for k in (0, 1) for pick in (np.argmin, np.argmax)}
     assert set(direction.draws[18:22]) == extreme
     assert direction.draws[22:] == [k for k in range(18, 60) if k not in extreme][:23]
@@ -61,7 +61,7 @@ def test_draws_that_tell_are_chosen_and_every_third_is_not() -> None:
         return frozenset({"slope"}) if random.normal() < -4.0 + 0.5 * (speed - 10.0) + 2.0 * drawn[0] else frozenset()
 
     fly(direction, 240, outcome, together=12)
-    numbers = np.abs(direction.numbers.first(5000)[direction.draws])
+    numbers = np.abs(direction.numbers.first_draws(5000)[direction.draws])
     chosen, plain = numbers[[k for k in range(60, 240) if k % 3]], numbers[60::3]
     assert chosen[:, 0].mean() > 1.1
     assert plain[:, 0].mean() == pytest.approx(0.8, abs=0.2)
@@ -152,7 +152,7 @@ def test_what_is_chosen_tells_more_than_what_comes() -> None:
     # 10 + (4 + 2.236 z) / 0.5, where Phi(z) is 0.01.
     truth = 10.0 + (4.0 + np.sqrt(5.0) * norm.ppf(0.01)) / 0.5
     for draw in range(flights):
-        plain.add(truth + (draw % 3), draw, outcome(truth + (draw % 3), plain.numbers.first(draw + 1)[draw]))
+        plain.add(truth + (draw % 3), draw, outcome(truth + (draw % 3), plain.numbers.first_draws(draw + 1)[draw]))
     assert chosen.boundary().low < truth < chosen.boundary().high
     assert chosen.boundary().estimate == pytest.approx(truth, abs=0.6)
     assert plain.boundary().width > 1.5 * chosen.boundary().width
