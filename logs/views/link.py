@@ -54,7 +54,7 @@ def link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
 
 def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapChart:
     """Return the path from above by the quality of the link, and the station.  antenna: (3,) m."""
-    scenario, route, points = setup.scenario, setup.route.waypoints, along.points
+    scenario, route, points = setup.scenario, setup.route.positions, along.points
     qualities = [link_quality(float(margin)) for margin in points.margin]
     segments = []
     for quality, group in groupby(range(len(qualities)), lambda k: qualities[k]):

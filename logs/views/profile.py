@@ -53,7 +53,7 @@ def profile_chart(
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
-    >>> route = setup.route.waypoints
+    >>> route = setup.route.positions
     >>> chart = profile_chart(
     ...     setup.scenario, plan_waypoints=None, route_waypoints=route, track=None, verdict=None
     ... )

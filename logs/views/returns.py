@@ -51,7 +51,7 @@ def path_layers(
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
     """Return the path from above, coloured by the outcome of returns, and the paths of the worst returns."""
-    scenario, route = setup.scenario, setup.route.waypoints
+    scenario, route = setup.scenario, setup.route.positions
     limit = drawn_returns.returns.limit
 
     def return_text(ret: SimulatedReturn) -> str:

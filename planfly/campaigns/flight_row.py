@@ -88,7 +88,7 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
     Each track point is assigned to the nearest point of the leg that was flown at that time.
     """
-    starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
+    starts, ends = route.positions[:-1, :2], route.positions[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
     leg_starts = np.concatenate([[0.0], np.cumsum(lengths)])
     leg = np.clip(track.leg, 0, len(lengths) - 1)
@@ -107,7 +107,7 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
     A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are omitted, because their
     number differs between flights. Right is relative to the mean of the incoming and outgoing courses.
     """
-    points = route.waypoints
+    points = route.positions
     crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
     steps = np.diff(points[:, :2], axis=0)
     courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
