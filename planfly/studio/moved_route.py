@@ -71,6 +71,8 @@ def update_moved_route(
         if any(int(route.items[k]) not in waypoint_seqs or route.arc_radii[k] for k in neighbours):
             return None
         positions[row] = new_position
+        if not math.isnan(points["above_ground"][row]):
+            points["above_ground"][row] = new_item.alt
         points["acceptance_radius"][row] = min(max(0.0, new_item.params[1]), rules.acceptance_limit)
         changed_rows |= {row, *neighbours}
     if any(_is_near_previous(array, k) for array in (positions, route.positions) for k in changed_rows if k):
