@@ -137,7 +137,7 @@ def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
 
 def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
     """Return starts (l, 2), unit courses (l, 2) and lengths (l,) of a route's legs, m."""
-    points = setup.route.waypoints[:, :2]
+    points = setup.route.positions[:, :2]
     steps = np.diff(points, axis=0)
     runs = np.hypot(steps[:, 0], steps[:, 1])
     return points[:-1], steps / runs[:, np.newaxis], runs

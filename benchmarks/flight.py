@@ -108,7 +108,7 @@ def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: f
             for air in (climb, -abs(descent))
         )
         step[2] = run * min(most, max(least, step[2] / run))
-    route = replace(setup.route, waypoints=waypoints[0] + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]))
+    route = setup.route.with_fields(position=waypoints[0] + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]))
     return replace(setup, route=route)
 
 
@@ -159,7 +159,7 @@ def flown_with(gains: Gains) -> Iterator[None]:
 
 def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEAR) -> float:
     """Return the RMS distance (m) of the true track from the legs, more than ``clear`` from their corners."""
-    waypoints, track, found = setup.route.waypoints, flown.track, []
+    waypoints, track, found = setup.route.positions, flown.track, []
     for leg in range(len(waypoints) - 1):
         step = (waypoints[leg + 1] - waypoints[leg])[:2]
         run = float(np.hypot(*step))

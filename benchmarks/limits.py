@@ -13,7 +13,7 @@ from benchmarks.flight import flown_with
 from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
-from flight.mission.route import Route
+from flight.mission.route import Route, route_points
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
@@ -95,9 +95,7 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
         "flight": {"aircraft": aircraft.name},
         "wind": {"speed_mps": wind, "from_deg": math.degrees(wind_from)},
     }
-    count = len(waypoints)
-    speeds = np.full(count - 1, aircraft.airspeed)
-    route = Route(waypoints, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
+    route = Route(route_points(waypoints, aircraft.airspeed, item=np.arange(len(waypoints))), "")
     battery = aircraft.battery_energy / 3600.0
     scenario = scenario_from_spec(spec, "limits", external=True)
     return FlightSetup(

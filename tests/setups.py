@@ -16,7 +16,7 @@ from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
-from flight.mission.route import Route
+from flight.mission.route import Route, route_points
 from flight.simulation.setup import FlightSetup, make_limits
 from planner.plan import Plan
 from world.arrays import Floats
@@ -56,10 +56,8 @@ def route_along(
 ) -> Route:
     """A route of waypoints (w, 3), no two of one mission item; speeds: m/s, one or one a leg."""
     way = np.array(points, dtype=np.float64)
-    over = np.zeros(len(way), dtype=bool)
-    over[list(fly_over)] = True
-    airspeed = np.full(len(way) - 1, speeds, dtype=np.float64)
-    return Route(way, airspeed, np.zeros(len(way)), over, np.arange(len(way)), started)
+    numbers = np.arange(len(way))
+    return Route(route_points(way, speeds, fly_over=np.isin(numbers, fly_over), item=numbers), started)
 
 
 def setup_along(
@@ -124,7 +122,7 @@ def setup_maker(aircraft: Aircraft) -> MakeSetup:
             scenario,
             route,
             envelope,
-            airspeed=float(route.airspeed[0]),
+            airspeed=float(route.leg_airspeeds[0]),
             bank_deg=bank_deg,
             aircraft=aircraft.name,
             battery=888.0,

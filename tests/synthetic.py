@@ -129,9 +129,9 @@ def fly_path(
     place = path[:, 1:3] + side[:, None] * right
     heights = heights if up is None else heights + up(s)
     speed = np.full_like(s, setup.airspeed) + (0.0 if airspeed is None else airspeed(s))
-    if setup.route.airspeed.min() != setup.route.airspeed.max():
+    if setup.route.leg_airspeeds.min() != setup.route.leg_airspeeds.max():
         leg = np.clip(np.searchsorted(stations, s, side="right") - 1, 0, setup.route.legs - 1)
-        speed = setup.route.airspeed[leg] + (0.0 if airspeed is None else airspeed(s))
+        speed = setup.route.leg_airspeeds[leg] + (0.0 if airspeed is None else airspeed(s))
     wind = setup.scenario.wind.velocities_at(np.asarray(heights, dtype=np.float64))
     ground = _ground_speed(speed * np.cos(slopes), course, wind)
     moved = np.hypot(*np.diff(place, axis=0).T)
@@ -211,7 +211,7 @@ def _horizontal(
     setup: FlightSetup, radius: float | Sequence[float] | None
 ) -> tuple[Floats, Floats, list[tuple[float, float]]]:
     """Rows of distance, east, north, course every 0.25 m; each waypoint's distance; each arc's start and end."""
-    points = setup.route.waypoints
+    points = setup.route.positions
     courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
     inner = len(points) - 2
     if radius is None:
@@ -254,7 +254,7 @@ def _heights(
     setup: FlightSetup, stations: Floats, arcs: list[tuple[float, float]], blend: float, s: Floats
 ) -> tuple[Floats, Floats]:
     """Height and slope angle at distances s: the legs' own lines, joined across each arc by a cubic."""
-    points = setup.route.waypoints
+    points = setup.route.positions
     runs = leg_runs(points)
     rise = np.diff(points[:, 2]) / runs
     up, slope = np.empty_like(s), np.empty_like(s)

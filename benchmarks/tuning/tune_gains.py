@@ -100,7 +100,7 @@ def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:
 def speed_error(case: Case, flown: SimulatedFlight) -> float:
     """Return the RMS over the legs of the mean airspeed error in the second half of a leg, m/s."""
     track, errors = flown.track, []
-    for leg, command in enumerate(case.setup.route.airspeed):
+    for leg, command in enumerate(case.setup.route.leg_airspeeds):
         airspeed = track.airspeed[track.leg == leg].astype(np.float64)
         errors.append(float(airspeed[airspeed.size // 2 :].mean()) - command if airspeed.size else 0.0)
     return math.sqrt(float(np.mean(np.square(errors))))

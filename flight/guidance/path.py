@@ -233,16 +233,16 @@ def fly_by_path(
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from flight.mission.route import route_points
     >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
     >>> way = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 520.0]])
-    >>> no = np.zeros(3, dtype=bool)
-    >>> path = fly_by_path(Route(way, np.full(2, 25.0), np.zeros(3), no, np.arange(3), ""), limits)
+    >>> path = fly_by_path(Route(route_points(way, 25.0), ""), limits)
     >>> path.pieces["length"].round().tolist(), round(1.0 / path.pieces["curvature"][1])
     ([883.0, 183.0, 883.0], 117)
     """
-    points = route.waypoints
+    points = route.positions
     courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, fly_over_turn)
     tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, leg_lengths, turns)
     return_lengths *= fly_over_turn != "none"
@@ -254,7 +254,7 @@ def fly_by_path(
     for leg in range(route.legs):
         straight_length = leg_lengths[leg] - tangents[leg] - return_lengths[leg] - tangents[leg + 1]
         course = float(courses[leg])
-        if terrain is not None and math.isfinite(route.above_ground[leg + 1]):
+        if terrain is not None and math.isfinite(route.points["above_ground"][leg + 1]):
             nodes += _ground_following_corners(route, terrain, leg, piece_start, course, distance, straight_length)
         if straight_length > 1e-6 or not pieces:
             pieces.append((distance, straight_length, *piece_start, course, 0.0, leg, math.inf))
@@ -289,18 +289,19 @@ def fly_by_path(
 def reversals(route: Route) -> NDArray[np.int64]:
     """Return the indices of fly-over waypoints at which the course reverses, so that the turn may go to either side.
 
+    >>> from flight.mission.route import route_points
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])
-    >>> reversals(Route(way, np.full(3, 25.0), np.zeros(4), over, np.arange(4), "")).tolist()
+    >>> reversals(Route(route_points(way, 25.0, fly_over=over), "")).tolist()
     [1]
     """
-    turns = np.concatenate([[0.0], np.abs(signed_turns(route.waypoints)), [0.0]])
+    turns = np.concatenate([[0.0], np.abs(signed_turns(route.positions)), [0.0]])
     return np.flatnonzero(route.fly_over & (turns > math.pi - REVERSAL_SIDE_TOLERANCE_RAD))
 
 
 def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
     """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; see `fly_by_path`."""
-    turns = signed_turns(route.waypoints)
+    turns = signed_turns(route.positions)
     if fly_over_turn == "long":
         corners = reversals(route) - 1
         turns[corners] -= np.copysign(2.0 * math.pi, turns[corners])
@@ -319,7 +320,7 @@ def _ground_following_corners(
     start_distance: distance of this start along the path, m.
     length: length of the straight part, m.
     """
-    leg_start, end_height = route.waypoints[leg], float(route.above_ground[leg + 1])
+    leg_start, end_height = route.positions[leg], float(route.points["above_ground"][leg + 1])
     start_height = float(leg_start[2]) - float(terrain.height(leg_start[0], leg_start[1]))
     if not math.isfinite(start_height):
         start_height = end_height
@@ -330,7 +331,7 @@ def _ground_following_corners(
             segment_start[1] + distance_along * math.cos(course),
         )
         fraction = math.hypot(east - leg_start[0], north - leg_start[1]) / math.dist(
-            leg_start[:2], route.waypoints[leg + 1, :2]
+            leg_start[:2], route.positions[leg + 1, :2]
         )
         ground_altitude = float(terrain.height(east, north))
         if math.isfinite(ground_altitude):
@@ -352,15 +353,15 @@ def _arcs_at_waypoints(
     waypoint is the length of the next leg up to the point where the path joins that leg; it is 0 if the leg is too
     short.
     """
-    count = len(route.waypoints)
+    count = len(route.points)
     tangents, radii, return_lengths = np.zeros(count), np.zeros(count), np.zeros(count)
     for i in range(1, count - 1):
         turn = abs(float(turns[i - 1]))
         if turn < 1e-6:
             continue
-        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
-        radius = float(route.arcs[i]) or limits.turn_radius(
-            float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed
+        speed = float(max(route.leg_airspeeds[i - 1], route.leg_airspeeds[i]))
+        radius = float(route.arc_radii[i]) or limits.turn_radius(
+            float(courses[i - 1]), float(courses[i]), float(route.positions[i, 2]), speed
         )
         if not route.fly_over[i]:
             tangents[i] = tangent_length(turn, radius)
@@ -427,7 +428,7 @@ def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route:
     slopes = np.diff(altitudes) / np.diff(distances)
     next_slopes = np.concatenate([slopes, slopes[-1:]])
     slope_changes = np.concatenate([[0.0], np.diff(slopes), [0.0]])
-    speed = float(route.airspeed.max()) + limits.wind.max_speed_at(route.waypoints[:, 2])
+    speed = float(route.leg_airspeeds.max()) + limits.wind.max_speed_at(route.positions[:, 2])
     half_lengths = np.abs(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
     gaps = np.diff(distances)
     max_half_lengths = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
@@ -445,36 +446,38 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     mission: mission of the route, which states how its loiters end; with None all loiters end after their turns.
     fly_over: True if the scenario requires fly-over at waypoints without an acceptance radius.
     """
-    waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
-    waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
-    waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
+    points = route.points
+    waypoints: Records = np.zeros(len(points), WAYPOINT)
+    waypoints["east"], waypoints["north"], waypoints["up"] = points["position"].T
+    waypoints["turn"][1:-1] = np.abs(signed_turns(points["position"]))
     # An acceptance radius stated by the item has priority over the scenario.
-    waypoints["fly_over"] = fly_over & (route.acceptance == 0.0) & (route.arcs == 0.0)
-    waypoints["acceptance"] = route.acceptance
+    waypoints["fly_over"] = fly_over & (points["acceptance_radius"] == 0.0) & (points["arc_radius"] == 0.0)
+    waypoints["acceptance"] = points["acceptance_radius"]
     items = {} if mission is None else {item.seq: item for item in mission.items}
     waypoints["pass_by"] = [pass_by_distance(items[seq]) if seq in items else 0.0 for seq in route.items.tolist()]
-    waypoints["follows_terrain"] = np.isfinite(route.above_ground)
-    waypoints["above_ground"] = np.nan_to_num(route.above_ground)
-    waypoints["home_up"] = route.home_up
-    waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
-    waypoints["min_ground_speed"] = np.nan_to_num(route.min_ground_speed)
-    waypoints["up"] = route.waypoints[:, 2]
-    waypoints["item"], waypoints["stop"] = route.items, route.stops
+    waypoints["follows_terrain"] = np.isfinite(points["above_ground"])
+    waypoints["above_ground"] = np.nan_to_num(points["above_ground"])
+    waypoints["home_up"] = points["home_up"]
+    waypoints["airspeed"] = np.append(route.leg_airspeeds, route.leg_airspeeds[-1])
+    waypoints["min_ground_speed"] = np.nan_to_num(points["min_ground_speed"])
+    waypoints["item"], waypoints["stop"] = points["item"], points["stop"]
     _set_circles(waypoints[1:-1], route)
     _set_loiters(waypoints, items)
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["is_gate"] = np.isin(route.items, gates)
     waypoints["is_mission_end"][-1] = mission is not None and ends_at_plain_waypoint(route, mission)
-    if route.direct_landing_start >= 0:
+    last_before_return = route.rtl_start
+    if route.direct_landing_start is not None:
         waypoints["without_crosstrack"][route.direct_landing_start] = True
-    if route.rtl_loiter is not None:
+        if last_before_return is None:
+            last_before_return = route.direct_landing_start - 1
+    if route.rtl_loiter is not None and route.rtl_start is not None:
         return_waypoints = waypoints[route.rtl_start + 1 : route.rtl_end]
         return_waypoints["is_rtl"] = True
         names = ("centre_east", "centre_north", "up", "loiter_radius", "slope_base")
         for name, value in zip(names, route.rtl_loiter, strict=True):
             return_waypoints[name] = value
-    last_before_return = route.rtl_start if route.rtl_loiter is not None else route.direct_landing_start - 1
-    if last_before_return >= 0:
+    if last_before_return is not None and last_before_return >= 0:
         waypoints["turn"][last_before_return] = _turn_before_return(route, last_before_return, items)
         _set_exit_bearing(waypoints, last_before_return, items)
     _set_landing(waypoints, mission)
@@ -490,7 +493,7 @@ def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem])
     item = items.get(int(route.items[index]))
     if index == 0 or item is None or not item.has_position:
         return 0.5 * math.pi
-    return float(abs(wrap(_bearing_to_origin(item) - float(leg_courses(route.waypoints)[index - 1]))))
+    return float(abs(wrap(_bearing_to_origin(item) - float(leg_courses(route.positions)[index - 1]))))
 
 
 def _bearing_to_origin(item: MissionItem) -> float:
@@ -526,8 +529,8 @@ def _set_landing(waypoints: Records, mission: Mission | None) -> None:
 
 def _set_circles(corners: Records, route: Route) -> None:
     """Set radius, center and altitude of the loiter at each corner of a route; the radius is 0 without a loiter."""
-    turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
-    corners["loiter_radius"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
+    turns, courses = signed_turns(route.positions), leg_courses(route.positions)
+    corners["loiter_radius"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arc_radii[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.
     mid_course = courses[:-1] + 0.5 * turns
     signed_radius = corners["loiter_radius"] / np.cos(0.5 * turns)

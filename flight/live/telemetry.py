@@ -96,7 +96,7 @@ class SnapshotMaker:
 
     def start_snapshot(self, setup: FlightSetup) -> Snapshot:
         """Return the snapshot of an aircraft at the start of the route, on the course of its first leg."""
-        points = setup.route.waypoints
+        points = setup.route.positions
         first_leg = points[1] - points[0]
         terrain = setup.scenario.terrain
         ground = math.nan if terrain is None else float(terrain.height(points[0, 0], points[0, 1]))

@@ -181,10 +181,10 @@ def _find_take_off(
     if math.isnan(ground):
         return None, "[launch]: the terrain at home is unknown, so the flight begins in the air"
     # ArduPlane does not fly to the position of a take-off item: the next item is the first one.
-    first_leg = route.waypoints[index + 1, :2] - home_position
+    first_leg = route.positions[index + 1, :2] - home_position
     course = launch.course if launch.course is not None else math.atan2(first_leg[0], first_leg[1])
     home = np.array([*home_position, float(ground)])
-    end_altitude, pitch = float(route.waypoints[index, 2]), climb_pitch(item)
+    end_altitude, pitch = float(route.positions[index, 2]), climb_pitch(item)
     speed, acceleration = launch.release_speed(min_airspeed), launch.acceleration(min_airspeed)
     return TakeOff(launch, item.seq, home, course, end_altitude, base.up, pitch, index, speed, acceleration), ""
 
@@ -203,8 +203,8 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
         reason = "the mission does not end with two waypoints and a NAV_LAND at a third position"
         return None, f"[landing]: {reason}: its flight ends in the air"
     ground = route.landing_ground
-    leg_start, leg_end = route.waypoints[last_leg - 1], route.waypoints[last_leg]
-    if math.isnan(ground):
+    leg_start, leg_end = route.positions[last_leg - 1], route.positions[last_leg]
+    if ground is None:
         return None, "[landing]: the altitude of the landing point is unknown, so the flight ends in the air"
     if leg_start[2] <= ground:
         return None, "[landing]: the approach does not begin above the landing point, so the flight ends in the air"
@@ -228,14 +228,14 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
 
     The leg to the landing point is omitted; the numbers of legs and waypoints do not change.
     """
-    points = np.array(route.waypoints)
+    points = np.array(route.positions)
     if ground_phases.take_off is not None and first_leg_start is not None:
         points[: ground_phases.take_off.waypoint + 1] = first_leg_start
         # Earlier waypoints are not flown: place each slightly before the next, so that every leg has a length.
         for index in range(ground_phases.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
-    moved_route = replace(route, waypoints=points, notes=flown_notes(route, ground_phases))
+    moved_route = replace(route.with_fields(position=points), notes=flown_notes(route, ground_phases))
     return (
         moved_route
         if ground_phases.approach is None or ground_phases.approach.leg < 1
@@ -249,7 +249,7 @@ def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
     The first and last waypoints are on the ground where the take-off or landing is simulated.
     The route itself starts at the altitude at which a take-off ends, and its leg to a landing point is level.
     """
-    points = np.array(route.waypoints)
+    points = np.array(route.positions)
     if ground_phases.take_off is not None:
         points[ground_phases.take_off.waypoint, 2] = ground_phases.take_off.home[2]
     if ground_phases.approach is not None:

@@ -176,6 +176,10 @@ class Gate(NamedTuple):
     switches_camera: bool = False
 
 
+# Seq of a stop without a mission item.
+NO_ITEM = -1
+
+
 @dataclass(frozen=True, slots=True)
 class RoutePoint:
     """A position to fly to: a stop of a mission's itinerary, and each waypoint of the route that belongs to the stop.
@@ -183,12 +187,12 @@ class RoutePoint:
     The position is None until `flight.mission.placing` has placed the stop on the map; a loiter then becomes several
     points.
 
-    item: seq of the mission item, -1 for a stop without an item.
+    item: seq of the mission item, `NO_ITEM` for a stop without an item.
     command: MAV_CMD of the item.
     alt: m in the item's frame, NaN to keep the last altitude.
     frame: MAV_FRAME of the item.
     airspeed: airspeed on the leg to the stop, m/s; NaN for the autopilot's default.
-    acceptance: acceptance radius, m; 0 if not stated.
+    acceptance_radius: m; 0 if not stated.
     loiter: loiter about the stop, or None.
     px4_airspeed: airspeed on that leg as PX4 reads the items, m/s.
     gates: gates on the leg to the stop, in order.
@@ -197,7 +201,7 @@ class RoutePoint:
     home_up: altitude of home on that leg, m AMSL; NaN if the mission's home does not state it.
     stop: number of the stop in flying order; all points of a loiter have the same.
     position: east, north, up, m AMSL, or None.
-    arc: radius of the turn there, m, 0 for the radius at the bank limit.
+    arc_radius: radius of the turn there, m, 0 for the radius at the bank limit.
     """
 
     item: int
@@ -207,7 +211,7 @@ class RoutePoint:
     alt: float
     frame: int
     airspeed: float
-    acceptance: float = 0.0
+    acceptance_radius: float = 0.0
     loiter: Loiter | None = None
     px4_airspeed: float = math.nan
     gates: tuple[Gate, ...] = ()
@@ -215,11 +219,11 @@ class RoutePoint:
     home_up: float = math.nan
     stop: int = -1
     position: Position | None = None
-    arc: float = 0.0
+    arc_radius: float = 0.0
 
-    def at(self, position: Position, arc: float = 0.0) -> "RoutePoint":
+    def at(self, position: Position, arc_radius: float = 0.0) -> "RoutePoint":
         """Return the point with a position on the map and a turn radius there, m."""
-        return replace(self, position=position, arc=arc)
+        return replace(self, position=position, arc_radius=arc_radius)
 
     @property
     def map_position(self) -> Position:
@@ -237,7 +241,7 @@ class Itinerary:
     has_home: True if the mission states its home.
     takeoff: take-off item at the start of the flight, or None.
     notes: items that are not flown as written, with their numbers, for ArduPlane.
-    endless_jump: seq of a jump without end, -1 for none.
+    endless_jump: seq of a jump without end, or None.
     landing: landing point, or None; the flight ends above it.
     px4_notes: the same notes for PX4, which reads only the value of a speed change, and gates.
     open_items, px4_open_items: items that leave the verdict undecided for ArduPlane and for PX4.
@@ -251,7 +255,7 @@ class Itinerary:
     has_home: bool
     takeoff: MissionItem | None
     notes: tuple[str, ...]
-    endless_jump: int = -1
+    endless_jump: int | None = None
     landing: RoutePoint | None = None
     px4_notes: tuple[str, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
@@ -286,7 +290,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
             )
         if builder.has_ended:
             break
-    if steps.endless >= 0:
+    if steps.endless is not None:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
     _add_command_limits(mission, steps, builder)
@@ -362,7 +366,7 @@ class _Steps:
 
     passes_exhausted_jump: True if a jump is passed again after its last repeat.
     reached: numbers of the items reached, including jumps.
-    endless: seq of the jump without end at which the iteration ended, -1 for none; such a jump is taken once.
+    endless: seq of the jump without end at which the iteration ended, or None; such a jump is taken once.
     jump_chains: seq of the first jump that is the n-th in a row, by n, for the n at which an autopilot gives up.
     long_command_chain: seq of the command at which ArduPlane ends the mission, -1 for none.
     """
@@ -380,7 +384,8 @@ class _Steps:
         self.jump_counts: dict[int, int] = {}
         self.reached: set[int] = set()
         self.jump_chains: dict[int, int] = {}
-        self.endless, self.long_command_chain, self._step_count = -1, -1, 0
+        self.endless: int | None = None
+        self.long_command_chain, self._step_count = -1, 0
 
     def __iter__(self) -> Iterator[_Step]:
         """Iterate over the navigation items, counting jumps."""
@@ -668,7 +673,7 @@ class _ItineraryBuilder:
             # verify_vtol_takeoff); its fixed wings skip the item.
             self.notes.add(f"{name}: its position is not flown to, as in ArduPlane; PX4 would fly to it", item.seq)
         if has_own_position and not is_vertical:
-            self.stops += [replace(over_home, item=-1), self._make_stop(item)]
+            self.stops += [replace(over_home, item=NO_ITEM), self._make_stop(item)]
         else:
             self.stops.append(over_home)
 

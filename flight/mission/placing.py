@@ -54,14 +54,14 @@ class PlacedLanding(NamedTuple):
 
     start: start of the sequence.
     stops: stops in flying order, the landing last.
-    ground: altitude of the landing point, m; NaN if unknown.
+    ground: altitude of the landing point, m; None if unknown.
     notes: parts that are not flown as written.
     open_items: items that leave the verdict open.
     """
 
     start: LandingStart
     stops: tuple[RoutePoint, ...]
-    ground: float
+    ground: float | None
     notes: tuple[str, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
 
@@ -72,8 +72,8 @@ class PlacedMission:
 
     stops: stops in flying order; a stop at the position of the previous stop is merged with it.
     notes: notes on the placing, after the itinerary's notes.
-    takeoff_ground: altitude of the ground at home, m; NaN if unknown, or if the mission has no take-off.
-    landing_ground: altitude of the landing point, m; NaN if unknown, or if the mission has no landing.
+    takeoff_ground: altitude of the ground at home, m; None if unknown, or if the mission has no take-off.
+    landing_ground: altitude of the landing point, m; None if unknown, or if the mission has no landing.
     return_points: home, at the reference altitude of heights above home, and then the rally points; empty if the
         mission does not end with an RTL.
     landings: landing sequences to which an RTL may continue, and that are simulated.
@@ -86,8 +86,8 @@ class PlacedMission:
     itinerary: Itinerary
     stops: tuple[RoutePoint, ...]
     notes: tuple[str, ...]
-    takeoff_ground: float
-    landing_ground: float
+    takeoff_ground: float | None
+    landing_ground: float | None
     return_points: tuple[ReturnPoint, ...] = ()
     landings: tuple[PlacedLanding, ...] = ()
     landing_starts: tuple[LandingStart, ...] = ()
@@ -125,7 +125,8 @@ def place_stops(
         itinerary = make_itinerary(mission, resets_jump_counters=resets_jump_counters)
     heights = _AltitudeConverter(mission.source, itinerary.home, origin, terrain, notes)
     stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs)
-    takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
+    ground_at_home = heights.ground_at_home()
+    takeoff_ground = None if itinerary.takeoff is None or math.isnan(ground_at_home) else ground_at_home
     landing_ground = heights.landing_altitude(itinerary)
     return_mission, return_heights, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
@@ -449,21 +450,21 @@ class _AltitudeConverter:
             self._home_amsl = self._find_home_amsl(self.home)
         return self._home_amsl
 
-    def landing_altitude(self, itinerary: Itinerary) -> float:
-        """Return the altitude of the landing point, m AMSL; NaN if unknown.
+    def landing_altitude(self, itinerary: Itinerary) -> float | None:
+        """Return the altitude of the landing point, m AMSL; None if unknown.
 
         For a landing point with a height above home, the result is known only with terrain, with home's altitude, or
         if the previous stop also has a height above home.
         """
         stop = itinerary.landing
         if stop is None or math.isnan(stop.alt):
-            return math.nan
+            return None
         is_known = stop.frame in AMSL or self.terrain is not None
         if stop.frame in OVER_HOME:
             previous_frame = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
             is_known = is_known or not math.isnan(self.home.alt) or previous_frame in OVER_HOME
         east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
-        return self.amsl(stop, float(east), float(north), math.nan) if is_known else math.nan
+        return self.amsl(stop, float(east), float(north), math.nan) if is_known else None
 
     def ground_at_home(self) -> float:
         """Return the altitude of the ground at home, m AMSL; NaN if unknown."""

@@ -67,13 +67,13 @@ def preflight_notes(
 
 def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     """Yield a note on the tailwind at a launch or a landing that the scenario states."""
-    courses = leg_courses(route.waypoints)
+    courses = leg_courses(route.positions)
     launch, landing = scenario.launch, scenario.landing
     ends = []
-    if launch is not None and not math.isnan(route.takeoff_ground):
+    if launch is not None and route.takeoff_ground is not None:
         stated_course = launch.course
         ends.append(("launch", float(courses[0]) if stated_course is None else stated_course, route.takeoff_ground))
-    if landing is not None and not math.isnan(route.landing_ground):
+    if landing is not None and route.landing_ground is not None:
         ends.append(("landing", float(courses[-1]), route.landing_ground))
     for name, course, altitude in ends:
         tail_wind = scenario.wind.components_on_course(course, altitude)[0]
@@ -108,7 +108,7 @@ def _note_rally_points(
                 f"{name} is {ground - altitude:.0f} m below the ground:"
                 f" {altitude:.0f} m AMSL, and the ground there {ground:.0f} m"
             )
-        distance = _distance_from_path(route.waypoints, (point.east, point.north))
+        distance = _distance_from_path(route.positions, (point.east, point.north))
         if 0.0 < rules.rally_limit < distance:
             limit = f"RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
             yield (
@@ -181,8 +181,8 @@ def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[
         return None
     if scenario.terrain is None:
         return math.nan, math.nan
-    east, north = route.waypoints[-1, :2].tolist()
-    return strip_slopes(scenario.terrain, LandingStrip(east, north), float(leg_courses(route.waypoints)[-1]))
+    east, north = route.positions[-1, :2].tolist()
+    return strip_slopes(scenario.terrain, LandingStrip(east, north), float(leg_courses(route.positions)[-1]))
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
@@ -191,9 +191,9 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:
         return
-    course = float(leg_courses(route.waypoints)[-1])
+    course = float(leg_courses(route.positions)[-1])
     wind = ""
-    if not math.isnan(route.landing_ground):
+    if route.landing_ground is not None:
         tail_wind = scenario.wind.components_on_course(course, route.landing_ground)[0]
         wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > MIN_NOTED_WIND_MPS else wind
         wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -MIN_NOTED_WIND_MPS else wind

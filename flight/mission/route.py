@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
 from flight.mission.itinerary import (
     GATES_ARE_NO_WAYPOINTS,
     NEVER_REACHED,
+    NO_ITEM,
     Itinerary,
     OpenItem,
     RoutePoint,
@@ -48,96 +49,146 @@ from flight.mission.return_path import (
     rtl_note,
     rtl_waypoints,
 )
-from world.arrays import Floats
+from world.arrays import Flags, Floats, Ints
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
+from world.kernels import Records, record_dtype
 from world.scenario import Scenario
 from world.terrain import Terrain
 
-# Columns of a route with NaN where the mission states nothing.
-ROUTE_COLUMNS_WITH_NAN = ("above_ground", "min_ground_speed", "home_up")
+# Value of a field of a route point for which nothing is stated or known.
+NOT_STATED = math.nan
+
+# A waypoint of a route, and the leg to it.
+ROUTE_POINT = record_dtype(
+    ("position", np.float64, (3,)),  # east, north, up, m
+    "airspeed",  # m/s, on the leg to the waypoint; `NOT_STATED` for the first waypoint, to which no leg leads
+    "acceptance_radius",  # m, 0 where the mission states none (advisory: the verdict has its own rule)
+    ("fly_over", np.bool_),  # True to turn behind the waypoint, False to turn on an arc that passes the waypoint
+    ("item", np.int64),  # seq of the mission item, `NO_ITEM` for a waypoint without an item
+    "arc_radius",  # m, radius of the turn, 0 for the radius at the bank limit; the loiter's radius at its corners
+    ("stop", np.int64),  # number of the stop, never decreasing: a jump back leads to another stop of the same item
+    "above_ground",  # m, height above ground held along the leg to the waypoint; `NOT_STATED` for a straight leg
+    "min_ground_speed",  # m/s, for which ArduPlane raises its airspeed on the leg; 0 or less for none, or `NOT_STATED`
+    "home_up",  # m AMSL, altitude of home on the leg to the waypoint; `NOT_STATED` if unknown
+)
+# Fields of `ROUTE_POINT` that are `NOT_STATED` by default.
+_FIELDS_NOT_STATED = ("airspeed", "above_ground", "min_ground_speed", "home_up")
+
+
+def route_points(position: ArrayLike, airspeed: ArrayLike, **fields: ArrayLike) -> Records:
+    """Return the points of a route, (w,) of `ROUTE_POINT`.
+
+    position: (w, 3) east, north, up, m.
+    airspeed: airspeed on each leg, m/s, (w - 1,) or one number.
+    fields: other fields of `ROUTE_POINT`, each (w,) or one value. By default a point is without an item and nothing is
+        stated about it, and successive points of one item are one stop.
+
+    >>> points = route_points(np.eye(3), 25.0, item=[1, 2, 2])
+    >>> points["airspeed"].tolist(), points["stop"].tolist()
+    ([nan, 25.0, 25.0], [0, 1, 1])
+    """
+    points: Records = np.zeros(len(np.asarray(position)), ROUTE_POINT)
+    points["item"] = NO_ITEM
+    for name in _FIELDS_NOT_STATED:
+        points[name] = NOT_STATED
+    _set_fields(points, {"position": position, "airspeed": airspeed, **fields})
+    if "stop" not in fields:
+        items = points["item"]
+        points["stop"][1:] = np.cumsum((np.diff(items) != 0) | (items[1:] == NO_ITEM))
+    return points
+
+
+def _set_fields(points: Records, fields: dict[str, ArrayLike]) -> None:
+    """Set fields of the points of a route; the airspeed has one value a leg."""
+    for name, values in fields.items():
+        points[name][1 if name == "airspeed" else 0 :] = values
 
 
 @dataclass(frozen=True, slots=True)
 class Route:
     """Waypoints in flying order; leg i goes from waypoint i to i + 1.
 
-    waypoints: (w, 3) east, north, up, m.
-    airspeed: (w - 1,) m/s on each leg.
-    acceptance: (w,) m, 0 where the mission states none (advisory: the verdict has its own rule).
-    fly_over: (w,) bool, True if the path goes through the waypoint and turns behind it, False if it turns on an arc
-        that passes the waypoint.
-    items: (w,) seq of the mission item, -1 for a point without an item.
+    points: (w,) of `ROUTE_POINT`. A loiter consists of the corners of a polygon around its circle, all of the loiter's
+        item, each with the circle's radius.
     started: description of the flight's start.
     notes: parts that cannot be flown as written, with item numbers.
-    arcs: (w,) turn radius, m, 0 for the radius at the bank limit. A loiter consists of the corners of a polygon around
-        its circle, all of the loiter's item, each with the circle's radius.
-    endless_jump: seq of a jump that repeats the last loop without end, -1 for none.
+    endless_jump: seq of a jump that repeats the last loop without end, or None.
     takeoff_ground, landing_ground: altitude of the ground at take-off and at the landing point, m, above which the
-        flight starts and ends; NaN without such a point or if unknown.
-    rtl_start: index of the waypoint at which an RTL starts, -1 for none; the waypoints from there to `rtl_end`
-        represent the path that the autopilot chooses.
+        flight starts and ends; None without such a point or if unknown.
+    rtl_start: index of the waypoint at which an RTL starts, or None; the waypoints from there to `rtl_end` represent
+        the path that the autopilot chooses.
     rtl_loiter: loiter at the end of the RTL, which may continue to a landing sequence; None without an RTL.
-    direct_landing_start: index of the waypoint at which an RTL without a loiter joins a landing sequence, -1 for none;
-        the leg to it starts at the aircraft and follows no line.
-    stops: (w,) number of the waypoint's stop, never decreasing: a jump back leads to another stop of the same item. By
-        default, successive waypoints of one item are one stop.
+    direct_landing_start: index of the waypoint at which an RTL without a loiter joins a landing sequence, or None; the
+        leg to it starts at the aircraft and follows no line.
     unjoined_stops: stops that the autopilot flies to, but that the waypoints lack, because no tangent joins them to a
         circle.
     open_items: items that change the flight path in a way that is not simulated.
-    above_ground: (w,) height above ground held along the leg to the waypoint, m; NaN for a straight leg.
-    min_ground_speed: (w,) ground speed for which ArduPlane raises its airspeed on the leg to the waypoint, m/s; 0 or
-        less for none, NaN for the autopilot's default.
-    home_up: (w,) altitude of home on the leg to the waypoint, m AMSL; NaN if unknown.
     """
 
-    waypoints: Floats
-    airspeed: Floats
-    acceptance: Floats
-    fly_over: NDArray[np.bool_]
-    items: NDArray[np.int64]
+    points: Records
     started: str
     notes: tuple[str, ...] = ()
-    arcs: Floats = field(default_factory=lambda: np.zeros(0))
-    endless_jump: int = -1
-    takeoff_ground: float = math.nan
-    landing_ground: float = math.nan
-    rtl_start: int = -1
+    endless_jump: int | None = None
+    takeoff_ground: float | None = None
+    landing_ground: float | None = None
+    rtl_start: int | None = None
     rtl_loiter: ReturnCircle | None = None
-    direct_landing_start: int = -1
-    stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    direct_landing_start: int | None = None
     unjoined_stops: tuple[UnjoinedStop, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
-    above_ground: Floats = field(default_factory=lambda: np.zeros(0))
-    min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
-    home_up: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Fill in default arrays, and lock all arrays."""
-        if not len(self.arcs):
-            object.__setattr__(self, "arcs", np.zeros(len(self.waypoints)))
-        if len(self.stops) != len(self.waypoints):
-            changes = np.flatnonzero((np.diff(self.items) != 0) | (self.items[1:] < 0))
-            object.__setattr__(self, "stops", np.searchsorted(changes, np.arange(len(self.items))))
-        for name in ROUTE_COLUMNS_WITH_NAN:
-            if len(getattr(self, name)) != len(self.waypoints):
-                object.__setattr__(self, name, np.full(len(self.waypoints), math.nan))
-        for name in (
-            *("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"),
-            *ROUTE_COLUMNS_WITH_NAN,
-        ):
-            array = np.array(getattr(self, name))
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        """Lock a copy of the points, whose first has no airspeed."""
+        points = self.points.copy()
+        points["airspeed"][0] = NOT_STATED
+        points.setflags(write=False)
+        object.__setattr__(self, "points", points)
+
+    def with_fields(self, **fields: ArrayLike) -> "Route":
+        """Return the route with other values in some fields of its points; arguments as for `route_points`."""
+        points = self.points.copy()
+        _set_fields(points, fields)
+        return replace(self, points=points)
+
+    @property
+    def positions(self) -> Floats:
+        """Position of each waypoint, (w, 3) east, north, up, m."""
+        return self.points["position"]
+
+    @property
+    def leg_airspeeds(self) -> Floats:
+        """Airspeed on each leg, m/s, (w - 1,)."""
+        return self.points["airspeed"][1:]
+
+    @property
+    def fly_over(self) -> Flags:
+        """Mask of the waypoints that are flown over, (w,)."""
+        return self.points["fly_over"]
+
+    @property
+    def items(self) -> Ints:
+        """Seq of the mission item of each waypoint, (w,), `NO_ITEM` for none."""
+        return self.points["item"]
+
+    @property
+    def arc_radii(self) -> Floats:
+        """Turn radius at each waypoint, m, (w,), 0 for the radius at the bank limit."""
+        return self.points["arc_radius"]
+
+    @property
+    def stops(self) -> Ints:
+        """Number of the stop of each waypoint, (w,)."""
+        return self.points["stop"]
 
     @property
     def legs(self) -> int:
         """Number of legs."""
-        return len(self.waypoints) - 1
+        return len(self.points) - 1
 
     @property
-    def leg_numbers(self) -> NDArray[np.int64]:
+    def leg_numbers(self) -> Ints:
         """Number of each leg in messages, (w - 1,).
 
         All legs around a loiter have the number of the leg to the loiter.
@@ -147,16 +198,21 @@ class Route:
     @property
     def rtl_end(self) -> int:
         """Index of the waypoint at which an RTL joins the landing sequence, or the number of waypoints."""
-        if self.rtl_start < 0:
-            return len(self.waypoints)
+        if self.rtl_start is None:
+            return len(self.points)
         is_return_item = self.items[self.rtl_start + 1 :] == self.items[self.rtl_start + 1]
-        return self.rtl_start + 1 + int(np.argmin(is_return_item)) if not is_return_item.all() else len(self.waypoints)
+        return self.rtl_start + 1 + int(np.argmin(is_return_item)) if not is_return_item.all() else len(self.points)
+
+    @property
+    def rtl_legs(self) -> range:
+        """Legs of an RTL, whose path the autopilot chooses; empty without an RTL."""
+        return range(0) if self.rtl_start is None else range(self.rtl_start, min(self.rtl_end, self.legs))
 
 
 def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
     """Return True if a route ends at a plain waypoint, without a loiter, a landing or an RTL.
 
-    >>> route = Route(np.eye(3)[:2], np.ones(1), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "")
+    >>> route = Route(route_points(np.eye(3)[:2], 25.0, item=[1, 2]), "")
     >>> ends_at_plain_waypoint(route, Mission(None, ()))
     False
     """
@@ -173,29 +229,26 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
     """Return the part of a route from waypoint ``first`` to waypoint ``last``, both included.
 
     >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
-    >>> whole = Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), "")
+    >>> whole = Route(route_points(way, 25.0, item=np.arange(4)), "")
     >>> part_of_route(whole, 1, 3).items.tolist()
     [1, 2, 3]
     """
     if (first, last) == (0, route.legs):
         return route
-    waypoint_range = slice(first, last + 1)
+    rtl_start, landing_start = route.rtl_start, route.direct_landing_start
+    if rtl_start is not None:
+        rtl_start = max(0, rtl_start - first) if rtl_start < last else None
+    if landing_start is not None:
+        landing_start = landing_start - first if first < landing_start <= last else None
     return replace(
         route,
-        waypoints=route.waypoints[waypoint_range],
-        airspeed=route.airspeed[first:last],
-        acceptance=route.acceptance[waypoint_range],
-        fly_over=route.fly_over[waypoint_range],
-        items=route.items[waypoint_range],
-        arcs=route.arcs[waypoint_range],
-        stops=route.stops[waypoint_range],
-        **{name: getattr(route, name)[waypoint_range] for name in ROUTE_COLUMNS_WITH_NAN},
-        endless_jump=-1,
-        takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
-        landing_ground=route.landing_ground if last == route.legs else math.nan,
-        rtl_start=max(0, route.rtl_start - first) if 0 <= route.rtl_start < last else -1,
-        rtl_loiter=route.rtl_loiter if route.rtl_start < last else None,
-        direct_landing_start=route.direct_landing_start - first if first < route.direct_landing_start <= last else -1,
+        points=route.points[first : last + 1],
+        endless_jump=None,
+        takeoff_ground=route.takeoff_ground if first == 0 else None,
+        landing_ground=route.landing_ground if last == route.legs else None,
+        rtl_start=rtl_start,
+        rtl_loiter=None if rtl_start is None else route.rtl_loiter,
+        direct_landing_start=landing_start,
     )
 
 
@@ -229,17 +282,11 @@ SHARPEST_FLY_BY_RAD = math.radians(150.0)
 
 
 def fly_over_waypoints(
-    points: Floats,
-    airspeed: Floats,
-    acceptance: Floats,
-    limits: Limits | None,
-    turn_distance: Callable[[float, float], float] | None = None,
-) -> NDArray[np.bool_]:
+    points: Records, limits: Limits | None, turn_distance: Callable[[float, float], float] | None = None
+) -> Flags:
     """Return a mask of the waypoints that must be flown over, (w,), because a fly-by arc would pass too far from them.
 
-    points: (w, 3) m.
-    airspeed: (w - 1,) m/s.
-    acceptance: (w,) m, 0 where the mission states none.
+    points: points of a route, (w,) of `ROUTE_POINT`.
     limits: limits of the aircraft; None if unknown, for a result of False.
     turn_distance: see `RouteRules`.
 
@@ -255,8 +302,8 @@ def fly_over_waypoints(
     >>> limits = SimpleNamespace(performance=lambda airspeed: table)
     >>> corner = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 500.0]])
     >>> def is_flown_over(acceptance, turn_distance=None):
-    ...     radii = np.array([0.0, acceptance, 0.0])
-    ...     return bool(fly_over_waypoints(corner, np.full(2, 25.0), radii, limits, turn_distance)[1])
+    ...     points = route_points(corner, 25.0, acceptance_radius=[0.0, acceptance, 0.0])
+    ...     return bool(fly_over_waypoints(points, limits, turn_distance)[1])
     >>> [is_flown_over(acceptance) for acceptance in (0.0, 45.0, 46.0)]
     [False, True, False]
     >>> [is_flown_over(0.0, lambda turn, amsl: distance) for distance in (10.0, 90.0)]
@@ -265,12 +312,13 @@ def fly_over_waypoints(
     is_flown_over = np.zeros(len(points), dtype=np.bool_)
     if limits is None:
         return is_flown_over
-    courses, turns = leg_courses(points), np.abs(signed_turns(points))
-    tables = {float(speed): limits.performance(float(speed)) for speed in set(airspeed.tolist())}
+    positions, airspeed, acceptance = points["position"], points["airspeed"], points["acceptance_radius"]
+    courses, turns = leg_courses(positions), np.abs(signed_turns(positions))
+    tables = {speed: limits.performance(speed) for speed in set(airspeed[1:].tolist())}
     for i in range(1, len(points) - 1):
         turn = float(turns[i - 1])
-        table = tables[float(max(airspeed[i - 1], airspeed[i]))]
-        radius = float(turn_radius_between(table, courses[i - 1], courses[i], points[i, 2]))
+        table = tables[float(max(airspeed[i], airspeed[i + 1]))]
+        radius = float(turn_radius_between(table, courses[i - 1], courses[i], positions[i, 2]))
         # A turn that cannot be flown in this wind has no arc.
         if turn == 0.0 or not math.isfinite(radius):
             continue
@@ -279,7 +327,7 @@ def fly_over_waypoints(
         elif turn_distance is None:
             is_flown_over[i] = turn > SHARPEST_FLY_BY_RAD
         else:
-            is_flown_over[i] = fly_by_offset(turn, radius) > turn_distance(turn, float(points[i, 2]))
+            is_flown_over[i] = fly_by_offset(turn, radius) > turn_distance(turn, float(positions[i, 2]))
     return is_flown_over
 
 
@@ -306,54 +354,41 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     >>> scenario = replace(load_scenario("tight"), start_course=0.0)  # north, and the route goes east
     >>> limits = SimpleNamespace(turn_radius=lambda *_: 110.0)  # all that is asked of the aircraft's limits
     >>> ends = np.array([scenario.start, scenario.destination])
-    >>> route = Route(ends, np.array([25.0]), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "no TAKEOFF")
+    >>> route = Route(route_points(ends, 25.0, item=[1, 2]), "no TAKEOFF")
     >>> longer = with_end_courses(route, scenario, limits)
-    >>> longer.waypoints.round().tolist()
+    >>> longer.positions.round().tolist()
     [[0.0, -210.0, 75.0], [0.0, 0.0, 75.0], [2600.0, 0.0, 75.0]]
     >>> longer.started
     "no TAKEOFF; on the scenario's start course, from a lead-in leg of 210 m"
     """
-    points, courses = route.waypoints, leg_courses(route.waypoints)
+    ends, courses = route.positions[[0, -1]], leg_courses(route.positions)
     lead_in = lead_out = None
-    if scenario.start_course is not None and math.dist(points[0], scenario.start) < _SAME_END_M:
-        lead_in = _lead_point(points[0], scenario.start_course, float(courses[0]), limits, -1.0)
-    if scenario.destination_course is not None and math.dist(points[-1], scenario.destination) < _SAME_END_M:
-        lead_out = _lead_point(points[-1], scenario.destination_course, float(courses[-1]), limits, 1.0)
-    lead_in_count = 0 if lead_in is None else 1
-    lead_out_count = 0 if lead_out is None else 1
-    if not lead_in_count + lead_out_count:
+    if scenario.start_course is not None and math.dist(ends[0], scenario.start) < _SAME_END_M:
+        lead_in = _lead_point(ends[0], scenario.start_course, float(courses[0]), limits, -1.0)
+    if scenario.destination_course is not None and math.dist(ends[1], scenario.destination) < _SAME_END_M:
+        lead_out = _lead_point(ends[1], scenario.destination_course, float(courses[-1]), limits, 1.0)
+    if lead_in is None and lead_out is None:
         return route
-    started = route.started
-    if lead_in is not None:
-        length = math.dist(lead_in[:2], points[0][:2])
-        started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
+    points, started, added_count = route.points.copy(), route.started, 0
     # The mission's acceptance radii at its ends do not apply to the turns that the lead legs add there.
-    acceptance = np.array(route.acceptance)
-    acceptance[:lead_in_count], acceptance[len(acceptance) - lead_out_count :] = 0.0, 0.0
-    all_points = [point for point in (lead_in, *points, lead_out) if point is not None]
-    padded_columns: dict[str, Any] = {
-        name: np.pad(getattr(route, name), (lead_in_count, lead_out_count), constant_values=math.nan)
-        for name in ROUTE_COLUMNS_WITH_NAN
-    }
+    if lead_in is not None:
+        length = math.dist(lead_in[:2], ends[0, :2])
+        started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
+        points["acceptance_radius"][0], points["airspeed"][0] = 0.0, points["airspeed"][1]
+        points["stop"] += 1
+        points = np.concatenate([route_points([lead_in], (), fly_over=points["fly_over"][:1], stop=0), points])
+        added_count = 1
+    if lead_out is not None:
+        points["acceptance_radius"][-1] = 0.0
+        end = route_points([lead_out], (), fly_over=points["fly_over"][-1:], stop=points["stop"][-1:] + 1)
+        end["airspeed"] = points["airspeed"][-1]
+        points = np.concatenate([points, end])
     return replace(
         route,
-        waypoints=np.array(all_points),
-        airspeed=np.pad(route.airspeed, (lead_in_count, lead_out_count), mode="edge"),
-        acceptance=np.pad(acceptance, (lead_in_count, lead_out_count)),
-        fly_over=np.pad(route.fly_over, (lead_in_count, lead_out_count), mode="edge"),
-        items=np.pad(route.items, (lead_in_count, lead_out_count), constant_values=-1),
-        arcs=np.pad(route.arcs, (lead_in_count, lead_out_count)),
-        **padded_columns,
-        stops=np.concatenate(
-            [
-                np.arange(lead_in_count),
-                route.stops + lead_in_count,
-                route.stops[-1:] + lead_in_count + np.arange(1, lead_out_count + 1),
-            ]
-        ),
+        points=points,
         started=started,
-        rtl_start=route.rtl_start + (lead_in_count if route.rtl_start >= 0 else 0),
-        direct_landing_start=route.direct_landing_start + (lead_in_count if route.direct_landing_start >= 0 else 0),
+        rtl_start=None if route.rtl_start is None else route.rtl_start + added_count,
+        direct_landing_start=None if route.direct_landing_start is None else route.direct_landing_start + added_count,
     )
 
 
@@ -418,7 +453,7 @@ def make_route(
     ...     for k, lat in enumerate((36.50, 36.51, 36.52), 1)
     ... ]
     >>> route = make_route(Mission(None, tuple(items)), GeoOrigin(36.5, -84.2), None, 25.0, fly_over=False)
-    >>> route.waypoints.round().tolist()
+    >>> route.positions.round().tolist()
     [[0.0, 0.0, 700.0], [0.0, 1110.0, 700.0], [0.0, 2219.0, 700.0]]
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
@@ -440,7 +475,7 @@ def route_through_stops(
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
-    >>> route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist()
+    >>> route_through_stops(placed, 25.0, fly_over=False).leg_airspeeds.tolist()
     [25.0]
     """
     mission, notes = placed_mission.mission, Notes()
@@ -461,26 +496,18 @@ def route_through_stops(
         if landing is not None:
             points += lay_out(read_stops(landing.stops, len(all_stops)))[0]
     _check_point_count(mission.source, len(points))
-    waypoints, arcs = np.array([point.map_position for point in points]), np.array([point.arc for point in points])
-    airspeed = np.array([point.airspeed for point in points[1:]])
-    acceptance = np.minimum([point.acceptance for point in points], acceptance_limit)
-    is_missed = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
+    records = _point_records(points, acceptance_limit, placed_mission.home_up)
+    is_missed = fly_over_waypoints(records, limits, turn_distance)
+    records["fly_over"] = (records["arc_radius"] == 0.0) & (fly_over | is_missed)
     _note_cruise_speed(mission, default_airspeed, points[1], notes)
     return Route(
-        waypoints=waypoints,
-        airspeed=airspeed,
-        acceptance=acceptance,
-        fly_over=(arcs == 0.0) & (fly_over | is_missed),
-        items=np.array([point.item for point in points], dtype=np.int64),
-        started=_start_text(placed_mission.itinerary, points[0], placed_mission.origin, waypoints),
+        points=records,
+        started=_start_text(placed_mission.itinerary, points[0], placed_mission.origin, records["position"]),
         notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
-        arcs=arcs,
-        stops=np.cumsum([False, *(a.stop != b.stop for a, b in pairwise(points))]),
-        direct_landing_start=-1 if landing is None else [point.item for point in points].index(landing.stops[0].item),
+        direct_landing_start=None if landing is None else [point.item for point in points].index(landing.stops[0].item),
         endless_jump=placed_mission.itinerary.endless_jump,
         takeoff_ground=placed_mission.takeoff_ground,
         landing_ground=placed_mission.landing_ground if landing is None else landing.ground,
-        **_columns_with_nan(points, placed_mission.home_up),
         # An autopilot that flies on tangents omits these stops.
         unjoined_stops=unjoined if loiter_rules.steers_to_center else (),
         open_items=_open_items(placed_mission.itinerary, landing, reads_as_px4),
@@ -488,21 +515,28 @@ def route_through_stops(
     )
 
 
-def _columns_with_nan(points: list[RoutePoint], home_up: float) -> dict[str, Any]:
-    """Return the columns `ROUTE_COLUMNS_WITH_NAN` of a route by their names.
+def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: float) -> Records:
+    """Return placed points as `ROUTE_POINT` records, without `fly_over`.
 
-    home_up: altitude of home for a stop that states none, m AMSL.
+    acceptance_limit: see `RouteRules`.
+    home_up: altitude of home for a point that states none, m AMSL.
     """
-    return {
-        "above_ground": np.array([_height_above_ground(point) for point in points]),
-        "min_ground_speed": np.array([point.min_ground_speed for point in points]),
-        "home_up": np.array([home_up if math.isnan(point.home_up) else point.home_up for point in points]),
-    }
+    return route_points(
+        [point.map_position for point in points],
+        [point.airspeed for point in points[1:]],
+        acceptance_radius=np.minimum([point.acceptance_radius for point in points], acceptance_limit),
+        item=[point.item for point in points],
+        arc_radius=[point.arc_radius for point in points],
+        stop=np.cumsum([False, *(a.stop != b.stop for a, b in pairwise(points))]),
+        above_ground=[_height_above_ground(point) for point in points],
+        min_ground_speed=[point.min_ground_speed for point in points],
+        home_up=[home_up if math.isnan(point.home_up) else point.home_up for point in points],
+    )
 
 
 def _height_above_ground(stop: RoutePoint) -> float:
-    """Return the height above ground held on the leg to a stop, m; NaN for a straight leg."""
-    return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
+    """Return the height above ground held on the leg to a stop, m; `NOT_STATED` for a straight leg."""
+    return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else NOT_STATED
 
 
 def _check_point_count(source: str, point_count: int) -> None:

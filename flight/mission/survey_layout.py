@@ -88,7 +88,7 @@ def min_turn_around(route: Route, survey: Survey) -> float:
 
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
     """Return the straight distance of each line beyond its photos, at each end of each turn-around, m."""
-    points, pairs = route.waypoints[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
+    points, pairs = route.positions[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for line, next_line in pairs for pair in ((line.last, line.ends), (next_line.begins, next_line.first))]
     return [math.dist(points[start], points[end]) for start, end in ends]
 
@@ -124,7 +124,7 @@ def with_layout(
         return None
     items, lines, flown = _survey_items(mission, route, survey), list[_Line](), _flown_items(route)
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
-        corners, line_items = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
+        corners, line_items = route.positions[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
         line = _Line(corners, line_items, flown)
         if _waypoint_of_item(mission, route)[line.steps[0].seq] != photo_line.first:
             line = line._replace(items=(_make_waypoint(line.steps[0], corners[0], origin), *line_items))
@@ -217,7 +217,7 @@ def _without_leads(
     max_lead_length: distance from that waypoint within which a waypoint is a lead, m; more distant waypoints belong to
         the transit and are kept.
     """
-    points, waypoint_of = route.waypoints[:, :2], _waypoint_of_item(mission, route)
+    points, waypoint_of = route.positions[:, :2], _waypoint_of_item(mission, route)
 
     def is_lead(item: MissionItem) -> bool:
         is_near = item.seq in waypoint_of and math.dist(points[waypoint_of[item.seq]], points[end]) <= max_lead_length

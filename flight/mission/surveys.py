@@ -238,10 +238,10 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
     turn_arounds: a pair of distances for each survey of the ground station: between photos, m, and from a line's first
         or last photo to the end of its run, m.
 
+    >>> from flight.mission.route import route_points
     >>> lines = [[0, 0], [0, 900], [60, 900], [60, 0], [120, 0], [120, 900]]
     >>> points = np.array([[*place, 100.0] for place in lines], dtype=float)
-    >>> flown_through = np.zeros(6, dtype=bool)
-    >>> route = Route(points, np.full(5, 15.0), np.zeros(6), flown_through, np.arange(1, 7), "")
+    >>> route = Route(route_points(points, 15.0, item=np.arange(1, 7)), "")
     >>> [survey] = find_surveys(route, np.zeros(6))
     >>> [(line.first, line.last) for line in survey.lines], survey.offsets, survey.spacing
     ([(0, 1), (2, 3), (4, 5)], (0.0, 60.0, 120.0), 60.0)
@@ -250,7 +250,7 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
     if camera.any():
         # If items switch the camera, only a run with the camera on can be a line.
         run_bounds = [(first, last) for first, last in run_bounds if (camera[first:last] != 0.0).any()]
-    runs = _Runs(route.waypoints, run_bounds)
+    runs = _Runs(route.positions, run_bounds)
     while run_index < len(run_bounds):
         chain = _find_chain(runs, run_index)
         survey = _make_survey(runs, chain, camera, turn_arounds)
@@ -267,9 +267,9 @@ def _straight_runs(route: Route) -> list[tuple[int, int]]:
 
     The legs of a take-off, a landing, a loiter's circle and a return to launch are left out.
     """
-    courses, arcs, end = leg_courses(route.waypoints), route.arcs, len(route.waypoints) - 1
-    last = route.rtl_start if route.rtl_start >= 0 else end
-    has_landing, has_takeoff = math.isfinite(route.landing_ground), math.isfinite(route.takeoff_ground)
+    courses, arcs, end = leg_courses(route.positions), route.arc_radii, route.legs
+    last = end if route.rtl_start is None else route.rtl_start
+    has_landing, has_takeoff = route.landing_ground is not None, route.takeoff_ground is not None
     runs, first = [], 0
     for index in range(1, last + 1):
         course_change = abs(math.remainder(float(courses[min(index, end - 1)] - courses[first]), 2.0 * math.pi))

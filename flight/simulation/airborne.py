@@ -101,7 +101,7 @@ class Airborne(ABC):
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
         waypoints["is_mission_end"] &= setup.autopilot.loiters.ends_in_circle
-        self._airspeeds = setup.autopilot.speeds.flown_airspeeds(setup.route.airspeed, setup.airspeed)
+        self._airspeeds = setup.autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
         self._workspace = Workspace(self._gains, self.path, waypoints, None if self._law is None else self._law.memory)
@@ -202,7 +202,7 @@ class Airborne(ABC):
         """Return the end reason of a flight that exceeded its time limit; in a loiter, name the loiter's item."""
         route, next_waypoint = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
         time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
-        if route.arcs[next_waypoint] > 0.0 and route.rtl_start < 0:
+        if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
             return f"circled: at the loiter of item {route.items[next_waypoint]}, {time_text}"
         return f"time limit: {time_text}"
 
@@ -244,7 +244,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
     """Return the lowest ground speed on any leg, in the mean wind at the leg's altitudes, m/s; at least 3 m/s."""
     limits: Limits = setup.limits
-    points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
+    points, courses = setup.route.positions, leg_courses(setup.route.positions)
     tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
     speeds = []
     for leg, airspeed in enumerate(airspeeds.tolist()):

@@ -41,7 +41,7 @@ class LocalMap:
         for an area around a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
-        points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
+        points = np.concatenate([setup.route.positions[:, :2], setup.scenario.bounds.T])
         min_corner, max_corner = points.min(axis=0) - MAP_MARGIN_M, points.max(axis=0) + MAP_MARGIN_M
         outline = np.array(
             [

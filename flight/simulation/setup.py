@@ -2,7 +2,7 @@
 
 import copy
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -239,9 +239,9 @@ class FlightSetup:
 
     def __post_init__(self) -> None:
         """Compute the demanded airspeeds and, with them, the reference path."""
-        airspeed = self.autopilot.speeds.flown_airspeeds(self.route.airspeed, self.airspeed)
-        keeps_commands = self.source is not None or np.array_equal(airspeed, self.route.airspeed)
-        demanded_route = self.route if keeps_commands else replace(self.route, airspeed=airspeed)
+        airspeed = self.autopilot.speeds.flown_airspeeds(self.route.leg_airspeeds, self.airspeed)
+        keeps_commands = self.source is not None or np.array_equal(airspeed, self.route.leg_airspeeds)
+        demanded_route = self.route if keeps_commands else self.route.with_fields(airspeed=airspeed)
         object.__setattr__(self, "demanded_route", demanded_route)
         object.__setattr__(self, "path", fly_by_path(self.demanded_route, self.limits, self.scenario.terrain))
 
@@ -268,7 +268,7 @@ class FlightSetup:
     @property
     def min_ground_speeds(self) -> Floats:
         """Minimum ground speed on the leg to each waypoint, m/s, (w,); 0 or less for no minimum."""
-        stated_speeds = self.route.min_ground_speed
+        stated_speeds = self.route.points["min_ground_speed"]
         return np.where(np.isnan(stated_speeds), self.autopilot.speeds.min_ground_speed, stated_speeds)
 
     @property
@@ -303,7 +303,7 @@ class FlightSetup:
     @property
     def default_launch_speed(self) -> float:
         """Minimum level-flight speed at the start of the route, m/s: the default launch speed."""
-        return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
+        return self.envelope.level_speeds(float(self.route.positions[0, 2]))[0]
 
     @property
     def display_waypoints(self) -> Floats:

@@ -198,12 +198,12 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission
-    >>> from flight.mission.route import Route
+    >>> from flight.mission.route import Route, route_points
     >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
     >>> way = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
-    >>> route = Route(way, np.array([25.0]), np.zeros(2), np.zeros(2, dtype=bool), np.arange(2), "")
+    >>> route = Route(route_points(way, 25.0), "")
     >>> limits = make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
     >>> setup = FlightSetup(scenario, Mission(None, ()), route, limits, "aerosonde", 888.0, 1)
     >>> flown = fly_to_end(Flight(setup, aerosonde))
@@ -342,7 +342,7 @@ class Flight(Airborne):
         for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
         self._law.initialise(self.memory, self._workspace.own)
-        self._law.transfer_state(old_memory, self._workspace.own, setup.route.waypoints[0])
+        self._law.transfer_state(old_memory, self._workspace.own, setup.route.positions[0])
         self._loop = self._make_loop()
 
     def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:

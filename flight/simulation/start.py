@@ -52,7 +52,7 @@ def find_start(
 
     Raises StartError if the start is not above the terrain.
     """
-    points = setup.route.waypoints
+    points = setup.route.positions
     east, north, up = (float(value + offset_part) for value, offset_part in zip(points[0], offset, strict=True))
     ground_altitude = ground.height(east, north)
     if not math.isnan(ground_altitude) and up <= ground_altitude:

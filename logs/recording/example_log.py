@@ -6,7 +6,7 @@ import numpy as np
 
 from aircraft.envelope import Envelope
 from flight.mission.items import Command, Mission, MissionItem
-from flight.mission.route import Route
+from flight.mission.route import Route, route_points
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import FlightLog, LogEvent
@@ -50,11 +50,7 @@ def example_log() -> FlightLog:
         scenario=scenario,
         mission=mission,
         route=Route(
-            waypoints=_WAYPOINTS,
-            airspeed=np.full(2, _AIRSPEED),
-            acceptance=np.zeros(3),
-            fly_over=np.zeros(3, dtype=np.bool_),
-            items=np.array([item.seq for item in mission.items]),
+            points=route_points(_WAYPOINTS, _AIRSPEED, item=[item.seq for item in mission.items]),
             started="Started in the air at waypoint 0.",
         ),
         limits=make_limits(scenario, _envelope(), _AIRSPEED, 0.5),

@@ -316,7 +316,7 @@ def read_log(path: Path | str) -> FlightLog:
     if SETUP_FILE not in container.attachments and container.problem:
         raise LogError(f"{path}: contains no setup: {container.problem}", file=path)
     stored_setup = unpack_setup(container.attachments, str(path))
-    rows, row_fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.waypoints))
+    rows, row_fault = _usable_rows(messages.rows(), len(stored_setup.setup.route.points))
     if not len(rows):
         fault = row_fault or container.problem or "an empty log"
         raise LogError(f"{path}: contains no complete second of flight: {fault}", file=path)

@@ -263,7 +263,7 @@ class Recorder:
         scenario_with_fence = with_fence_zones(setup).scenario
         if scenario_with_fence.zones:
             self._add_scene_channel(ZONES_TOPIC)
-            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, scenario_with_fence, setup.route.waypoints)
+            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, scenario_with_fence, setup.route.positions)
         self._write_messages([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 

@@ -6,21 +6,22 @@ and the dataclass is made from its values. Numbers are written as Python's repr,
 cattrs 26 needs as many lines to rename fields, but reads 1.7 as the integer 1, "12" as a number and NaN as any number.
 """
 
-import math
+from dataclasses import fields
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
 
 from aircraft.envelope import Envelope
 from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
 from flight.mission.items import Camera, Home, Mission, MissionItem, SurveyPlan
-from flight.mission.itinerary import OpenItem
+from flight.mission.itinerary import NO_ITEM, OpenItem
 from flight.mission.loiter_circles import UnjoinedStop
 from flight.mission.return_path import ReturnCircle
-from flight.mission.route import ROUTE_COLUMNS_WITH_NAN, Route
+from flight.mission.route import NOT_STATED, ROUTE_POINT, Route, route_points
 from world.errors import LogError
 from world.geometry import leg_runs
+from world.kernels import field_names
 
 Data = TypeVar("Data")
 
@@ -33,6 +34,14 @@ _Table = Annotated[list[list[float]], _LISTED]  # by airspeed, then by height
 _Position = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 # A height or another value that may be unknown: NaN in the dataclass, null in the file.
 _Height = Annotated[Finite | None, BeforeValidator(lambda value: None if value != value else value)]
+
+# Number of a waypoint or an item in the file where the dataclass has None.
+_NO_NUMBER = -1
+_Number = Annotated[
+    Annotated[int, Field(ge=0)] | None,
+    BeforeValidator(lambda value: None if value == _NO_NUMBER else value),
+    PlainSerializer(lambda value: _NO_NUMBER if value is None else value),
+]
 
 
 class SetupModel(BaseModel):
@@ -130,64 +139,69 @@ class MissionTable(SetupModel):
 
 
 class RouteTable(SetupModel):
-    """A `Route` as a table: one value a waypoint, and for airspeed one value a leg."""
+    """A `Route` as a table: the fields of its points are columns, with one value a waypoint, and for airspeed a leg."""
 
     name = "route"
-    waypoints: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
+    position: Annotated[list[_Position], Field(min_length=2, alias="waypoints_east_north_amsl_m"), _LISTED]
     airspeed: Annotated[_Finites, Field(alias="airspeed_mps")]
-    acceptance: Annotated[_Column, Field(alias="acceptance_m")]
+    acceptance_radius: Annotated[_Column, Field(alias="acceptance_m")]
     fly_over: Annotated[list[bool], _LISTED]
-    items: Annotated[list[Annotated[int, Field(ge=-1, lt=2**31)]], _LISTED]
+    item: Annotated[list[Annotated[int, Field(ge=NO_ITEM, lt=2**31)]], Field(alias="items"), _LISTED]
     started: str
     notes: tuple[str, ...]
-    arcs: Annotated[_Column, Field(alias="arcs_m")] = []
-    stops: Annotated[list[Annotated[int, Field(ge=0, lt=2**31)]], _LISTED] = []
-    endless_jump: int = -1
+    arc_radius: Annotated[_Column, Field(alias="arcs_m")] = []
+    stop: Annotated[list[Annotated[int, Field(ge=0, lt=2**31)]], Field(alias="stops"), _LISTED] = []
+    endless_jump: _Number = None
     takeoff_ground: Annotated[_Height, Field(alias="takeoff_ground_m")] = None
     landing_ground: Annotated[_Height, Field(alias="landing_ground_m")] = None
-    rtl_start: Annotated[int, Field(ge=-1, alias="return_from_waypoint")] = -1
+    rtl_start: Annotated[_Number, Field(alias="return_from_waypoint")] = None
     rtl_loiter: Annotated[
         tuple[Finite, Finite, Finite, Finite, Finite] | None,
         Field(alias="return_to_east_north_amsl_radius_slope_base_m"),
     ] = None
-    direct_landing_start: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
+    direct_landing_start: Annotated[_Number, Field(alias="straight_to_waypoint")] = None
     unjoined_stops: Annotated[tuple[UnjoinedStop, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
     above_ground: Annotated[list[_Height], Field(alias="above_ground_m"), _LISTED] = []
     home_up: Annotated[list[_Height], Field(alias="home_amsl_m"), _LISTED] = []
     min_ground_speed: Annotated[list[_Height], Field(alias="min_ground_speed_mps"), _LISTED] = []
     open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _columns_of_points(cls, value: Any) -> Any:
+        """Return the values of a route by name, with its points as columns."""
+        if not isinstance(value, Route):
+            return value
+        columns = {name: value.points[name] for name in field_names(ROUTE_POINT)} | {"airspeed": value.leg_airspeeds}
+        return columns | {field.name: getattr(value, field.name) for field in fields(value) if field.name != "points"}
+
     def route(self, file: str) -> Route:
         """Return the route of the table.
 
         Raises LogError for inconsistent columns, and for a leg without length.
         """
-        waypoints = np.array(self.waypoints)
-        if not (leg_runs(waypoints) > 0.0).all():
-            raise self.fault(file, "waypoints", "a leg without horizontal length")
-        for field in (
-            "airspeed",
-            "acceptance",
-            "fly_over",
-            "items",
-            *(name for name in ("arcs", "stops", *ROUTE_COLUMNS_WITH_NAN) if getattr(self, name)),
-        ):
-            length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
-            if length != expected:
-                raise self.fault(file, field, f"{length} values: expected {expected}")
-        if self.rtl_start >= len(waypoints) - 1 or (self.rtl_start < 0) != (self.rtl_loiter is None):
-            raise self.fault(file, "rtl_start", f"{self.rtl_start}: expected a waypoint before the last, and a target")
-        if self.direct_landing_start >= len(waypoints):
-            raise self.fault(file, "direct_landing_start", f"{self.direct_landing_start}: expected a waypoint, or -1")
-        heights = {field: getattr(self, field) for field in ("takeoff_ground", "landing_ground")}
-        ground_heights = {field: math.nan if height is None else height for field, height in heights.items()}
+        if not (leg_runs(np.array(self.position)) > 0.0).all():
+            raise self.fault(file, "position", "a leg without horizontal length")
+        columns, count = {}, len(self.position)
+        for name in field_names(ROUTE_POINT):
+            values, expected = getattr(self, name), count - (name == "airspeed")
+            # A log of an earlier version may lack a column.
+            if not values and not type(self).model_fields[name].is_required():
+                continue
+            if len(values) != expected:
+                raise self.fault(file, name, f"{len(values)} values: expected {expected}")
+            columns[name] = [NOT_STATED if value is None else value for value in values]
+        start = self.rtl_start
+        if (start is None) != (self.rtl_loiter is None) or (start is not None and start >= count - 1):
+            text = f"{_NO_NUMBER if start is None else start}: expected a waypoint before the last, and a target"
+            raise self.fault(file, "rtl_start", text)
+        if self.direct_landing_start is not None and self.direct_landing_start >= count:
+            raise self.fault(
+                file, "direct_landing_start", f"{self.direct_landing_start}: expected a waypoint, or {_NO_NUMBER}"
+            )
+        other_fields = {name: value for name, value in self if name not in field_names(ROUTE_POINT)}
         circle = None if self.rtl_loiter is None else ReturnCircle(*self.rtl_loiter)
-        items = np.array(self.items, dtype=np.int64)
-        stops = np.array(self.stops, dtype=np.int64)
-        columns = {"waypoints": waypoints, "items": items, "stops": stops}
-        for name in ROUTE_COLUMNS_WITH_NAN:
-            columns[name] = np.array([math.nan if value is None else value for value in getattr(self, name)])
-        return _make_from_table(Route, self, rtl_loiter=circle, **columns, **ground_heights)
+        return Route(**(other_fields | {"points": route_points(**columns), "rtl_loiter": circle}))
 
 
 class EnvelopeTable(SetupModel):

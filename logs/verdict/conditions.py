@@ -211,7 +211,7 @@ def corridor_line(setup: FlightSetup) -> str:
     if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
     line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} (set [limits] corridor_m to change it)"
-    closest_legs = min_leg_spacing(setup.route.waypoints)
+    closest_legs = min_leg_spacing(setup.route.positions)
     if closest_legs is None or closest_legs[0] >= half_width:
         return line
     spacing, leg = closest_legs

@@ -197,9 +197,7 @@ def with_suggestions(
     Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
     None gets a suggestion if more than `MAX_SUGGESTED_FINDINGS` need one.
     """
-    first_leg = requirements.setup.route.rtl_start
-    last_leg = min(requirements.legs, requirements.setup.route.rtl_end)
-    return_legs = {requirements.leg(i) for i in range(first_leg, last_leg)} if first_leg >= 0 else set()
+    return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
     places = [
         k
         for k, finding in enumerate(findings)

@@ -184,7 +184,7 @@ def suggest_gentler_slope(
         _slope_speed(requirements, leg, planned_slope + SUGGESTION_ANGLE_MARGIN_RAD) if source == "aircraft" else None
     )
     if speed is not None:
-        current_speed = float(requirements.setup.demanded_route.airspeed[leg])
+        current_speed = float(requirements.setup.demanded_route.leg_airspeeds[leg])
         alternatives.append(
             (abs(speed - current_speed) / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
         )
@@ -226,7 +226,7 @@ def suggest_gentler_turn(
     if source == "aircraft" and math.isfinite(requirements.length_before[corner]):
         speed = _turn_speed(requirements, corner)
         if speed is not None:
-            current_speed = float(max(requirements.setup.demanded_route.airspeed[corner - 1 : corner + 1]))
+            current_speed = float(max(requirements.setup.demanded_route.leg_airspeeds[corner - 1 : corner + 1]))
             alternatives.append(
                 (1.0 - speed / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
             )
@@ -270,15 +270,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
     """
     first_point, end_point = max(0, corner - 2), min(len(requirements.points), corner + 3)
     route = requirements.route
-    nearby_route = replace(
-        route,
-        waypoints=route.waypoints[first_point:end_point],
-        airspeed=route.airspeed[first_point : end_point - 1],
-        **{
-            name: getattr(route, name)[first_point:end_point]
-            for name in ("acceptance", "fly_over", "items", "arcs", "above_ground")
-        },
-    )
+    nearby_route = replace(route, points=route.points[first_point:end_point])
     tables, local_corner = performance_tables(nearby_route, requirements.limits), corner - first_point
     for _ in range(SUGGESTION_TRIAL_COUNT):
         degrees = math.floor(10.0 * math.degrees(max_turn)) / 10.0
@@ -289,7 +281,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
         cos, sin = math.cos(change), math.sin(change)
         next_points = points[local_corner + 1 :, :2] - points[local_corner, :2]
         points[local_corner + 1 :, :2] = points[local_corner, :2] + next_points @ np.array([[cos, -sin], [sin, cos]])
-        trial = turn_requirements(replace(nearby_route, waypoints=points), tables)
+        trial = turn_requirements(nearby_route.with_fields(position=points), tables)
         limit, _ = tighter_turn(requirements, corner, float(trial.limit[local_corner]))
         if limit >= math.radians(degrees):
             return degrees
@@ -299,7 +291,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
 
 def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
     """Return the ratio of true airspeed to the commanded airspeed on a leg."""
-    return float(requirements.route.airspeed[leg] / requirements.setup.demanded_route.airspeed[leg])
+    return float(requirements.route.leg_airspeeds[leg] / requirements.setup.demanded_route.leg_airspeeds[leg])
 
 
 def _level_speeds(requirements: RouteRequirements, altitude: float, current_speed: float, factor: float) -> list[float]:
@@ -340,13 +332,13 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
         table = certain_limits.performance(speed * factor)
         return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
-    commanded = float(requirements.setup.demanded_route.airspeed[leg])
+    commanded = float(requirements.setup.demanded_route.leg_airspeeds[leg])
     return first_that_passes(_level_speeds(requirements, max(altitudes), commanded, factor), can_hold_slope)
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
     """Return the highest commanded airspeed, below the current one, at which a turn fits its legs, m/s, or None."""
-    current_speed = float(max(requirements.setup.demanded_route.airspeed[corner - 1 : corner + 1]))
+    current_speed = float(max(requirements.setup.demanded_route.leg_airspeeds[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(
             requirements.runs, requirements.length_before, requirements.length_after, requirements.reversal, corner
@@ -457,8 +449,8 @@ def suggest_flying_faster(
     """Suggest a higher airspeed, above the stall."""
     if finding.limit is None:
         return ()
-    leg = int(np.argmin(requirements.route.airspeed))
-    current_speed = float(requirements.setup.demanded_route.airspeed[leg])
+    leg = int(np.argmin(requirements.route.leg_airspeeds))
+    current_speed = float(requirements.setup.demanded_route.leg_airspeeds[leg])
     requested_speed = (
         math.ceil(
             10.0 * finding.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
@@ -482,7 +474,7 @@ def suggest_level_flight_speed(
     leg = finding.place.index
     if leg is None or finding.limit is None or finding.margin is None:
         return ()
-    commanded = float(requirements.setup.demanded_route.airspeed[leg])
+    commanded = float(requirements.setup.demanded_route.leg_airspeeds[leg])
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     envelope = requirements.setup.envelope
     certain_envelope = envelope.with_margin() if finding.check == UNKNOWN_AIRCRAFT else envelope

@@ -40,7 +40,7 @@ def make_two_flights_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
         with_fence_zones(first.setup).scenario,
         "two flights from above",
         plan_waypoints=None,
-        route_waypoints=first.setup.route.waypoints,
+        route_waypoints=first.setup.route.positions,
         tracks=[
             DrawnTrack(shorten(flight.name, 40), flight.track, role, k)
             for k, (flight, role) in enumerate(zip(flights, ROLES, strict=True))

@@ -138,7 +138,7 @@ def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
     """Make a figure and axes that hold route, threats and ground, with equal scales."""
-    min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
+    min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.positions[:, 2].min())
     corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
     threats = setup.scenario.threats
     sphere_tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array(
@@ -146,7 +146,7 @@ def _make_axes(
     )
     projected_parts = [
         projection.project(corners),
-        projection.project(setup.route.waypoints),
+        projection.project(setup.route.positions),
         projection.project(sphere_tops),
     ]
     if grid is not None:
@@ -262,7 +262,7 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
 
     Return the legend's handles.
     """
-    zones, route = setup.scenario.zones, setup.route.waypoints
+    zones, route = setup.scenario.zones, setup.route.positions
     min_altitude, max_altitude = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
     for zone in zones:
         fill = theme.rgba("zone", 0.10 if zone.kind == "exclusion" else 0.03)

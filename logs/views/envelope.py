@@ -30,7 +30,7 @@ class EnvelopeLine:
 
 def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
     """Return the envelope at the lowest and the highest altitude of the route."""
-    envelope, altitudes = setup.envelope, setup.route.waypoints[:, 2]
+    envelope, altitudes = setup.envelope, setup.route.positions[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []
     for amsl in sorted({round(float(altitudes.min())), round(float(altitudes.max()))}):
@@ -85,7 +85,10 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
         moments = flown_moments(track)
         slopes.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.bank))
-    leg_slopes_deg, commanded_speeds = np.degrees(leg_slopes(setup.display_waypoints)), np.asarray(setup.route.airspeed)
+    leg_slopes_deg, commanded_speeds = (
+        np.degrees(leg_slopes(setup.display_waypoints)),
+        np.asarray(setup.route.leg_airspeeds),
+    )
     slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded_speeds, leg_slopes_deg))
     min_speed, max_speed = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])
     speed_range = (min_speed - 0.5, max_speed + 0.5)

@@ -101,7 +101,7 @@ def _make_map(subject: Subject) -> MapChart:
 
 def _make_scene(subject: Subject) -> SceneView:
     """Make the 3-D view of a flight."""
-    waypoints = len(subject.setup.route.waypoints)
+    waypoints = len(subject.setup.route.points)
     return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
 
 
@@ -171,7 +171,7 @@ FIGURES = (
         "profile",
         "Profile",
         lambda subject: profile_chart(
-            subject.setup.scenario, **_path_arguments(subject), above_ground=subject.setup.route.above_ground
+            subject.setup.scenario, **_path_arguments(subject), above_ground=subject.setup.route.points["above_ground"]
         ),
         alternative=lambda subject: (
             "Heights along the path: terrain, required clearance, "

@@ -20,7 +20,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
 
     Return None if glides were not judged.
     """
-    glides, scenario, route = drawn_returns.glides, setup.scenario, setup.route.waypoints
+    glides, scenario, route = drawn_returns.glides, setup.scenario, setup.route.positions
     if not glides.each:
         return None
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])

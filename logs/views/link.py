@@ -60,7 +60,7 @@ def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapCh
 
     antenna: position of the station's antenna, m, (3,).
     """
-    scenario, route, points = setup.scenario, setup.route.waypoints, along.points
+    scenario, route, points = setup.scenario, setup.route.positions, along.points
     qualities = [link_quality(float(margin)) for margin in points.margin]
     segments = []
     for quality, group in groupby(range(len(qualities)), lambda k: qualities[k]):

@@ -65,7 +65,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
-    >>> figure = draw_paths(setup.scenario, "umda", [PaperPath(setup.route.waypoints, 1.01, safe=True)])
+    >>> figure = draw_paths(setup.scenario, "umda", [PaperPath(setup.route.positions, 1.01, safe=True)])
     >>> figure.axes[0].get_title(loc="left")
     'example: 1 runs of umda, 1 safe'
     """
@@ -96,7 +96,7 @@ def draw_encodings(scenario: Scenario, path_by_encoding: Mapping[str, PaperPath]
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
-    >>> path = PaperPath(setup.route.waypoints, 1.01, safe=True)
+    >>> path = PaperPath(setup.route.positions, 1.01, safe=True)
     >>> figure = draw_encodings(setup.scenario, {"rotated": path, "cartesian": path}, seed=1)
     >>> figure.axes[0].get_title(loc="left")
     'example: one path of each encoding, seed 1'

@@ -55,7 +55,7 @@ def path_layers(
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
     """Return a map of the path, coloured by the outcome of a return from there, and of the worst returns."""
-    scenario, route = setup.scenario, setup.route.waypoints
+    scenario, route = setup.scenario, setup.route.positions
     limit = drawn_returns.returns.limit
 
     def return_text(ret: SimulatedReturn) -> str:

@@ -43,7 +43,7 @@ class GroundGrid:
 
 def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
     """Return the east and north range of area, route and flight, m, (2, 2)."""
-    points = [setup.scenario.bounds.T, setup.route.waypoints[:, :2]]
+    points = [setup.scenario.bounds.T, setup.route.positions[:, :2]]
     if track is not None:
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
     all_points = np.vstack(points)
@@ -69,7 +69,7 @@ def ground_grid(terrain: Terrain | None, bounds: Floats, max_samples: int) -> Gr
 
 def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
     """Return the factor by which heights are stretched to be visible: 1, 1.5, 2 or 3."""
-    altitudes = setup.route.waypoints[:, 2]
+    altitudes = setup.route.positions[:, 2]
     min_altitude, max_altitude = float(altitudes.min()), float(altitudes.max())
     if grid is not None:
         min_altitude, max_altitude = (
@@ -136,7 +136,7 @@ def _zone_walls(setup: FlightSetup) -> dict[str, object]:
 
     The result is empty without zones.
     """
-    zones, altitudes = setup.scenario.zones, setup.route.waypoints[:, 2]
+    zones, altitudes = setup.scenario.zones, setup.route.positions[:, 2]
     if not zones:
         return {}
     walls = [

@@ -89,7 +89,7 @@ def clearance_profile(route: Route, track: Track) -> Singles:
     The pieces are equally long; NaN for a piece that was not flown.  Each track point is assigned to the nearest point
     of the leg that was flown at that time.
     """
-    starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
+    starts, ends = route.positions[:-1, :2], route.positions[1:, :2]
     lengths = np.hypot(*(ends - starts).T)
     leg_starts = np.concatenate([[0.0], np.cumsum(lengths)])
     leg = np.clip(track.leg, 0, len(lengths) - 1)
@@ -109,7 +109,7 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
     later corners are omitted, because their number differs between flights.  Right is relative to the mean of the
     incoming and outgoing courses.
     """
-    points = route.waypoints
+    points = route.positions
     crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
     steps = np.diff(points[:, :2], axis=0)
     courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))

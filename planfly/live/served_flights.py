@@ -319,8 +319,8 @@ class ServedLog:
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
     """Return texts for stations: size of a mission, its verdict, and items that are not flown as written."""
     route = setup.route
-    length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
-    size_text = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
+    length = float(np.linalg.norm(np.diff(route.positions[:, :2], axis=0), axis=1).sum()) / 1000.0
+    size_text = StatusText(f"mission: {len(route.points)} waypoints, {length:.1f} km; {route.started}", INFO)
     notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS_PER_VERDICT])
     return (size_text, *verdict_texts("geometry", verdict), *notes)
 

@@ -364,7 +364,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
             f"{name}: a plan needs a scenario, but this mission was opened without one (--scenario)", file=name
         )
     has_unique_waypoints = (
-        not route.arcs.any() and len(set(route.items[route.items >= 0].tolist())) == (route.items >= 0).sum()
+        not route.arc_radii.any() and len(set(route.items[route.items >= 0].tolist())) == (route.items >= 0).sum()
     )
     if (
         not has_unique_waypoints
@@ -377,7 +377,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
     if (plan := _plan_with_ground_phases(context, mission)) is not None:
         return plan
     _check_plain_waypoints(mission)
-    return _certified_plan(context, np.array(route.waypoints)[route.items >= 0])
+    return _certified_plan(context, np.array(route.positions)[route.items >= 0])
 
 
 def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:

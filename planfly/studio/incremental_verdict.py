@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.items import Mission
-from flight.mission.route import Route, part_of_route
+from flight.mission.route import Route, part_of_route, route_points
 from flight.mission.surveys import camera_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
@@ -97,45 +97,37 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
 
     before_part: True to add the legs before the part, because the part ends at the end of the route.
     """
-    altitudes, wind = route.waypoints[:, 2], context.scenario.wind
+    altitudes, wind = route.positions[:, 2], context.scenario.wind
     leg_altitudes = 0.5 * (altitudes[1:] + altitudes[:-1])
-    true_airspeed = route.airspeed * np.array([_speed_factor(context, float(altitude)) for altitude in leg_altitudes])
-    legs = list(dict.fromkeys([int(np.argmax(route.airspeed)), int(np.argmax(true_airspeed))]))
+    true_airspeed = route.leg_airspeeds * np.array(
+        [_speed_factor(context, float(altitude)) for altitude in leg_altitudes]
+    )
+    legs = list(dict.fromkeys([int(np.argmax(route.leg_airspeeds)), int(np.argmax(true_airspeed))]))
     windiest_altitude = float(
         max(dict.fromkeys(altitudes.tolist()), key=lambda altitude: float(np.hypot(*wind.velocity_at(altitude))))
     )
     added_altitudes = np.array([windiest_altitude, *(leg_altitudes[leg] for leg in legs for _ in range(2))])
-    leg_airspeeds = np.array([speed for leg in legs for speed in (route.airspeed[leg], route.airspeed[leg])])
+    leg_airspeeds = np.array([speed for leg in legs for speed in (route.leg_airspeeds[leg], route.leg_airspeeds[leg])])
     count = len(added_altitudes)
     end, neighbour = (0, 1) if before_part else (-1, -2)
-    direction = part.waypoints[end, :2] - part.waypoints[neighbour, :2]
+    direction = part.positions[end, :2] - part.positions[neighbour, :2]
     if not direction.any():
         direction = np.array([0.0, 1.0])
     steps = _APPENDED_LEG_LENGTH_M * np.arange(1.0, count + 1.0)[:, None] * direction / float(np.hypot(*direction))
-    points = np.column_stack([part.waypoints[end, :2] + steps, added_altitudes])
+    positions = np.column_stack([part.positions[end, :2] + steps, added_altitudes])
     # The first appended leg keeps the airspeed at the end of the part.  Each further leg has the airspeed for the pair
     # of altitudes at its ends.
-    added_airspeeds = np.concatenate([part.airspeed[end : end + 1 or None], leg_airspeeds])
-    element_order = slice(None, None, -1) if before_part else slice(None)
-
-    def join(part_values: np.ndarray, added_values: np.ndarray) -> np.ndarray:
-        return np.concatenate(
-            [added_values[element_order], part_values] if before_part else [part_values, added_values]
-        )
-
-    stops = part.stops.max() + 1 + np.arange(count)
-    extended_part = replace(
-        part,
-        waypoints=join(part.waypoints, points),
-        airspeed=join(part.airspeed, added_airspeeds),
-        acceptance=join(part.acceptance, np.zeros(count)),
-        fly_over=join(part.fly_over, np.zeros(count, dtype=np.bool_)),
-        items=join(part.items, np.full(count, -1)),
-        arcs=join(part.arcs, np.zeros(count)),
-        above_ground=join(part.above_ground, np.full(count, np.nan)),
-        stops=np.concatenate([np.arange(count), part.stops + count]) if before_part else join(part.stops, stops),
-    )
-    return extended_part, count if before_part else 0
+    added_airspeeds = np.concatenate([part.leg_airspeeds[end : end + 1 or None], leg_airspeeds])
+    if before_part:
+        added_points = route_points(positions[::-1], added_airspeeds[:0:-1], stop=np.arange(count))
+        points = np.concatenate([added_points, part.points])
+        points["airspeed"][count], points["stop"][count:] = added_airspeeds[0], part.stops + count
+    else:
+        stops = part.stops.max() + 1 + np.arange(count)
+        added_points = route_points(positions, added_airspeeds[1:], stop=stops)
+        added_points["airspeed"][0] = added_airspeeds[0]
+        points = np.concatenate([part.points, added_points])
+    return replace(part, points=points), count if before_part else 0
 
 
 def _speed_factor(context: EditContext, altitude: float) -> float:
@@ -174,7 +166,7 @@ def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None
     Overlapping spans are merged. Landing sequences and returns depend on the whole route.
     """
     rows = np.flatnonzero(route.items == seq)
-    if not len(rows) or route.rtl_start >= 0 or route.direct_landing_start >= 0:
+    if not len(rows) or route.rtl_start is not None or route.direct_landing_start is not None:
         return None
     spans: list[tuple[int, int]] = []
     for first, last in _consecutive_runs(rows):
@@ -194,12 +186,12 @@ def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
     """Return a span extended by at least `REACH` and `LEGS` on both sides, without cutting a loiter."""
-    distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.waypoints))])
+    distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.positions))])
     start = min(first - LEGS, int(np.searchsorted(distance, distance[first] - REACH, side="right")) - 1)
     end = max(last + LEGS, int(np.searchsorted(distance, distance[last] + REACH)))
     start, end = max(0, start), min(route.legs, end)
-    while start and (route.stops[start] == route.stops[start - 1] or route.arcs[start]):
+    while start and (route.stops[start] == route.stops[start - 1] or route.arc_radii[start]):
         start -= 1
-    while end < route.legs and (route.stops[end] == route.stops[end + 1] or route.arcs[end]):
+    while end < route.legs and (route.stops[end] == route.stops[end + 1] or route.arc_radii[end]):
         end += 1
     return start, end

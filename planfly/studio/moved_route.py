@@ -55,7 +55,8 @@ def update_moved_route(
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
     waypoint_seqs = {item.seq for item in mission.items if item.command == Command.NAV_WAYPOINT}
     rules = airframe.autopilot.route_rules
-    points, acceptance, changed_rows = np.array(route.waypoints), np.array(route.acceptance), set[int]()
+    points, changed_rows = route.points.copy(), set[int]()
+    positions = points["position"]
     for old_item, new_item in pairs:
         row, old_position, new_position = (
             rows[new_item.seq],
@@ -63,17 +64,22 @@ def update_moved_route(
             _map_position(new_item, mission, scenario),
         )
         neighbours = [k for k in (row - 1, row + 1) if 0 <= k <= route.legs]
-        if old_position is None or new_position is None or math.dist(old_position, points[row]) > _POSITION_TOLERANCE_M:
+        if old_position is None or new_position is None:
             return None
-        if any(int(route.items[k]) not in waypoint_seqs or route.arcs[k] for k in neighbours):
+        if math.dist(old_position, positions[row]) > _POSITION_TOLERANCE_M:
             return None
-        points[row], acceptance[row] = new_position, min(max(0.0, new_item.params[1]), rules.acceptance_limit)
+        if any(int(route.items[k]) not in waypoint_seqs or route.arc_radii[k] for k in neighbours):
+            return None
+        positions[row] = new_position
+        if not math.isnan(points["above_ground"][row]):
+            points["above_ground"][row] = new_item.alt
+        points["acceptance_radius"][row] = min(max(0.0, new_item.params[1]), rules.acceptance_limit)
         changed_rows |= {row, *neighbours}
-    if any(_is_near_previous(points_array, k) for points_array in (points, route.waypoints) for k in changed_rows if k):
+    if any(_is_near_previous(array, k) for array in (positions, route.positions) for k in changed_rows if k):
         return None
-    must_fly_over = fly_over_waypoints(points, route.airspeed, acceptance, airframe.limits, rules.turn_distance)
-    fly_over = np.where(route.arcs > 0.0, False, scenario.flight.fly_over | must_fly_over)
-    return replace(route, waypoints=points, acceptance=acceptance, fly_over=fly_over)
+    must_fly_over = fly_over_waypoints(points, airframe.limits, rules.turn_distance)
+    points["fly_over"] = np.where(route.arc_radii > 0.0, False, scenario.flight.fly_over | must_fly_over)
+    return replace(route, points=points)
 
 
 def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
@@ -88,7 +94,7 @@ def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
 
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
     """Return True if each position item is one stop of the route, with an altitude independent of other items."""
-    if route.rtl_start >= 0 or route.direct_landing_start >= 0 or math.isfinite(route.landing_ground):
+    if any(value is not None for value in (route.rtl_start, route.direct_landing_start, route.landing_ground)):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:
         return False

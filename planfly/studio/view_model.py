@@ -144,7 +144,7 @@ def sheet_json(context: EditContext, judged_mission: JudgedMission) -> Json:
         "findings": findings_json(verdict),
         "profile": profile_json(context.scenario, setup),
         "total": {
-            "km": round(float(route_distance(setup.route.waypoints)[-1]) / 1000.0, 2),
+            "km": round(float(route_distance(setup.route.positions)[-1]) / 1000.0, 2),
             "s": round(path.times[-1]),
         },
     }
@@ -195,7 +195,7 @@ def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
     """Return page data of the waypoints `first` to `last`, each with the index of its item, or -1 without an item."""
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
-    return {"route": round_to_json(route.waypoints[first : last + 1]), "of": items}
+    return {"route": round_to_json(route.positions[first : last + 1]), "of": items}
 
 
 def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -> list[list[float]]:
@@ -262,7 +262,7 @@ def _finding_json(number: int, finding: Finding) -> Json:
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
     """Return page data of the profile along the route: terrain, waypoints, and sections of threats and zones."""
-    route = setup.route.waypoints
+    route = setup.route.positions
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))
     ground = terrain_altitudes(scenario, points)

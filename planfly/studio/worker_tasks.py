@@ -68,7 +68,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
         "autopilot": setup.autopilot.title,
         "seconds": seconds,
         "figures": flight_results(mission, setup.route, flight.verdict.findings, seconds),
-        **_track_json(setup.route.waypoints, flight.track, flight.verdict.leg_ends),
+        **_track_json(setup.route.positions, flight.track, flight.verdict.leg_ends),
     }
 
 

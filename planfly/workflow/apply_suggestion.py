@@ -154,13 +154,13 @@ class _EditedMission:
 
     def waypoint_positions(self) -> Floats:
         """Return the waypoints of the route before the change, (w, 3), m."""
-        return np.asarray(self.route.waypoints)
+        return np.asarray(self.route.positions)
 
     def current_position(self, waypoint: int) -> Floats:
         """Return a waypoint of the route as moved so far, (3,) m."""
         index = self.item_index(waypoint)
         offset = np.zeros(3) if index is None else self.offsets.get(index, np.zeros(3))
-        return np.asarray(self.route.waypoints[waypoint] + offset)
+        return np.asarray(self.route.positions[waypoint] + offset)
 
     def move_items(self, waypoints: Sequence[int], offset: Floats) -> None:
         """Move the items of waypoints, except landings, each item once.
@@ -240,8 +240,8 @@ def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) 
         legs = range(max(0, place.index - 1), min(route.legs, place.index + 1))
     for leg in reversed(legs):
         index = edited.item_index(leg + 1)
-        if index is not None and airspeed != route.airspeed[leg]:
-            edited.mission = set_airspeed(edited.mission, index, airspeed, float(route.airspeed[leg]))
+        if index is not None and airspeed != route.leg_airspeeds[leg]:
+            edited.mission = set_airspeed(edited.mission, index, airspeed, float(route.leg_airspeeds[leg]))
             edited.is_changed = True
 
 

@@ -57,8 +57,8 @@ def predicted_seconds(setup: FlightSetup) -> float:
     >>> bool(abs(predicted_seconds(flown.setup) - flown.track.time[-1]) < 5.0)
     True
     """
-    leg_lengths = leg_runs(setup.route.waypoints)
-    speed = leg_lengths.sum() / (leg_lengths / setup.demanded_route.airspeed).sum()
+    leg_lengths = leg_runs(setup.route.positions)
+    speed = leg_lengths.sum() / (leg_lengths / setup.demanded_route.leg_airspeeds).sum()
     return float(setup.path.length / speed)
 
 

@@ -421,7 +421,7 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
         return setup
     stretch, *others = source.stretches
     is_inside = (track.time >= stretch.start) & (track.time <= stretch.end)
-    rows = np.flatnonzero(is_inside & (track.position[:, 2] >= route.waypoints[0, 2]))
+    rows = np.flatnonzero(is_inside & (track.position[:, 2] >= route.positions[0, 2]))
     if not rows.size:
         return setup
     east, north, up = track.position[rows[0]].tolist()

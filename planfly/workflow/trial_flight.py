@@ -99,7 +99,8 @@ def reason_not_to_start(requirements: RouteRequirements) -> str:
     is skipped if even full power throughout the flight would not exceed this energy.
     """
     setup = requirements.setup
-    duration, full_power = setup.path.length / float(setup.demanded_route.airspeed.min()), setup.envelope.power_full
+    duration = setup.path.length / float(setup.demanded_route.leg_airspeeds.min())
+    full_power = setup.envelope.power_full
     full_energy = float(np.nanmax(full_power, initial=0.0)) * duration / 3600.0
     if full_energy <= MAX_ENERGY_RATIO * setup.battery:
         return ""

@@ -62,7 +62,7 @@ def test_the_first_flight_is_as_its_page_says() -> None:
     with TemporaryDirectory() as folder:
         log = Path(folder, "flight.mcap")
         log.write_bytes(files["flight.mcap"])
-        route = read_log(log).setup.route.waypoints
+        route = read_log(log).setup.route.positions
     assert f"{np.linalg.norm(np.diff(route[:, :2], axis=0), axis=1).sum() / 1000.0:.1f} km in all" in words
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from aircraft.envelope import Envelope
 from flight.mission.items import Home, Mission, MissionItem
-from flight.mission.route import Route
+from flight.mission.itinerary import NO_ITEM
+from flight.mission.route import Route, route_points
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import Track
 from logs.recording.recorder import Recorder
@@ -50,11 +51,13 @@ def make_setup(*, with_plan: bool = True, **changes: object) -> FlightSetup:
     rally = MissionItem(0, 5100, 3, (0.0, 0.0, 0.0, 0.0), 46.003, 8.004, 77.7)
     mission = Mission(Home(45.99, 7.99, 301.5), items, (fence,), (rally,), 25.5, ("line 3: CRLF",), "a.waypoints")
     route = Route(
-        waypoints=WAYPOINTS,
-        airspeed=np.array([25.0, 26.1, 24.7]),
-        acceptance=np.array([0.0, 25.0, 30.3, 0.0]),
-        fly_over=np.array([False, True, False, False]),
-        items=np.array([-1, 2, 3, 4]),
+        points=route_points(
+            WAYPOINTS,
+            [25.0, 26.1, 24.7],
+            acceptance_radius=[0.0, 25.0, 30.3, 0.0],
+            fly_over=[False, True, False, False],
+            item=[NO_ITEM, 2, 3, 4],
+        ),
         started="Started in the air at waypoint 0.",
         notes=("item 9 is not flown",),
     )

@@ -303,7 +303,7 @@ class SitlFlight(ProgramFlight):
 
         For a take-off, return the rail of the launch.
         """
-        start, points = self._find_start(setup), setup.route.waypoints
+        start, points = self._find_start(setup), setup.route.positions
         if self._ground_phases.take_off is not None:
             self._start_trimmed(setup.mission.source, start)
             aircraft = self.fdm.aircraft

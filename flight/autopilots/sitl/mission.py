@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flight.mission.ground_ways import GroundPhases
 from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, round_to_grid
-from flight.mission.itinerary import stated_loiter
+from flight.mission.itinerary import NO_ITEM, stated_loiter
 from flight.mission.route import Route, ends_at_plain_waypoint
 from flight.simulation.setup import FlightSetup
 from world.arrays import Floats
@@ -57,7 +57,7 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         return _unchanged_mission(setup, setup.ground_phases)
     route, origin = setup.route, setup.scenario.origin
     items: list[MissionItem] = []
-    has_landing = route.rtl_start >= 0 and route.rtl_end <= route.legs
+    has_landing = route.rtl_start is not None and route.rtl_end <= route.legs
     for item in setup.mission.items:
         waypoint_indices = np.flatnonzero(route.items == item.seq)
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
@@ -68,9 +68,9 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
             items.append(item)
     if not any(item.has_position for item in items):
         items = _route_items(route, origin)
-    elif route.items[-1] == -1 and items[-1].command != Command.NAV_LOITER_UNLIM:
-        items.append(_make_waypoint(items[-1].seq + 1, route.waypoints[-1], 0.0, origin))
-    if (route.rtl_start >= 0 and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
+    elif route.items[-1] == NO_ITEM and items[-1].command != Command.NAV_LOITER_UNLIM:
+        items.append(_make_waypoint(items[-1].seq + 1, route.positions[-1], 0.0, origin))
+    if (route.rtl_start is not None and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally)
     if setup.autopilot.loiters.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
         return UploadedMission(_home_for_upload(setup), _renumber(items))
@@ -104,10 +104,12 @@ def _item_with_position(
     waypoint_indices: waypoints of the route that belong to the item.
     earlier: items that are uploaded before this one; a loiter without a position is about the last of their positions.
     """
-    position = route.waypoints[waypoint_indices[-1]]
+    position = route.positions[waypoint_indices[-1]]
     loiter = stated_loiter(item)
     if loiter is None:
-        waypoint = _make_waypoint(item.seq, position, float(route.acceptance[waypoint_indices[-1]]), origin)
+        waypoint = _make_waypoint(
+            item.seq, position, float(route.points["acceptance_radius"][waypoint_indices[-1]]), origin
+        )
         if item.command != Command.NAV_WAYPOINT:
             return waypoint
         hold, _, pass_by, yaw = (0.0 if math.isnan(value) else value for value in item.params)
@@ -124,10 +126,10 @@ def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
     """Return waypoints and changes of speed for a route whose mission has no items with positions."""
     items: list[MissionItem] = []
     speed = math.nan
-    for index, point in enumerate(route.waypoints):
-        items.append(_make_waypoint(len(items) + 1, point, float(route.acceptance[index]), origin))
-        if index < len(route.airspeed) and route.airspeed[index] != speed:
-            speed = float(route.airspeed[index])
+    for index, point in enumerate(route.positions):
+        items.append(_make_waypoint(len(items) + 1, point, float(route.points["acceptance_radius"][index]), origin))
+        if index < route.legs and route.leg_airspeeds[index] != speed:
+            speed = float(route.leg_airspeeds[index])
             change = (0.0, speed, -1.0, 0.0)
             items.append(
                 MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), change, 0.0, 0.0, 0.0)
@@ -143,9 +145,9 @@ def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin
 
 def _extra_point(route: Route) -> Floats:
     """Return the position (3,) of the extra waypoint, m: straight on after the last leg, at its final altitude."""
-    east, north, _ = route.waypoints[-1] - route.waypoints[-2]
+    east, north, _ = route.positions[-1] - route.positions[-2]
     scale = EXTRA_WAYPOINT_DISTANCE_M / math.hypot(east, north)
-    return route.waypoints[-1] + np.array([scale * east, scale * north, 0.0])
+    return route.positions[-1] + np.array([scale * east, scale * north, 0.0])
 
 
 def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
@@ -169,7 +171,7 @@ def _home_for_upload(setup: FlightSetup) -> Home:
     Near home's altitude ArduPlane would limit the throttle as before a take-off.  A mission with an RTL, which measures
     its altitudes from home, keeps its own home.
     """
-    start = setup.route.waypoints[0]
+    start = setup.route.positions[0]
     home = setup.mission.home
     if home is None:
         lat, lon = to_geo(setup.scenario.origin, start[0], start[1])

@@ -64,7 +64,7 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
         return None
     aligned, waypoint_indices = _earliest_lap(setup, rows, aligned, waypoint_indices)
     first, last = int(waypoint_indices[0]), int(waypoint_indices[-1])
-    route_end = len(setup.route.waypoints) - 1
+    route_end = len(setup.route.points) - 1
     time_after_last = float(aligned.track.time[-1] - aligned.track.time[aligned.rows[last]])
     is_partial = last < route_end and time_after_last > PARTIAL_LEG_MIN_S
     end = last + 1 if is_partial else last
@@ -184,7 +184,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     stretches = () if source is None else source.stretches
     stretch_tracks = [rows_between(track, stretch.start, stretch.end) for stretch in stretches]
     stretch_tracks = [rows for rows in stretch_tracks if len(rows) > 1]
-    points = setup.route.waypoints
+    points = setup.route.positions
     if not stretch_tracks:
         return None
     min_distances, times = _closest_distances(points, stretch_tracks)

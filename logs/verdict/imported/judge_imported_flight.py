@@ -466,7 +466,7 @@ def _merge_precedence(finding: Finding) -> int:
 
 def _leg_ends(setup: FlightSetup, flown_stretches: Sequence[FlownLegs]) -> tuple[float, ...]:
     """Return the end time of each leg but the last, s, never decreasing; inf from the first unreached leg on."""
-    end_times = np.full(len(setup.route.waypoints), np.inf)
+    end_times = np.full(len(setup.route.points), np.inf)
     for legs in flown_stretches:
         times = legs.aligned.track.time[legs.aligned.rows]
         end_waypoint = legs.last if legs.partial else legs.last + 1

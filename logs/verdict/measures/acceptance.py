@@ -56,7 +56,7 @@ def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceC
     where a return to launch begins, up to the full WP_RADIUS is allowed.
     """
     setup, path_radius = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
-    mission_radius = float(setup.route.acceptance[i])
+    mission_radius = float(setup.route.points["acceptance_radius"][i])
     tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     if mission_radius > 0.0:
         return AcceptanceCondition(mission_radius, "mission", tolerance)
@@ -102,12 +102,12 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     radius_is_known = source is None or source.aircraft_known
     if radius_is_known and not requirements.setup.autopilot.turns.follows_path:
         # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is an estimate.
-        radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
+        radius = np.where(requirements.setup.route.arc_radii[ends] == 0.0, requirements.radius[ends], 0.0)
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
     if requirements.setup.autopilot.loiters.steers_to_center:
-        arcs, tightest = requirements.setup.route.arcs[ends], requirements.min_radius[ends]
+        arcs, tightest = requirements.setup.route.arc_radii[ends], requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
         loiter_radius = float(arcs.max())
@@ -176,7 +176,7 @@ def shortcut_distance(requirements: RouteRequirements, first: int, last: int) ->
     distance = max(_distance_from_leg(point, start, end) for point in omitted)
     if (
         distance > KINK_FRACTION * requirements.setup.corridor
-        or requirements.setup.route.arcs[first : last + 1].any()
+        or requirements.setup.route.arc_radii[first : last + 1].any()
         or not _gap_has_room(requirements, first, last)
     ):
         return None
@@ -232,7 +232,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
     if run_in == 0.0 or run_out == 0.0:
         # A vertical leg has no course.
         return True
-    table = requirements.limits.performance(float(max(route.airspeed[before], route.airspeed[corner])))
+    table = requirements.limits.performance(float(max(route.leg_airspeeds[before], route.leg_airspeeds[corner])))
     radius = turn_radius_between(table, course_in, course_out, points[1][2])
     if not math.isfinite(radius):
         aircraft_limit = 0.0
@@ -249,10 +249,9 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 
     Each leg has the speed of the old leg that begins at the same waypoint.
     """
-    names = ("waypoints", "acceptance", "fly_over", "items", "arcs", "above_ground")
-    return replace(
-        route, airspeed=route.airspeed[waypoints[:-1]], **{name: getattr(route, name)[waypoints] for name in names}
-    )
+    points = route.points[waypoints]
+    points["airspeed"][1:] = route.leg_airspeeds[waypoints[:-1]]
+    return replace(route, points=points)
 
 
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:

@@ -33,7 +33,7 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
     )
     for leg, duration in enumerate(leg_durations):
         speed, altitude = (
-            float(route.airspeed[leg]),
+            float(route.leg_airspeeds[leg]),
             float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
         )
         power = power_at(speed, altitude, air_angle(requirements, leg, speed, altitude))

@@ -24,7 +24,7 @@ def _returns_after_last_item(setup: FlightSetup) -> bool:
     a home.
     """
     route, mission = setup.route, setup.mission
-    ends_in_flight = route.rtl_start < 0 and route.endless_jump < 0 and mission.home is not None
+    ends_in_flight = route.rtl_start is None and route.endless_jump is None and mission.home is not None
     if setup.source is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
         return False
     last_seq = _last_seq(setup)
@@ -43,7 +43,7 @@ def _last_seq(setup: FlightSetup) -> int:
 def _distance_to_destination(setup: FlightSetup) -> float:
     """Return the distance from the end of a mission to the destination of its scenario, m."""
     route = setup.route
-    return math.dist(route.waypoints[route.items.tolist().index(_last_seq(setup))], setup.scenario.destination)
+    return math.dist(route.positions[route.items.tolist().index(_last_seq(setup))], setup.scenario.destination)
 
 
 def _ends_at_destination(setup: FlightSetup) -> bool:

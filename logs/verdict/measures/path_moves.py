@@ -61,7 +61,9 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
     first, last: first and last leg to return; by default all legs.
     """
-    speeds = np.where(np.isfinite(requirements.ground_speed), requirements.ground_speed, requirements.route.airspeed)
+    speeds = np.where(
+        np.isfinite(requirements.ground_speed), requirements.ground_speed, requirements.route.leg_airspeeds
+    )
     moves = path_moves(requirements.setup.path, speeds, first, requirements.legs - 1 if last is None else last)
     return moves[(moves["leg"] >= first) & (moves["leg"] <= (requirements.legs if last is None else last))]
 

@@ -83,7 +83,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     """
     steps = np.hypot(*np.diff(position[:, :2], axis=0).T)
     distance_run = np.concatenate([[0.0], np.cumsum(steps)])
-    length = float(np.hypot(*np.diff(route.waypoints[:, :2], axis=0).T).sum())
+    length = float(np.hypot(*np.diff(route.positions[:, :2], axis=0).T).sum())
     spacing = max(_SAMPLE_SPACING_M, math.sqrt(max(1.0, length) * max(1.0, float(distance_run[-1])) / _MAX_CELLS))
     samples = _sample_route(route, spacing)
     rows = np.unique(
@@ -98,7 +98,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
     )
     begin_rows, end_rows = rows[ends[:, 0]], rows[ends[:, 1]]
     final_sample = int(np.flatnonzero(ends[:, 0] >= 0)[-1])
-    count = len(route.waypoints)
+    count = len(route.points)
     target = min(count - 1, int(np.searchsorted(samples.sample_of_waypoint, final_sample, side="right")))
     while target + 1 < count and samples.sample_of_waypoint[target + 1] == samples.sample_of_waypoint[target]:
         target += 1
@@ -124,12 +124,12 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
 
 def _sample_route(route: Route, spacing: float) -> _Samples:
     """Sample the legs of a route about every `spacing` (m); a loiter is one sample, however many laps it has."""
-    points = route.waypoints[:, :2]
+    points = route.positions[:, :2]
     positions, radii, distances = [points[0]], [0.0], [0.0]
     sample_of_waypoint = np.zeros(len(points), dtype=np.int64)
     for i in range(1, len(points)):
         start, end = points[i - 1], points[i]
-        if route.arcs[i] > 0.0 and route.arcs[i - 1] > 0.0 and route.stops[i] == route.stops[i - 1]:
+        if route.arc_radii[i] > 0.0 and route.arc_radii[i - 1] > 0.0 and route.stops[i] == route.stops[i - 1]:
             sample_of_waypoint[i] = sample_of_waypoint[i - 1]
             continue
         length = math.dist(start, end)
@@ -139,11 +139,13 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
             radii.append(0.0)
             distances.append(distances[-1] + length / count)
         sample_of_waypoint[i] = len(positions) - 1
-        if route.arcs[i] > 0.0:
+        if route.arc_radii[i] > 0.0:
             corners = [
-                k for k in range(i, len(points)) if route.stops[k] == route.stops[i] and route.arcs[i : k + 1].all()
+                k
+                for k in range(i, len(points))
+                if route.stops[k] == route.stops[i] and route.arc_radii[i : k + 1].all()
             ]
-            positions[-1], radii[-1] = _loiter_center(route, points[corners], float(route.arcs[i]), i)
+            positions[-1], radii[-1] = _loiter_center(route, points[corners], float(route.arc_radii[i]), i)
     return _Samples(np.array(positions), np.array(radii), np.array(distances), sample_of_waypoint)
 
 
@@ -154,7 +156,7 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
     """
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     reach_radius = float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
-    if 0 <= route.rtl_start < first < route.rtl_end:
+    if route.rtl_start is not None and route.rtl_start < first < route.rtl_end:
         reach_radius = max(reach_radius, RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     return center, reach_radius
 

@@ -156,21 +156,21 @@ class TurnRequirements:
 
 def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceTable]:
     """Return the aircraft's performance at each airspeed of a route, m/s."""
-    return {float(speed): limits.performance(float(speed)) for speed in route.airspeed}
+    return {float(speed): limits.performance(float(speed)) for speed in route.leg_airspeeds}
 
 
 def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> TurnRequirements:
     """Compute the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
-    points = np.asarray(route.waypoints, dtype=np.float64)
+    points = route.positions
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
     turns = np.zeros(count)
     if count > 2:
         turns[1:-1] = signed_turns(points)
     min_radius, radius, length_before, length_after = (np.zeros(count) for _ in range(4))
     for i in range(1, count - 1):
-        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
+        speed = float(max(route.leg_airspeeds[i - 1], route.leg_airspeeds[i]))
         min_radius[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
-        radius[i] = route.arcs[i] or min_radius[i]
+        radius[i] = route.arc_radii[i] or min_radius[i]
         length_before[i], length_after[i] = turn_lengths(
             abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i])
         )
@@ -205,7 +205,7 @@ def _reversal_lengths(
     for leg in range(1, len(courses) - 1):
         are_fly_bys = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
         if turns[leg] * turns[leg + 1] < 0.0 and are_fly_bys:
-            table = tables[float(route.airspeed[leg])]
+            table = tables[float(route.leg_airspeeds[leg])]
             course_east, course_north = math.sin(courses[leg]), math.cos(courses[leg])
             min_altitude = float(min(up[leg], up[leg + 1]))
             lengths[leg] = roll_reversal_length(
@@ -424,7 +424,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     envelope: False to omit the aircraft's limits and judge by only the flown evidence.
     """
     route, limits = true_route(setup), setup.limits
-    points = np.asarray(route.waypoints, dtype=np.float64)
+    points = route.positions
     tables = performance_tables(route, limits)
     turns = turn_requirements(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
@@ -510,23 +510,22 @@ def true_route(setup: FlightSetup) -> Route:
     >>> true_route(setup) is setup.route
     True
     >>> faster = true_route(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
-    >>> bool((faster.airspeed > setup.route.airspeed).all())
+    >>> bool((faster.leg_airspeeds > setup.route.leg_airspeeds).all())
     True
     """
     route = setup.demanded_route
     speeds = setup.autopilot.speeds
     if not speeds.equivalent:
         return route
-    mean_altitudes = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
-    return replace(
-        route, airspeed=route.airspeed * [speeds.true_airspeed_factor(altitude) for altitude in mean_altitudes]
-    )
+    mean_altitudes = 0.5 * (route.positions[1:, 2] + route.positions[:-1, 2])
+    factors = [speeds.true_airspeed_factor(altitude) for altitude in mean_altitudes]
+    return route.with_fields(airspeed=route.leg_airspeeds * factors)
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
     """Return the fly-by path as a chain of points, with the time at each point."""
     points, legs = path_polyline(path)
-    speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
+    speed = np.where(np.isfinite(ground_speed), ground_speed, route.leg_airspeeds)
     runs = np.hypot(*np.diff(points[:, :2], axis=0).T)
     return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(runs / speed[legs])]))
 
@@ -538,7 +537,7 @@ def _leg_limits(
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
-        table, course = tables[float(route.airspeed[leg])], float(courses[leg])
+        table, course = tables[float(route.leg_airspeeds[leg])], float(courses[leg])
         altitudes = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
         speeds[leg] = min(ground_speed_on(table, course, altitude) for altitude in altitudes)
         if any(math.isnan(ground_speed_on(table, course, altitude)) for altitude in altitudes):
@@ -563,7 +562,7 @@ def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Float
     """
     slopes = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
-    speed = float(route.airspeed.max()) + setup.scenario.wind.max_speed_at(points[:, 2])
+    speed = float(route.leg_airspeeds.max()) + setup.scenario.wind.max_speed_at(points[:, 2])
     for i in range(1, len(points) - 1):
         slope_changes = [abs(slopes[i] - slopes[i - 1])]
         turn = abs(float(turns.turns[i]))
@@ -601,7 +600,7 @@ def tighter_turn(requirements: RouteRequirements, i: int, aircraft_limit: float)
     """Return the tighter of the scenario's limit and an aircraft limit, rad, and its source."""
     scenario_limit = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.
-    if scenario_limit is not None and scenario_limit <= aircraft_limit and requirements.setup.route.arcs[i] == 0.0:
+    if scenario_limit is not None and scenario_limit <= aircraft_limit and requirements.setup.route.arc_radii[i] == 0.0:
         return scenario_limit, "scenario"
     return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
 
@@ -626,7 +625,7 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     cannot make on the arc changes its speed by g dh / V.
     """
     i = leg + 1
-    if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arcs[i] > 0.0:
+    if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arc_radii[i] > 0.0:
         return None
     turn_length, length = (
         float(requirements.length_before[i]),
@@ -639,5 +638,5 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
-    limit, speed = float(np.tan(limits).mean()), float(requirements.route.airspeed[leg])
+    limit, speed = float(np.tan(limits).mean()), float(requirements.route.leg_airspeeds[leg])
     return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > SPEED_TOLERANCE_MPS else None

@@ -251,7 +251,7 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
     """Return the rows of a leg from the time at which its commanded airspeed can be reached; the slice may be empty."""
     rows = aligned.leg_rows(leg)
-    speeds = requirements.route.airspeed
+    speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
     start = float(aligned.track.time[rows.start]) + change / MAX_STEADY_ACCELERATION_MPS2
     return slice(max(rows.start, int(np.searchsorted(aligned.track.time, start))), rows.stop)
@@ -267,7 +267,7 @@ def _saturation_times(
         return 0.0, 0.0, 0.0, 0.0
     tick = aligned.tick
     is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
-    commanded = float(requirements.route.airspeed[leg])
+    commanded = float(requirements.route.leg_airspeeds[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed but not the energy: the airspeed without the gust must be off, too.
     gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
@@ -321,7 +321,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     acceleration = np.gradient(velocity, track.time[rows], axis=0)
     climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_measured]
-    commanded_speed, altitude = float(requirements.route.airspeed[leg]), track.position[rows, 2][is_measured]
+    commanded_speed, altitude = float(requirements.route.leg_airspeeds[leg]), track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
     fit = _plane_at_origin(

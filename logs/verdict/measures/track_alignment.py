@@ -161,13 +161,13 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 def _arrival_radii(requirements: RouteRequirements) -> Floats:
     """Return the radius around each waypoint within which a track that ends has arrived at the waypoint, m, (w,)."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.turns.follows_path
-    offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
+    offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.points))
     radii = [
         max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
         for i, offset in enumerate(offsets)
     ]
     first_return = route.rtl_start
-    if first_return >= 0:
+    if first_return is not None:
         # A return may end anywhere on its loiter, and the flown loiter may differ from the drawn one.
         end_return, loiter = route.rtl_end, route.rtl_loiter
         loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
@@ -177,8 +177,8 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
         ]
     if requirements.setup.autopilot.loiters.steers_to_center:
         # A mission that ends on a loiter may end anywhere on the loiter, which may be flown wider than drawn.
-        k, item = route.arcs.size - 1, route.items[-1]
-        while k > 0 and route.items[k] == item and route.arcs[k - 1]:
+        k, item = route.arc_radii.size - 1, route.items[-1]
+        while k > 0 and route.items[k] == item and route.arc_radii[k - 1]:
             radii[k] = max(radii[k], RTL_ARRIVAL_RADIUS_M)
             k -= 1
     return np.array(radii)
@@ -217,7 +217,7 @@ def _advance_last_leg(
     if (
         not 0 < last_passed < len(rows) - 1
         or rows[last_passed] < len(track) - 1
-        or requirements.setup.route.arcs[last_passed] > 0.0
+        or requirements.setup.route.arc_radii[last_passed] > 0.0
     ):
         return
     distances = np.hypot(*(track.position[:, :2] - requirements.points[last_passed, :2]).T)

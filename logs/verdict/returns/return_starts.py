@@ -66,7 +66,7 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     (True, 0.0, True)
     """
     is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
-    if setup.route.rtl_start >= 0 and setup.source is None:
+    if setup.route.rtl_start is not None and setup.source is None:
         is_usable &= track.leg < setup.route.rtl_start
     usable_rows = np.flatnonzero(is_usable)
     if not usable_rows.size:
@@ -98,7 +98,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
         return is_ground_phase, is_ground_phase.copy()
     height_above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
     is_low = is_ground_phase & (height_above_ground < setup.limits.min_clearance + SINK_HEIGHT_LOSS_M)
-    min_airspeed = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]
+    min_airspeed = setup.envelope.level_speeds(float(setup.route.positions[0, 2]))[0]
     return is_low, is_low & (track.airspeed[rows] < min_airspeed)
 
 
@@ -124,7 +124,7 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     (True, False)
     """
     route = setup.route
-    last_leg = route.rtl_start - 1 if route.rtl_start >= 0 else route.legs - 1
+    last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
     moves = moves[moves["leg"] <= last_leg]
     if not len(moves):
@@ -181,9 +181,9 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 def _ground_speeds(setup: FlightSetup) -> Floats:
     """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s."""
     route, speeds = setup.route, []
-    courses = leg_courses(route.waypoints)
-    for leg, speed in enumerate(route.airspeed.tolist()):
-        wind = setup.scenario.wind.components_on_course(float(courses[leg]), float(route.waypoints[leg, 2]))
+    courses = leg_courses(route.positions)
+    for leg, speed in enumerate(route.leg_airspeeds.tolist()):
+        wind = setup.scenario.wind.components_on_course(float(courses[leg]), float(route.positions[leg, 2]))
         speed_over_ground = ground_speed(speed, *wind)
         speeds.append(speed_over_ground if speed_over_ground > 0.0 else speed)
     return np.array(speeds)

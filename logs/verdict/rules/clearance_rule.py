@@ -190,7 +190,7 @@ def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int
 
     Return the start of the final approach if no waypoint keeps this height, or if the terrain is unknown.
     """
-    terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final_leg + 1]
+    terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.positions[: final_leg + 1]
     if terrain is None:
         return final_leg
     heights = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])

@@ -87,7 +87,7 @@ def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, alti
 
     The first value is the nominal slope, the second the slope reduced by the uncertainty of the aircraft's model.
     """
-    speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
+    speed, limits = float(requirements.route.leg_airspeeds[leg]), requirements.limits
     max_slope, certain_slope = (
         limit_set.slopes(course, altitude, speed)[0] for limit_set in (limits, limits.with_margin())
     )
@@ -384,7 +384,7 @@ def approach_findings(
     length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
     start_altitude, point_altitude = float(glide_start[2]), setup.route.landing_ground
     ground_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
-    if math.isnan(point_altitude) or math.isnan(ground_altitude) or length < MIN_LEG_LENGTH_M:
+    if point_altitude is None or math.isnan(ground_altitude) or length < MIN_LEG_LENGTH_M:
         reason = "the terrain height at the landing point is unknown"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     if start_altitude <= point_altitude:

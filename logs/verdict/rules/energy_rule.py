@@ -42,7 +42,7 @@ def energy_findings(
     setup = requirements.setup
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
     planned_energy, peak_current = predicted_energy(requirements)
-    faults = [_endless_jump_message(requirements, limit)] if setup.route.endless_jump >= 0 else []
+    faults = [_endless_jump_message(requirements, limit)] if setup.route.endless_jump is not None else []
     is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_measured = setup.source is not None and not geometric

@@ -200,7 +200,8 @@ def _find_landing(
     )
     if (
         climb_height is None
-        or math.isnan(home_altitude + ground_altitude + terrain_altitude)
+        or ground_altitude is None
+        or math.isnan(home_altitude + terrain_altitude)
         or leg_length < MIN_LEG_LENGTH_M
         or glide_start[2] <= ground_altitude
     ):

@@ -49,7 +49,7 @@ class LoiterCircle:
 
 def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
     """Return the loiters of a route, in flying order."""
-    arcs, items = requirements.setup.route.arcs, requirements.setup.route.items
+    arcs, items = requirements.setup.route.arc_radii, requirements.setup.route.items
     loiters: list[LoiterCircle] = []
     i = 0
     while i < len(arcs):
@@ -146,7 +146,7 @@ def end_loiter_findings(
     if not math.isfinite(reach):
         fault = message(
             f"{title} then circles here without end, and the wind is too strong to fly a circle",
-            f": at {float(requirements.route.airspeed[-1]):.1f} m/s the aircraft drifts downwind",
+            f": at {float(requirements.route.leg_airspeeds[-1]):.1f} m/s the aircraft drifts downwind",
         )
         return [
             make_finding(
@@ -307,7 +307,7 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
-    speed, bank_text = float(requirements.route.airspeed[circle.first]), bank_limit_text(requirements.setup)
+    speed, bank_text = float(requirements.route.leg_airspeeds[circle.first]), bank_limit_text(requirements.setup)
     need_text = f"at {speed:.0f} m/s and {bank_text} the aircraft needs {min_radius:.0f} m"
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"

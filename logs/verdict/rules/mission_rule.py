@@ -187,7 +187,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     itinerary = make_itinerary(setup.mission, resets_jump_counters=setup.autopilot.checks.resets_jump_counters)
     last = next((k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item), -1)
     end = items[last]
-    if itinerary.endless_jump >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
+    if itinerary.endless_jump is not None or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
         return []
     later_items = itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[last + 1 :])
     unreached = [item for item in later_items if item.seq in itinerary.unreached and is_navigation(item.command)]
@@ -217,7 +217,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
     """Yield a finding for each item or setting that changes the flight path but is not simulated."""
     remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.checks.follows_terrain:
-        items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
+        items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.points["above_ground"])].tolist()))
         reason = f"the simulated {setup.autopilot.title} does not follow the item's height above terrain along the leg"
         remarks += [(seq, reason) for seq in items_above_terrain]
     if setup.scenario.returns is not None:
@@ -292,7 +292,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         ),
         follows_terrain=any(item.frame in OVER_TERRAIN and item.has_position for item in items),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
-        wind=setup.scenario.wind.max_speed_at(setup.route.waypoints[:, 2]),
+        wind=setup.scenario.wind.max_speed_at(setup.route.positions[:, 2]),
         full_voltage=_full_voltage(setup),
         commands=frozenset(commands),
         aircraft=aircraft,
@@ -530,7 +530,7 @@ def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
         # The fence rule judges the flight against the union of the inclusion zones.
         return
     origin, route = setup.scenario.origin, setup.route
-    for point, item in zip(route.waypoints, route.items, strict=True):
+    for point, item in zip(route.positions, route.items, strict=True):
         problem = fence_problem(setup.mission.fences, origin, float(point[0]), float(point[1]))
         if problem is not None:
             violation, fence_item = problem

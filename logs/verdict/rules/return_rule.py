@@ -242,7 +242,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     outcome: text on how far the RTL was flown.
     """
     route = requirements.setup.route
-    if route.rtl_start < 0:
+    if route.rtl_start is None:
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
@@ -274,12 +274,12 @@ def without_path_following_findings(
     findings: all findings, including the finding on the RTL itself.
     """
     first_leg = requirements.setup.route.rtl_start
-    if first_leg < 0:
+    if first_leg is None:
         return tuple(findings)
     # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
     end_waypoint = requirements.setup.route.rtl_end
-    legs = range(first_leg, min(end_waypoint, requirements.legs))
     return_points = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
+    legs = requirements.setup.route.rtl_legs
     return_points |= {requirements.leg(i) for i in legs}
     first_corner = requirements.waypoint(first_leg)
     kept_findings = [

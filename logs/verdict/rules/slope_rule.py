@@ -173,7 +173,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
 def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
     """Return True if the aircraft can fly level at the leg's commanded airspeed."""
     min_speed, max_speed = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
-    return min_speed <= float(requirements.route.airspeed[leg]) <= max_speed
+    return min_speed <= float(requirements.route.leg_airspeeds[leg]) <= max_speed
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
@@ -191,7 +191,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     """Describe the limit on a leg's slope (rad) and, for the aircraft's own limit, the influence of the wind."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
-    speed = float(requirements.route.airspeed[leg])
+    speed = float(requirements.route.leg_airspeeds[leg])
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     condition = f"at {speed:.0f} m/s and {altitude:.0f} m AMSL"
     if limit <= 0.0:
@@ -307,7 +307,7 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
     if ability.slope - abs(planned_slope) >= -ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error:
         return []
     verb = "climb" if planned_slope >= 0.0 else "sink"
-    speed = float(requirements.route.airspeed[leg])
+    speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
             f"in {ability.duration:.0f} s at {_throttle_limit(planned_slope)} throttle the aircraft showed that"

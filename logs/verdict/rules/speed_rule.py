@@ -45,7 +45,7 @@ def speed_findings(
 ) -> list[Finding]:
     """Compare each leg's commanded airspeed with the envelope, and the flown airspeed with the command."""
     # The demanded route is computed at each access, which is too slow to repeat for each of thousands of legs.
-    demanded_speeds = requirements.setup.demanded_route.airspeed
+    demanded_speeds = requirements.setup.demanded_route.leg_airspeeds
     findings = [
         _speed_finding(requirements, aligned, leg, float(demanded_speeds[leg]), geometric=geometric)
         for leg in range(requirements.legs)
@@ -69,7 +69,7 @@ def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
     """Judge the airspeed on one leg, on which the mission demands a true or equivalent airspeed, m/s."""
-    commanded = float(requirements.route.airspeed[leg])
+    commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
     notes += _short_leg_notes(requirements, leg, commanded)
@@ -199,7 +199,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
     """Return a note if the autopilot does not accept the speed that the mission commands on a leg."""
     setup, autopilot = requirements.setup, requirements.setup.autopilot
-    command, limits = float(setup.route.airspeed[leg]), autopilot.speeds.limits
+    command, limits = float(setup.route.leg_airspeeds[leg]), autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
         return []
     range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
@@ -209,7 +209,7 @@ def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
     """Return a note if a leg is too short to reach its airspeed at `MAX_STEADY_ACCELERATION_MPS2`, otherwise []."""
-    previous_speed = float(requirements.route.airspeed[leg - 1]) if leg else commanded
+    previous_speed = float(requirements.route.leg_airspeeds[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
     duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
     # Distance at the mean of both speeds over ground, in the wind along the leg.

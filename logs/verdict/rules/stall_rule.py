@@ -62,7 +62,7 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     """Judge the planned turn with the smallest margin above the stall; return [] for a route without a turn."""
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
-        for speed in requirements.route.airspeed[corner - 1 : corner + 1].tolist():
+        for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():
             bank, stall_speed = (
                 planned_bank(requirements, corner, speed),
                 level_stall(requirements, float(requirements.points[corner, 2])),
@@ -91,7 +91,7 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
         return 0.0
     # The bank limit's radius belongs to the ground speed of the faster leg.
     max_ground_speed = math.sqrt(float(requirements.min_radius[i]) * GRAVITY * math.tan(limit))
-    speed_deficit = max(requirements.route.airspeed[i - 1 : i + 1]) - speed
+    speed_deficit = max(requirements.route.leg_airspeeds[i - 1 : i + 1]) - speed
     bank = math.atan(max(0.0, max_ground_speed - speed_deficit) ** 2 / (GRAVITY * radius))
     # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
     reachable_bank = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))

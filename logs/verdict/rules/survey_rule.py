@@ -187,7 +187,9 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
         return float(requirements.length_before[last])
     turn = abs(float(requirements.turns[last]))
-    mission_radius = float(setup.route.acceptance[last]) if setup.autopilot.turns.reads_acceptance else 0.0
+    mission_radius = (
+        float(setup.route.points["acceptance_radius"][last]) if setup.autopilot.turns.reads_acceptance else 0.0
+    )
     return mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
 
 

@@ -102,13 +102,13 @@ def landing_findings(
             return []
         reason = f"{command_name(items[-1].command)} has no position of its own on the route"
         route = requirements.setup.route
-        if route.rtl_start >= 0:
+        if route.rtl_start is not None:
             reason = RTL_NOT_CONTINUED_TEXT
         end_waypoint, is_return_continued = (
             requirements.waypoint(requirements.legs),
             RTL_NOT_CONTINUED_TEXT in " ".join(route.notes),
         )
-        if route.rtl_start >= 0 and not is_return_continued:
+        if route.rtl_start is not None and not is_return_continued:
             # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end_waypoint, ok=None, reason=reason, unit="deg")]
         return [_unjudged_finding("landing", end_waypoint, reason)]
@@ -132,15 +132,21 @@ def _last_waypoint_of_item(requirements: RouteRequirements, seq: int) -> int:
 
 
 def _slope_finding(
-    requirements: RouteRequirements, rule: str, first: int, last: int, first_altitude: float, last_altitude: float
+    requirements: RouteRequirements,
+    rule: str,
+    first: int,
+    last: int,
+    first_altitude: float | None,
+    last_altitude: float | None,
 ) -> Finding:
     """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
 
     rule: "takeoff" or "landing".
+    An altitude is None if the terrain there is unknown.
     """
     waypoint_place = requirements.waypoint(last)
     distance = float(requirements.runs[first:last].sum())
-    if math.isnan(first_altitude) or math.isnan(last_altitude):
+    if first_altitude is None or last_altitude is None:
         return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, distance)
     limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
@@ -187,7 +193,7 @@ def _slope_limit(
     slope: rad; its sign selects the limit for a climb or for a descent.
     """
     direction, limits = (0 if slope >= 0.0 else 1), requirements.limits
-    speed, course = float(requirements.route.airspeed[leg]), float(requirements.courses[leg])
+    speed, course = float(requirements.route.leg_airspeeds[leg]), float(requirements.courses[leg])
     aircraft_limit = min(
         limits.slopes(course, altitude, speed)[direction] for altitude in (first_altitude, last_altitude)
     )

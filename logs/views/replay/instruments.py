@@ -84,7 +84,7 @@ class Instruments:
         bar = "[" + "=" * filled_columns + " " * (columns - 2 - filled_columns) + "]"
         leg = int(track.leg[k])
         route = log.setup.route
-        step = route.waypoints[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
+        step = route.positions[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
         leg_text = (
             f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)},"
             f" {_metres_text(float(np.hypot(*step)))} to go"

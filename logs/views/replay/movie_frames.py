@@ -70,7 +70,7 @@ class MovieFrames:
             flight_map(
                 with_fence_zones(setup).scenario,
                 plan_waypoints=None,
-                route_waypoints=setup.route.waypoints,
+                route_waypoints=setup.route.positions,
                 track=None,
                 verdict=None,
                 stops=setup.route.stops.tolist(),

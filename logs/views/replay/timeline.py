@@ -115,9 +115,9 @@ def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]
     """Group the parts of a flight in order: all parts around one loiter form one group, others one each."""
     first_legs: list[int] = []
     for leg in range(route.legs):
-        is_on_circle = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
+        is_on_circle = min(route.arc_radii[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
         continues_loiter = (
-            is_on_circle and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
+            is_on_circle and leg and route.arc_radii[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
         )
         first_legs.append(first_legs[-1] if continues_loiter else leg)
     return [list(group) for _, group in itertools.groupby(parts, key=lambda part: first_legs[part.leg])]
@@ -158,17 +158,15 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         part = group[0]
         leg = part.leg
         if len(group) > 1:
-            item, radius = int(route.items[leg]), route.arcs[leg]
-            item_text = (
-                f"return of item {item}" if 0 <= route.rtl_start <= leg < route.rtl_end else f"loiter of item {item}"
-            )
+            item, radius = int(route.items[leg]), route.arc_radii[leg]
+            item_text = f"return of item {item}" if leg in route.rtl_legs else f"loiter of item {item}"
             text = f"{item_text}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360
         text = (
             f"leg {route.leg_numbers[leg]} to {waypoint_name(route, leg + 1)}: course {course:03d}°, "
-            f"{runs[leg]:.0f} m, slope {math.degrees(slopes[leg]):+.1f}°, {route.airspeed[leg]:.1f} m/s"
+            f"{runs[leg]:.0f} m, slope {math.degrees(slopes[leg]):+.1f}°, {route.leg_airspeeds[leg]:.1f} m/s"
         )
         entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
     return entries
@@ -180,14 +178,14 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     The peak bank is the largest from the middle of one leg to the middle of the next.
     """
     route, track = log.setup.route, log.track
-    turns = signed_turns(route.waypoints)
+    turns = signed_turns(route.positions)
     roll, _, _ = track.attitude.T
     bank = np.abs(roll.astype(np.float64))
     entries = []
     for previous, following in itertools.pairwise(parts):
         # The corners of a loiter share the entry of the loiter; a loiter that is left at once has a turn.
         is_same_item = route.items[max(0, following.leg - 1) : following.leg + 2] == route.items[following.leg]
-        if following.leg != previous.leg + 1 or (route.arcs[following.leg] > 0.0 and is_same_item.sum() > 1):
+        if following.leg != previous.leg + 1 or (route.arc_radii[following.leg] > 0.0 and is_same_item.sum() > 1):
             continue
         angle = math.degrees(turns[previous.leg])
         side = "right" if angle > 0.0 else "left"

@@ -277,7 +277,7 @@ def _page_html(
 ) -> str:
     """Return the report's page: the template filled with verdict, tables, pictures and facts."""
     track, verdict = subject.track, subject.verdict
-    failed = failures(verdict, len(setup.route.waypoints))
+    failed = failures(verdict, len(setup.route.points))
     rows = finding_rows(verdict.findings, verdict.deciding)
     shown_pictures = report_pictures(subject, page_charts(views), pictures)
     failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), verdict_badge(verdict)

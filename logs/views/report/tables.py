@@ -225,7 +225,7 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
         ("Aircraft", f"{setup.aircraft}, at {quantity(setup.airspeed, 'm/s')}, bank up to {quantity(bank, 'rad')}"),
         ("Descent", f"the propeller {braking_text}"),
         ("Mission", f"{setup.mission.source}: {len(setup.mission.items)} items, {route.legs} legs"),
-        ("Route", f"{quantity(float(path_length(route.waypoints)) / 1000.0, 'km')} long"),
+        ("Route", f"{quantity(float(path_length(route.positions)) / 1000.0, 'km')} long"),
     ]
     if setup.plan is not None:
         plan = setup.plan

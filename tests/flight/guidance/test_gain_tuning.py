@@ -31,7 +31,7 @@ def test_the_missions_are_of_every_kind_and_not_those_reported_on(name: str) -> 
     assert {case.setup.guidance_hz for case in trained} == {30, 60}
     assert {case.setup.scenario.wind.turbulence for case in trained} == {"none", "light", "moderate"}
     assert {case.variation for case in trained} == {case.variation for case in reported}
-    routes = [case.setup.route.waypoints for case in [*trained, *reported]]
+    routes = [case.setup.route.positions for case in [*trained, *reported]]
     turns = [np.diff(np.arctan2(*np.diff(way[:, :2], axis=0).T)) for way in [*routes, standard()]]
     assert len({tuple(np.round(turn, 6)) for turn in turns}) == len(turns)
     for seed in (2, 3):

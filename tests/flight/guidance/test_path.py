@@ -24,7 +24,7 @@ from flight.guidance.path import (
     project,
     waypoint_records,
 )
-from flight.mission.route import Route, RouteRules, make_route
+from flight.mission.route import Route, RouteRules, make_route, route_points
 from flight.simulation.setup import FlightSetup
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.sampled_paths import sample_path
@@ -48,7 +48,7 @@ def test_a_first_leg_without_length_has_no_slope(make_setup: MakeSetup) -> None:
     """As of a circle to a height that the flight begins at."""
     limits = make_setup(np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0]])).limits
     way = np.array([[0.0, 0.0, 500.0], [0.0, 0.0, 500.0], [0.0, 1000.0, 520.0], [1000.0, 1000.0, 520.0]])
-    path = fly_by_path(Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), ""), limits)
+    path = fly_by_path(Route(route_points(way, 25.0), ""), limits)
     assert path.length == pytest.approx(2000.0, abs=150.0)
     assert path.nodes["slope"][0] == pytest.approx(20.0 / 1000.0, rel=0.2)
     assert np.isfinite(path.nodes["altitude"]).all()
@@ -95,7 +95,7 @@ def _end(piece: Record) -> tuple[Floats, float]:
 
 def _whole(path: FlyByPath, setup: FlightSetup, corners: int = 0) -> None:
     """Pieces follow one another without a gap, and without a corner but for so many."""
-    points, kinks = setup.route.waypoints, 0
+    points, kinks = setup.route.positions, 0
     first, last = path.pieces[0], path.pieces[-1]
     assert (first.east, first.north) == pytest.approx(points[0, :2])
     for one, two in itertools.pairwise(path.pieces):
@@ -161,12 +161,12 @@ def test_any_route_with_long_legs_is_whole_smooth_and_at_the_bank_limit(make_set
     _smooth_profile(path)
     # The radius is at the bank limit, no smaller and no larger.
     arcs = path.pieces[path.pieces["curvature"] != 0.0]
-    legs = np.diff(setup.route.waypoints[:, :2], axis=0)
+    legs = np.diff(setup.route.positions[:, :2], axis=0)
     courses = np.arctan2(legs[:, 0], legs[:, 1])
-    bent = turning_angles(setup.route.waypoints) >= 1e-6
+    bent = turning_angles(setup.route.positions) >= 1e-6
     wanted = [
         limits.turn_radius(a, b, up)
-        for a, b, up, is_bent in zip(courses, courses[1:], setup.route.waypoints[1:-1, 2], bent, strict=False)
+        for a, b, up, is_bent in zip(courses, courses[1:], setup.route.positions[1:-1, 2], bent, strict=False)
         if is_bent
     ]
     assert 1 / np.abs(arcs["curvature"]) == pytest.approx(wanted, rel=1e-6)

@@ -42,11 +42,11 @@ def test_an_exported_plan_comes_back(points: list[tuple[float, float, float]]) -
     assert parse_mission(mission_text(exported, "plan"), "a.plan") == exported
     assert parse_mission(mission_text(exported, "plan"), "a.plan").cruise_speed == 25.0
     flown = make_route(exported, plan.scenario.origin, plan.scenario.terrain, 18.0, False)
-    assert flown.waypoints.shape == plan.waypoints.shape
-    assert np.abs(flown.waypoints - plan.waypoints).max() < 0.008
-    assert set(flown.airspeed.tolist()) == {25.0}
+    assert flown.positions.shape == plan.waypoints.shape
+    assert np.abs(flown.positions - plan.waypoints).max() < 0.008
+    assert set(flown.leg_airspeeds.tolist()) == {25.0}
     assert flown.notes == ()
-    assert (flown.acceptance >= 10.0).all()
+    assert (flown.points["acceptance_radius"] >= 10.0).all()
 
 
 def test_a_corner_has_its_fly_by_offset_as_acceptance() -> None:

@@ -96,9 +96,9 @@ def test_the_route_in_the_air_begins_where_the_take_off_ended_and_ends_before_th
     setup = circuit(RAIL, STRIP)
     begun = np.array([300.0, 40.0, 60.5])
     route = airborne_route(setup.route, setup.ground_phases, begun)
-    assert route.waypoints[0].tolist() == begun.tolist()
+    assert route.positions[0].tolist() == begun.tolist()
     assert route.items.tolist() == [1, 2, 3, 4]
-    assert np.array_equal(route.waypoints[1:], setup.route.waypoints[1:4])
+    assert np.array_equal(route.positions[1:], setup.route.positions[1:4])
     assert not any("not flown to the ground" in note for note in route.notes)
 
 

@@ -37,7 +37,7 @@ LEGS = {
 
 def _legs(route: Route) -> int:
     """Legs with all that stands for a way back counted as one."""
-    return route.legs if route.rtl_start < 0 else route.rtl_start + 1
+    return route.legs if route.rtl_start is None else route.rtl_start + 1
 
 
 # Those that need ground to count heights from.
@@ -54,10 +54,10 @@ def test_samples_fly_over_the_tile(name: str) -> None:
     assert _legs(flown) == legs
     assert [item for item, _ in groupby(flown.items.tolist())] == items
     # A way back is drawn as it is flown: its turns begin at the last place of the mission, and it comes down.
-    last = None if flown.rtl_start < 0 else flown.rtl_start + 1
-    there, circling = flown.waypoints[:last], flown.arcs[:last] > 0.0
+    last = None if flown.rtl_start is None else flown.rtl_start + 1
+    there, circling = flown.positions[:last], flown.arc_radii[:last] > 0.0
     assert leg_runs(there)[~(circling[1:] | circling[:-1])].min() >= 600.0
-    assert np.degrees(turning_angles(flown.waypoints)).max() < 105.0
+    assert np.degrees(turning_angles(flown.positions)).max() < 105.0
     assert np.degrees(np.abs(leg_slopes(there))).max() < 2.5
     assert scenario.terrain is not None
     assert min(scenario.terrain.clearance(a, b)[0] for a, b in pairwise(there)) > 100.0
@@ -118,7 +118,7 @@ def test_a_mission_through_a_hill_has_a_scenario() -> None:
     scenario = implied_scenario(read, "jacksboro").scenario
     assert scenario.terrain is not None
     assert scenario.destination[2] > 100.0
-    assert make_route(read, scenario.origin, scenario.terrain, 25.0, False).waypoints[:, 2].tolist() == [20.0, 20.0]
+    assert make_route(read, scenario.origin, scenario.terrain, 25.0, False).positions[:, 2].tolist() == [20.0, 20.0]
 
 
 def origin_of(read: Mission) -> GeoOrigin:

@@ -28,9 +28,9 @@ def test_speeds_count_for_the_legs_after_them() -> None:
         "2 178 0 0 -1 0 0 0 0",
         wp(0, 5400),
     )
-    assert flown.airspeed.tolist() == [25.0, 22.0, 22.0, 22.0, 25.0, 25.0]
+    assert flown.leg_airspeeds.tolist() == [25.0, 22.0, 22.0, 22.0, 25.0, 25.0]
     # Of type 1 it is the least ground speed from there on, which is left as it is by a change of airspeed.
-    assert np.array_equal(flown.min_ground_speed, [math.nan] * 3 + [28.0] * 4, equal_nan=True)
+    assert np.array_equal(flown.points["min_ground_speed"], [math.nan] * 3 + [28.0] * 4, equal_nan=True)
     assert flown.notes == (
         "item 5: DO_CHANGE_SPEED's throttle: ignored",
         "item 5: DO_CHANGE_SPEED of ground speed: sets MIN_GROUNDSPEED to 28 m/s",
@@ -65,7 +65,7 @@ def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
 ) -> None:
     items = wp(0, 0), "2 178 0 28 -1 0 0 0 0", wp(0, 900), f"2 178 {change} 0 0 0 0", wp(0, 1800)
     flown = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
-    assert flown.airspeed.tolist() == [28.0, airspeed]
+    assert flown.leg_airspeeds.tolist() == [28.0, airspeed]
     assert flown.notes[-1:] == (() if noted is None else (f"item 4: {noted}",))
 
 
@@ -74,11 +74,11 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
     items = wp(0, 0), fast, gate, slow, wp(0, 1800)
     flown = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     # From the gate to item 5 lead (-300, 1200): at right angles to that, 300^2 / 1200 m sooner on the leg.
-    assert flown.waypoints[:, :2] == pytest.approx(np.array([[0.0, 0.0], [0.0, 525.0], [0.0, 1800.0]]), abs=0.1)
-    assert (flown.airspeed.tolist(), flown.items.tolist(), flown.notes) == ([28.0, 20.0], [1, 3, 5], ())
+    assert flown.positions[:, :2] == pytest.approx(np.array([[0.0, 0.0], [0.0, 525.0], [0.0, 1800.0]]), abs=0.1)
+    assert (flown.leg_airspeeds.tolist(), flown.items.tolist(), flown.notes) == ([28.0, 20.0], [1, 3, 5], ())
     # ArduPlane has no gates.
     plain = route(*items)
-    assert (plain.airspeed.tolist(), plain.items.tolist()) == ([20.0], [1, 5])
+    assert (plain.leg_airspeeds.tolist(), plain.items.tolist()) == ([20.0], [1, 5])
     assert plain.notes == ("item 3: CONDITION_GATE: not flown",)
 
 
@@ -115,9 +115,9 @@ def test_gates_that_leave_their_leg_whole(
     flown = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert [note for note in flown.notes if "GATE" in note] == noted
     if airspeed is None:
-        assert flown.airspeed[0] == 20.0
+        assert flown.leg_airspeeds[0] == 20.0
     else:
-        assert flown.airspeed.tolist() == airspeed
+        assert flown.leg_airspeeds.tolist() == airspeed
 
 
 def test_what_is_the_cameras_is_not_called_not_flown() -> None:
@@ -136,7 +136,7 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
     assert endless.notes == ("item 4: DO_JUMP has no end: it is flown once, and the flight ends there",)
-    assert (endless.endless_jump, route(*corners, "2 177 2 2 0 0 0 0 0").endless_jump) == (4, -1)
+    assert (endless.endless_jump, route(*corners, "2 177 2 2 0 0 0 0 0").endless_jump) == (4, None)
     # What follows a jump without end is never flown.
     beyond = route(*corners, "2 177 2 -1 0 0 0 0 0", wp(0, 0))
     assert beyond.items.tolist() == [1, 2, 3, 2, 3]
@@ -188,7 +188,7 @@ def test_a_loiter_at_a_height_of_0_keeps_the_altitude_of_the_item_before(command
     """ArduPlane's `Location::sanitize` takes a relative altitude of 0 for the present one; home is at 300 m."""
     loiter = wp(0, 1500, 0, command=command, p="1 0 0 0", frame=frame)
     made = route(wp(0, 500, 150), loiter, wp(0, 5000, 150), terrain=ground())
-    altitudes = made.waypoints[made.items == 2, 2]
+    altitudes = made.positions[made.items == 2, 2]
     assert bool(np.allclose(altitudes, 450.0, atol=0.02)) is keeps
     assert any("at a height of 0 m" in note for note in made.notes) is keeps
 
@@ -205,7 +205,7 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     landed = route(
         wp(0, 500, 150), "3 189 0 0 0 0 36.5 -84.2 0", wp(0, 1500, 60), wp(900, 1500, 0, command=21), wp(0, 0)
     )
-    assert landed.waypoints[-1] == pytest.approx([900.0, 1500.0, 360.0], abs=0.02)
+    assert landed.positions[-1] == pytest.approx([900.0, 1500.0, 360.0], abs=0.02)
     assert [note.split(":")[0] for note in landed.notes] == ["item 2", "item 4", "item 5"]
     here = route(wp(0, 500), wp(0, 1500), "3 85 0 0 0 0 0 0 0")
     assert here.items.tolist() == [1, 2]
@@ -258,7 +258,7 @@ def test_a_glide_from_or_to_an_item_above_terrain_is_open(frames: tuple[int, int
 def test_a_vertical_take_off_is_over_home_and_its_place_is_not_flown_to() -> None:
     """As ArduPlane does it: it climbs where it stands, and a fixed wing of it passes the item over."""
     flown = route(wp(0, 700, 80, command=84), wp(900, 700))
-    assert flown.waypoints == pytest.approx(np.array([[0, 0, 380], [900, 700, 400]]), abs=0.01)
+    assert flown.positions == pytest.approx(np.array([[0, 0, 380], [900, 700, 400]]), abs=0.01)
     assert flown.notes[:2] == (
         "item 1: NAV_VTOL_TAKEOFF: not flown straight up",
         "item 1: NAV_VTOL_TAKEOFF: its position is not flown to, as in ArduPlane; PX4 would fly to it",

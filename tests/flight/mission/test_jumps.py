@@ -104,19 +104,19 @@ def test_commands_behind_a_spent_jump_run_a_round_early_in_arduplane_and_in_thei
     flown = route(*items)
     assert flown.items.tolist() == [1, 2, 3, 4, 2, 3, 4, 2, 3, 4, 8, 9]
     # ArduPilot #30376: at the begin of the last round the jump's counter is used up, and item 7 runs.
-    assert flown.airspeed.tolist() == [25.0] * 3 + [22.0] * 3 + [30.0] * 5
+    assert flown.leg_airspeeds.tolist() == [25.0] * 3 + [22.0] * 3 + [30.0] * 5
     assert flown.notes == ("item 7: DO_CHANGE_SPEED: run one loop early, as ArduPlane does",)
     by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
-    assert by_px4.airspeed.tolist() == [25.0] * 3 + [22.0] * 6 + [30.0] * 2
+    assert by_px4.leg_airspeeds.tolist() == [25.0] * 3 + [22.0] * 6 + [30.0] * 2
     assert by_px4.notes == ()
 
 
 def test_a_jumps_target_command_is_not_run_behind_another_command() -> None:
     items = SPEED.format(20), wp(0, 0), wp(0, 1000), SPEED.format(22), "2 177 1 1 0 0 0 0 0", wp(1000, 1000)
     # Behind item 3 ArduPlane runs item 4; from there on the jump is spent, and item 6 the next: item 1 is left out.
-    assert route(*items).airspeed.tolist() == [20.0, 22.0, 22.0, 22.0]
+    assert route(*items).leg_airspeeds.tolist() == [20.0, 22.0, 22.0, 22.0]
     by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
-    assert by_px4.airspeed.tolist() == [20.0, 20.0, 20.0, 22.0]
+    assert by_px4.leg_airspeeds.tolist() == [20.0, 20.0, 20.0, 22.0]
 
 
 def test_a_tag_leads_to_the_first_item_of_its_number_wherever_the_jump_stands() -> None:
@@ -141,7 +141,7 @@ def test_a_tag_leads_to_the_first_item_of_its_number_wherever_the_jump_stands() 
 
 
 def heights(made: Route) -> list[float]:
-    return [round(float(up), 3) for up in made.waypoints[:, 2]]
+    return [round(float(up), 3) for up in made.positions[:, 2]]
 
 
 def test_a_home_that_is_set_counts_for_the_altitudes_and_the_return_behind_it() -> None:

@@ -33,11 +33,11 @@ TURN = 2.0 * math.pi
 
 def circled(flown: Route, item: int) -> tuple[float, float]:
     """Signed angle (turns) that a route goes around at an item's corners, and their radius."""
-    turns = np.zeros(len(flown.waypoints))
-    turns[1:-1] = signed_turns(flown.waypoints)
-    at = (flown.items == item) & (flown.arcs > 0.0)
-    assert np.ptp(flown.arcs[at]) == 0.0
-    return float(turns[at].sum()) / TURN, float(flown.arcs[at][0])
+    turns = np.zeros(len(flown.positions))
+    turns[1:-1] = signed_turns(flown.positions)
+    at = (flown.items == item) & (flown.arc_radii > 0.0)
+    assert np.ptp(flown.arc_radii[at]) == 0.0
+    return float(turns[at].sum()) / TURN, float(flown.arc_radii[at][0])
 
 
 @settings(max_examples=scaled(60, 12), deadline=None)
@@ -63,7 +63,7 @@ def test_the_path_is_the_circle(
     turns = turns if turns < 1.0 else math.floor(turns)
     assert turns - 1e-6 <= abs(around) < turns + 1.0 + 1e-6
     assert arc == pytest.approx(radius)
-    corners = flown.waypoints[flown.items == 2, :2]
+    corners = flown.positions[flown.items == 2, :2]
     step = abs(around) * TURN / len(corners)
     assert step <= math.pi / 4.0 + 1e-6
     middle = np.array([float(v) for v in to_map(ORIGIN, *place_of(east, north))])
@@ -99,12 +99,12 @@ def test_loiters_last_as_long_as_asked() -> None:
 def test_loiter_to_altitude_spirals_within_the_envelope() -> None:
     flown = setup_of(wp(0, 0), wp(0, 1500, 600, command=31, p="1 150 0 0"), wp(3000, 1500, 600)).route
     at = flown.items == 2
-    assert flown.waypoints[at, 2][-1] == pytest.approx(900.0, abs=0.01)
-    assert (np.diff(flown.waypoints[:, 2]) >= -1e-9).all()
+    assert flown.positions[at, 2][-1] == pytest.approx(900.0, abs=0.01)
+    assert (np.diff(flown.positions[:, 2]) >= -1e-9).all()
     # 500 m at 60 % of what the aircraft climbs (13.7 degrees at 25 m/s and 500 m, less at 900 m).
-    assert 5.0 < math.degrees(leg_slopes(flown.waypoints).max()) < 0.6 * 13.7
+    assert 5.0 < math.degrees(leg_slopes(flown.positions).max()) < 0.6 * 13.7
     down = setup_of(wp(0, 0, 700), wp(0, 1500, 100, command=31, p="1 -150 0 0"), wp(3000, 1500, 100)).route
-    assert math.degrees(leg_slopes(down.waypoints).min()) > -0.6 * 7.8
+    assert math.degrees(leg_slopes(down.positions).min()) > -0.6 * 7.8
     assert circled(down, 2)[0] < -1.0
 
 
@@ -123,13 +123,13 @@ def test_stops_inside_a_circle_are_left_out() -> None:
     assert [note.split(":")[0] for note in over.notes] == ["items 2, 4"]
     start = route(wp(0, 0), wp(0, 0, command=18, p="1 0 120 0"), wp(3000, 2000))
     assert "starts trimmed in the air on the circle of item 2" in start.started
-    assert math.hypot(*start.waypoints[0, :2]) == pytest.approx(120.0, abs=0.1)
+    assert math.hypot(*start.positions[0, :2]) == pytest.approx(120.0, abs=0.1)
     two = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 120 0"), wp(0, 2050, command=19, p="30 0 -100 0"), wp(3000, 0))
     assert any("item 3: its circle has no tangent" in note for note in two.notes)
     assert circled(two, 3)[1] == 120.0
     here = route(wp(0, 0), wp(0, 2000), "2 18 1 0 120 0 0 0 0", wp(3000, 2000))
     assert list(dict.fromkeys(here.items.tolist())) == [1, 3, 4]
-    assert (here.waypoints[here.items == 3, 2] == 400.0).all()
+    assert (here.positions[here.items == 3, 2] == 400.0).all()
 
 
 def test_a_jump_back_to_a_loiter_flies_it_again() -> None:
@@ -206,7 +206,7 @@ def test_a_loiter_cut_short_is_not_complete(flight: tuple[FlightSetup, Any]) -> 
 
 def test_loiters_over_terrain_have_the_height_of_their_middle() -> None:
     flown = route(wp(0, 0), wp(0, 2000, 250, command=18, frame=10, p="1 0 150 0"), wp(2500, 0), terrain=ground(320.0))
-    assert (flown.waypoints[flown.items == 2, 2] == 570.0).all()
+    assert (flown.positions[flown.items == 2, 2] == 570.0).all()
 
 
 def test_a_replay_tells_a_loiter_in_one_line(flight: tuple[FlightSetup, Any], tmp_path: Path) -> None:
@@ -215,7 +215,7 @@ def test_a_replay_tells_a_loiter_in_one_line(flight: tuple[FlightSetup, Any], tm
         recorder.write(flown.track)
         recorder.finish(flown.ended, judge_flight(setup, flown.track, flown.ended))
     log = read_log(tmp_path / "a.mcap")
-    assert (log.setup.route.arcs == setup.route.arcs).all()
+    assert (log.setup.route.arc_radii == setup.route.arc_radii).all()
     texts = [entry.text for entry in timeline(log) if entry.kind == "leg"]
     around = [text for text in texts if text.startswith("loiter of item")]
     assert [text.split(":")[0] for text in around] == [f"loiter of item {item}" for item in (2, 3, 7)]
@@ -246,11 +246,11 @@ def test_a_loiter_without_a_radius_has_that_of_the_autopilots_parameter() -> Non
 def test_the_way_to_a_loiter_to_a_height_is_level_where_the_height_is_held() -> None:
     lines = wp(0, -1500), wp(0, 0, 250, 31, p="0 200 0 0"), wp(1500, 1500, 250)
     held = laid_for(LoiterRules(holds_height=True, max_climb_rate=2.5, altitude_tolerance=10.0), *lines)
-    corners = held.waypoints[held.items == 2, 2]
+    corners = held.positions[held.items == 2, 2]
     assert (corners[0], corners[-1]) == (400.0, 550.0)
     # 140 m at 2.5 m/s and 25 m/s are 1,400 m, 1.11 of its circles.
     assert 1.11 < circled(held, 2)[0] < 2.25
-    assert laid_for(LoiterRules(), *lines).waypoints[1, 2] > 480.0
+    assert laid_for(LoiterRules(), *lines).positions[1, 2] > 480.0
 
 
 def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:

@@ -104,7 +104,9 @@ def laid(
     ]
     there = ReturnTarget(target, "home", "", math.hypot(*target[:2]), base)
     points = rtl_waypoints(before, STOP, there, rules, ABLE)
-    return np.array([(0.0, 0.0, 500.0), *(p.map_position for p in points)]), np.array([0.0, *(p.arc for p in points)])
+    return np.array([(0.0, 0.0, 500.0), *(p.map_position for p in points)]), np.array(
+        [0.0, *(p.arc_radius for p in points)]
+    )
 
 
 @pytest.mark.parametrize("course", [-170.0, -90.0, -30.0, -2.0, 0.0, 2.0, 30.0, 90.0, 170.0])
@@ -256,7 +258,7 @@ def test_a_route_goes_back_where_its_rules_say() -> None:
     assert (flown.rtl_start, flown.items.tolist()[:3]) == (1, [1, 2, 3])
     assert flown.rtl_loiter is not None
     assert flown.rtl_loiter[:4] == pytest.approx((0.0, 0.0, 400.0, 80.0), abs=0.01)
-    assert flown.waypoints[-1, 2] == pytest.approx(400.0, abs=0.01)
+    assert flown.positions[-1, 2] == pytest.approx(400.0, abs=0.01)
 
 
 def test_a_rally_point_is_named_by_its_place_in_the_file() -> None:
@@ -270,14 +272,14 @@ def test_a_rally_point_is_named_by_its_place_in_the_file() -> None:
 
 def test_a_speed_that_was_set_does_not_count_on_the_way_back() -> None:
     flown = route(wp(0, 500), "2 178 0 22 -1 0 0 0 0", wp(0, 2500), RTL)
-    assert flown.airspeed[0] == 22.0
-    assert (flown.airspeed[1:] == 25.0).all()
+    assert flown.leg_airspeeds[0] == 22.0
+    assert (flown.leg_airspeeds[1:] == 25.0).all()
 
 
 def test_a_return_from_over_home_is_flown() -> None:
     flown = route(wp(0, 0, 300), wp(0, 900, 300), wp(0, 0, 300), RTL)
     assert flown.rtl_start == 2
-    assert flown.waypoints[-1, 2] == pytest.approx(400.0, abs=0.01)
+    assert flown.positions[-1, 2] == pytest.approx(400.0, abs=0.01)
 
 
 def test_a_height_that_is_never_flown_is_refused() -> None:

@@ -4,7 +4,6 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +12,17 @@ from aircraft.catalog import load_aircraft
 from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.implied_scenario import implied_scenario
+from flight.mission.itinerary import NO_ITEM
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import (
     END_LEG_LENGTH_M,
+    ROUTE_POINT,
     Route,
     RouteRules,
     fly_over_waypoints,
     make_route,
+    part_of_route,
+    route_points,
     with_end_courses,
 )
 from flight.mission_files.formats import mission_text, parse_mission, read_mission
@@ -28,41 +31,70 @@ from tests.mission_lines import ORIGIN, ground, mission, refusal, route, setup_o
 from tests.setups import small_scenario
 from world.errors import MissionError
 from world.geometry import leg_courses
+from world.kernels import Records, field_names
 from world.scenario import Scenario
 
-ARRAYS = ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs")
 
-
-def parts() -> dict[str, Any]:
+def three_points() -> Records:
     """Three waypoints and the two legs between them."""
-    return {
-        "waypoints": np.array([[0.0, 0.0, 500.0], [0.0, 900.0, 500.0], [800.0, 900.0, 550.0]]),
-        "airspeed": np.array([25.0, 27.0]),
-        "acceptance": np.array([0.0, 30.0, 0.0]),
-        "fly_over": np.array([False, True, False]),
-        "items": np.array([-1, 1, 2]),
-        "started": "on the ground",
-    }
+    return route_points(
+        [[0.0, 0.0, 500.0], [0.0, 900.0, 500.0], [800.0, 900.0, 550.0]],
+        [25.0, 27.0],
+        acceptance_radius=[0.0, 30.0, 0.0],
+        fly_over=[False, True, False],
+        item=[NO_ITEM, 1, 2],
+    )
 
 
 def test_a_leg_is_between_two_waypoints() -> None:
-    assert Route(**parts()).legs == 2
+    route = Route(three_points(), "on the ground")
+    assert (route.legs, route.leg_airspeeds.tolist()) == (2, [25.0, 27.0])
 
 
-def test_turns_have_the_bank_limits_radius_unless_one_is_given() -> None:
-    assert Route(**parts()).arcs.tolist() == [0.0, 0.0, 0.0]
-    assert Route(**parts(), arcs=np.array([0.0, 80.0, 0.0])).arcs.tolist() == [0.0, 80.0, 0.0]
+def test_what_a_point_does_not_state() -> None:
+    points = route_points(np.eye(3), 25.0)
+    assert points["item"].tolist() == [NO_ITEM] * 3
+    # Points without an item belong to no common stop.
+    assert points["stop"].tolist() == [0, 1, 2]
+    for name in ("fly_over", "acceptance_radius", "arc_radius"):
+        assert not points[name].any()
+    for name in ("above_ground", "min_ground_speed", "home_up"):
+        assert np.isnan(points[name]).all()
 
 
-@pytest.mark.parametrize("name", ARRAYS)
-def test_arrays_are_locked_copies(name: str) -> None:
-    given = parts() | {"arcs": np.array([0.0, 80.0, 0.0])}
-    kept = given[name].copy()
-    route = Route(**given)
+@pytest.mark.parametrize("name", field_names(ROUTE_POINT))
+def test_points_are_a_locked_copy(name: str) -> None:
+    given = three_points()
+    route = Route(given, "on the ground")
     with pytest.raises(ValueError, match="read-only"):
-        getattr(route, name)[0] = 1
-    given[name][:] = 1 - given[name].astype(kept.dtype) if kept.dtype != bool else ~kept
-    np.testing.assert_array_equal(getattr(route, name), kept)
+        route.points[name][1] = 1
+    given[name] = 1 - given[name].astype(np.int64) if name == "fly_over" else given[name] + 1
+    np.testing.assert_array_equal(route.points[name], three_points()[name])
+
+
+def test_other_values_in_some_fields_are_those_of_another_route() -> None:
+    route = Route(three_points(), "on the ground")
+    other = route.with_fields(airspeed=[20.0, 21.0], fly_over=True)
+    assert (other.leg_airspeeds.tolist(), other.fly_over.tolist()) == ([20.0, 21.0], [True] * 3)
+    assert (route.leg_airspeeds.tolist(), route.fly_over.tolist()) == ([25.0, 27.0], [False, True, False])
+    assert other.items.tolist() == route.items.tolist()
+
+
+def test_the_legs_of_an_rtl_end_where_it_joins_the_landing_sequence() -> None:
+    way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(5)])
+    route = Route(route_points(way, 25.0, item=[1, 2, 3, 3, 4]), "")
+    assert list(route.rtl_legs) == []
+    circle = ReturnCircle(0.0, 0.0, 300.0, 80.0)
+    # Waypoints 2 and 3 are of item 3, the RTL, and waypoint 4 is of the landing sequence.
+    joined = replace(route, rtl_start=1, rtl_loiter=circle)
+    assert (joined.rtl_end, list(joined.rtl_legs)) == (4, [1, 2, 3])
+    alone = part_of_route(joined, 0, 3)
+    assert (alone.rtl_end, list(alone.rtl_legs)) == (4, [1, 2])
+
+
+def test_no_leg_leads_to_the_first_waypoint_of_a_part() -> None:
+    part = part_of_route(Route(three_points(), "on the ground"), 1, 2)
+    assert (part.leg_airspeeds.tolist(), math.isnan(part.points["airspeed"][0])) == ([27.0], True)
 
 
 # ----------------------------------------------------------------------
@@ -85,17 +117,19 @@ def test_an_acceptance_just_below_and_just_above_where_the_arc_passes(turn_deg: 
     turn = math.radians(turn_deg)
     passes = RADIUS / math.cos(turn / 2.0) - RADIUS
     for acceptance, misses in ((passes - 0.01, True), (passes + 0.01, False), (0.0, turn_deg > 150.0)):
-        radii = np.array([1.0, acceptance, 1.0])
-        found = fly_over_waypoints(corner(turn), np.full(2, 25.0), radii, limits)
+        radii = [1.0, acceptance, 1.0]
+        found = fly_over_waypoints(route_points(corner(turn), 25.0, acceptance_radius=radii), limits)
         assert found.tolist() == [False, misses, False]
 
 
 def test_the_faster_leg_draws_the_arc_and_without_limits_there_is_none(limits: Limits) -> None:
-    turn, speeds = math.radians(90.0), np.array([20.0, 30.0])
+    points = route_points(corner(math.radians(90.0)), [20.0, 30.0])
     passes = 30.0**2 / 25.0**2 * RADIUS * (math.sqrt(2.0) - 1.0)
     for acceptance, misses in ((passes - 0.01, True), (passes + 0.01, False)):
-        assert fly_over_waypoints(corner(turn), speeds, np.array([0.0, acceptance, 0.0]), limits)[1] == misses
-    assert not fly_over_waypoints(corner(turn), speeds, np.full(3, 1.0), None).any()
+        points["acceptance_radius"][1] = acceptance
+        assert fly_over_waypoints(points, limits)[1] == misses
+    points["acceptance_radius"] = 1.0
+    assert not fly_over_waypoints(points, None).any()
 
 
 def test_an_autopilot_flies_on_to_its_own_distance_before_a_corner_whose_arc_would_miss_it(limits: Limits) -> None:
@@ -108,7 +142,7 @@ def test_an_autopilot_flies_on_to_its_own_distance_before_a_corner_whose_arc_wou
             asked.append((round(angle, 9), amsl))
             return distance
 
-        found = fly_over_waypoints(corner(turn), np.full(2, 25.0), np.zeros(3), limits, turn_distance)
+        found = fly_over_waypoints(route_points(corner(turn), 25.0), limits, turn_distance)
         assert found.tolist() == [False, misses, False]
         assert asked == [(round(turn, 9), 500.0)]
         rules = RouteRules(turn_distance=turn_distance)
@@ -118,7 +152,7 @@ def test_an_autopilot_flies_on_to_its_own_distance_before_a_corner_whose_arc_wou
 
 @pytest.mark.parametrize("turn_deg", [149.0, 151.0, 165.0, 174.0, 179.9, 180.0, -180.0, -165.0])
 def test_guidance_that_follows_the_path_flies_over_reversals(turn_deg: float, limits: Limits) -> None:
-    found = fly_over_waypoints(corner(math.radians(turn_deg)), np.full(2, 25.0), np.zeros(3), limits)
+    found = fly_over_waypoints(route_points(corner(math.radians(turn_deg)), 25.0), limits)
     assert found.tolist() == [False, abs(turn_deg) > 150.0, False]
 
 
@@ -139,7 +173,7 @@ SETUP = setup_of(wp(0, 0), wp(0, 2000))
 def ends(**courses: float) -> tuple[Route, Scenario]:
     """The route north, and a scenario with its ends and these courses."""
     route = SETUP.route
-    start, destination = route.waypoints[0], route.waypoints[-1]
+    start, destination = route.positions[0], route.positions[-1]
     return route, replace(SETUP.scenario, start=start, destination=destination, **courses)
 
 
@@ -149,11 +183,11 @@ def test_the_route_starts_on_the_course_far_enough_for_the_turn(turn_deg: float)
     route, scenario = ends(start_course=course)
     longer = with_end_courses(route, scenario, SETUP.limits)
     assert longer.legs == route.legs + 1
-    assert float(leg_courses(longer.waypoints)[0]) == pytest.approx(course, abs=1e-4)
-    assert longer.waypoints[0, 2] == route.waypoints[0, 2]
+    assert float(leg_courses(longer.positions)[0]) == pytest.approx(course, abs=1e-4)
+    assert longer.positions[0, 2] == route.positions[0, 2]
     # R = 625 / (9.80665 tan 30) = 110.39 m; the tangent of a sharp turn counts as two radii at most.
     length = 110.39 * min(math.tan(abs(course) / 2.0), 2.0) + END_LEG_LENGTH_M
-    assert math.dist(longer.waypoints[0], longer.waypoints[1]) == pytest.approx(length, abs=0.1)
+    assert math.dist(longer.positions[0], longer.positions[1]) == pytest.approx(length, abs=0.1)
     assert longer.items.tolist() == [-1, *route.items.tolist()]
     assert f"from a lead-in leg of {length:.0f} m" in longer.started
 
@@ -163,13 +197,13 @@ def test_a_return_stays_where_it_began_behind_a_lead_in_leg() -> None:
     back = replace(route, rtl_start=1, rtl_loiter=ReturnCircle(0.0, 0.0, 400.0, 80.0))
     longer = with_end_courses(back, scenario, SETUP.limits)
     assert (longer.rtl_start, longer.rtl_loiter) == (2, back.rtl_loiter)
-    assert with_end_courses(route, scenario, SETUP.limits).rtl_start == -1
+    assert with_end_courses(route, scenario, SETUP.limits).rtl_start is None
 
 
 def test_the_route_ends_on_the_course() -> None:
     route, scenario = ends(destination_course=math.pi / 2.0)
     longer = with_end_courses(route, scenario, SETUP.limits)
-    assert float(leg_courses(longer.waypoints)[-1]) == pytest.approx(math.pi / 2.0, abs=1e-4)
+    assert float(leg_courses(longer.positions)[-1]) == pytest.approx(math.pi / 2.0, abs=1e-4)
     assert longer.items.tolist() == [*route.items.tolist(), -1]
     assert longer.started == route.started
 
@@ -193,24 +227,24 @@ def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
     mission = read_mission(SAMPLES / "endless.waypoints")
     scenario = implied_scenario(mission, None).scenario
     route = make_route(mission, scenario.origin, None, 25.0, False)
-    assert route.waypoints[0, 2] == mission.items[0].alt
+    assert route.positions[0, 2] == mission.items[0].alt
     assert any("measured from 0 m AMSL" in note for note in route.notes)
 
 
 def test_a_route_starts_at_the_first_position_or_over_home() -> None:
     plain = route(wp(0, 500, 120), wp(0, 1500, 150))
-    assert plain.waypoints[0] == pytest.approx([0.0, 500.0, 420.0], abs=0.01)
+    assert plain.positions[0] == pytest.approx([0.0, 500.0, 420.0], abs=0.01)
     assert plain.started.startswith("no TAKEOFF: starts trimmed at the first position, item 1: 36.504")
     assert plain.started.endswith("420.0 m AMSL, on course 0 degrees")
     over_home = route("3 22 15 0 0 0 0 0 80", wp(900, 0))
-    assert over_home.waypoints[0] == pytest.approx([0.0, 0.0, 380.0], abs=0.01)
+    assert over_home.positions[0] == pytest.approx([0.0, 0.0, 380.0], abs=0.01)
     assert over_home.items.tolist() == [1, 2]
     assert over_home.started.startswith(
         "NAV_TAKEOFF (item 1): starts trimmed in the air over home at that item's height"
     )
     own_place = route(wp(0, 700, 80, command=22), wp(900, 700))
     assert own_place.items.tolist() == [-1, 1, 2]
-    assert own_place.waypoints[:2] == pytest.approx(np.array([[0, 0, 380], [0, 700, 380]]), abs=0.01)
+    assert own_place.positions[:2] == pytest.approx(np.array([[0, 0, 380], [0, 700, 380]]), abs=0.01)
     same_place = route(wp(0, 0, 80, command=84), wp(900, 700))
     assert same_place.items.tolist() == [1, 2]
 
@@ -219,7 +253,7 @@ def test_a_take_off_without_home_starts_at_the_first_position() -> None:
     """Home at 0, 0 means none: the first position item stands for it."""
     flown = route(wp(0, 700, 80, command=22), wp(900, 700), home="0 0 0", terrain=ground())
     assert flown.items.tolist() == [1, 2]
-    assert flown.waypoints[0] == pytest.approx([0.0, 700.0, 380.0], abs=0.01)
+    assert flown.positions[0] == pytest.approx([0.0, 700.0, 380.0], abs=0.01)
     assert "over the first position, as there is no home" in flown.started
     assert "home has no altitude: taken as the ground at 36.506" in flown.notes[-1]
 
@@ -234,9 +268,9 @@ def test_heights_of_every_frame_are_amsl() -> None:
         wp(0, 4900, 140, frame=11),
         terrain=ground(310.0),
     )
-    assert flown.waypoints[:, 2].tolist() == pytest.approx([450, 450, 450, 450, 450, 450])
+    assert flown.positions[:, 2].tolist() == pytest.approx([450, 450, 450, 450, 450, 450])
     # Those above terrain are held along the legs to them.
-    assert flown.above_ground.tolist() == pytest.approx([math.nan] * 4 + [140.0, 140.0], nan_ok=True)
+    assert flown.points["above_ground"].tolist() == pytest.approx([math.nan] * 4 + [140.0, 140.0], nan_ok=True)
 
 
 def test_a_home_off_the_ground_is_noted() -> None:
@@ -246,7 +280,7 @@ def test_a_home_off_the_ground_is_noted() -> None:
 
 def test_cruise_speed_is_no_command() -> None:
     flown = make_route(read_mission(SAMPLES / "qgc_amsl.plan"), ORIGIN, None, 25.0, False)
-    assert set(flown.airspeed.tolist()) == {25.0}
+    assert set(flown.leg_airspeeds.tolist()) == {25.0}
     assert "cruiseSpeed 15 m/s is the ground station's estimate" in flown.notes[-1]
 
 
@@ -276,7 +310,7 @@ def test_null_in_a_plan_keeps_what_is() -> None:
     third[6] = None
     flown = make_route(parse_mission(json.dumps(data), "a.plan"), ORIGIN, None, 25.0, False)
     assert flown.items.tolist() == [1, 3]
-    assert flown.waypoints[:, 2].tolist() == [400.0, 400.0]
+    assert flown.positions[:, 2].tolist() == [400.0, 400.0]
     assert "item 2: NAV_WAYPOINT without a position" in flown.notes[0]
     assert flown.notes[1] == "item 3: NAV_WAYPOINT without an altitude: keeps the last height"
     first[6] = None
@@ -287,7 +321,7 @@ def test_null_in_a_plan_keeps_what_is() -> None:
 def test_circles_are_flown_by_whatever_the_waypoints_are() -> None:
     read = mission(wp(0, 0, p="0 40 0 0"), wp(0, 900, p="0 -3 0 0"), wp(900, 900, command=18, p="1 2 80 0"))
     flown = make_route(read, ORIGIN, None, 25.0, True)
-    assert flown.acceptance[:2].tolist() == [40.0, 0.0]
-    assert not flown.acceptance[2:].any()
-    assert flown.fly_over.tolist() == (flown.arcs == 0.0).tolist()
+    assert flown.points["acceptance_radius"][:2].tolist() == [40.0, 0.0]
+    assert not flown.points["acceptance_radius"][2:].any()
+    assert flown.fly_over.tolist() == (flown.arc_radii == 0.0).tolist()
     assert flown.fly_over[:2].all()

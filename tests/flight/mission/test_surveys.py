@@ -342,7 +342,7 @@ def test_gates_at_which_the_camera_is_switched_end_the_lines(in_turns: bool) -> 
         (9, 10, 8, 11),
     ]
     assert [line.photo for line in found.lines] == [25.0] * 3
-    lengths = [math.dist(route.waypoints[line.first, :2], route.waypoints[line.last, :2]) for line in found.lines]
+    lengths = [math.dist(route.positions[line.first, :2], route.positions[line.last, :2]) for line in found.lines]
     assert lengths == pytest.approx([800.0] * 3, abs=0.1)
     if not in_turns:
         assert camera.tolist() == [0.0, 25.0, 0.0, 0.0] * 3
@@ -358,7 +358,7 @@ def test_lines_between_gates_are_laid_out_otherwise() -> None:
     assert [item.command for item in made.items] == [16, 4501, 206, 4501, 206, 16] * 3
     again = make_route(made, ORIGIN, None, 15.0, False, rules=RouteRules(reads_as_px4=True))
     assert camera_spacing(made, again).tolist() == [0.0, 25.0, 0.0, 0.0] * 3
-    assert again.waypoints[::4, :2] == pytest.approx(np.array([[0, -200], [120, 1000], [60, -200]]), abs=0.1)
+    assert again.positions[::4, :2] == pytest.approx(np.array([[0, -200], [120, 1000], [60, -200]]), abs=0.1)
     # Without turn-arounds, gates would lead nowhere.
     bare = with_layout(read, route, found, SurveyLayout(0.0, every=2), ORIGIN)
     assert bare is not None
@@ -390,7 +390,7 @@ def test_waypoints_at_equal_distances_along_a_line_are_no_leads() -> None:
 
 
 def places_of(read: Mission) -> np.ndarray:
-    return np.array(make_route(read, ORIGIN, None, 15.0, False).waypoints)[:, :2]
+    return np.array(make_route(read, ORIGIN, None, 15.0, False).positions)[:, :2]
 
 
 def test_turn_arounds_are_laid_out_and_each_line_keeps_its_camera() -> None:
@@ -509,7 +509,7 @@ def test_why_a_layout_is_kept(place: int, line: str, why: str) -> None:
     [found] = find_surveys(route, np.zeros(16))
     # The route of the plain grid, with the items of this mission: an endless loiter would end it.
     items = [item.seq for item in read.items if item.command == 16]
-    route = replace(route, items=np.array(items))
+    route = route.with_fields(item=np.array(items))
     assert layout_obstacle(read, route, found) == why
 
 

@@ -46,8 +46,8 @@ def test_a_route_starts_at_its_first_waypoint_on_its_first_leg() -> None:
 
 def test_a_start_in_the_ground_is_refused() -> None:
     setup = MAKE([[0.0, 0.0, 150.0], [1000.0, 0.0, 200.0]])
-    low = setup.route.waypoints - [0.0, 0.0, 51.0]
-    setup = replace(setup, route=replace(setup.route, waypoints=low))
+    low = setup.route.positions - [0.0, 0.0, 51.0]
+    setup = replace(setup, route=setup.route.with_fields(position=low))
     with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
         Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._find_start(setup)
 

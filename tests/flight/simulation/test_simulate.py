@@ -296,7 +296,7 @@ def test_dive_into_a_hill(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
 
 def test_start_under_the_terrain(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     setup = make_setup([[0, 0, 500], [0, 3000, 500]])
-    route = replace(setup.route, waypoints=np.array([[0.0, 0.0, 99.0], [0.0, 3000.0, 500.0]]))
+    route = setup.route.with_fields(position=np.array([[0.0, 0.0, 99.0], [0.0, 3000.0, 500.0]]))
     with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
         fly_to_end(Flight(replace(setup, route=route), aerosonde))
 

@@ -183,7 +183,7 @@ def test_zones_are_lines_from_the_ground_to_the_ceiling() -> None:
         {"name": "fence", "kind": "inclusion", "east_m": 0, "north_m": 0, "radius_m": 1400},
     ]
     setup = make_setup(zones=zones, terrain={"kind": "flat", "amsl_m": 40})
-    entity = SceneUpdate.FromString(zones_scene(EPOCH_NS, setup.scenario, setup.route.waypoints)).entities[0]
+    entity = SceneUpdate.FromString(zones_scene(EPOCH_NS, setup.scenario, setup.route.positions)).entities[0]
     assert (entity.id, [text.text for text in entity.texts]) == ("zones", ["town", "fence"])
     town = [line for line in entity.lines if len(line.points) in (5, 2)][:6]
     assert {(point.x, point.y) for point in town[0].points} == {tuple(map(float, corner)) for corner in square}
@@ -209,7 +209,7 @@ def test_names_stand_above_the_ground() -> None:
 
 def test_waypoints_are_named_as_in_a_verdict() -> None:
     setup = make_setup()
-    update = plan_scene(EPOCH_NS, setup.route.waypoints, setup.route.items.tolist())
+    update = plan_scene(EPOCH_NS, setup.route.positions, setup.route.items.tolist())
     entity = SceneUpdate.FromString(update).entities[0]
     assert [text.text for text in entity.texts] == ["0", "1 (item 2)", "2 (item 3)", "3 (item 4)"]
 

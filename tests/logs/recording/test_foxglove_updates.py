@@ -188,7 +188,7 @@ def test_the_points_are_those_of_the_scenario(
     red = [value >> 24 for value in colours]
     assert set(red) == {round(255 * theme.rgba(role, dark=True)[0]) for role in ("missile", "radar")}
     (row,) = shown["/points/plan"]
-    assert points(row)[-1] == pytest.approx(setup.route.waypoints[-1], abs=0.05)
+    assert points(row)[-1] == pytest.approx(setup.route.positions[-1], abs=0.05)
 
 
 def test_the_track_of_points_grows_to_the_whole(shown: dict[str, list[dict[str, Any]]], track: Track) -> None:

@@ -20,7 +20,7 @@ WATTS = {f"power_{name}": 100.0 / 3.0 * k * np.ones((3, 2)) for k, name in enume
 # Circles and power, too, which a route and an envelope may go without.
 SETUP = replace(
     PLAIN,
-    route=replace(PLAIN.route, arcs=np.array([0.0, 80.1, 0.0, 0.0])),
+    route=PLAIN.route.with_fields(arc_radius=np.array([0.0, 80.1, 0.0, 0.0])),
     limits=replace(PLAIN.limits, envelope=replace(PLAIN.envelope, volts=44.4, **WATTS)),
 )
 
@@ -66,6 +66,14 @@ def test_an_unknown_height_is_null() -> None:
     same(RouteTable.from_dataclass(known).route("x"), known)
 
 
+def test_a_waypoint_or_item_that_is_none_is_minus_one() -> None:
+    assert [ROUTE[key] for key in ("return_from_waypoint", "straight_to_waypoint", "endless_jump")] == [-1] * 3
+    made = RouteTable.model_validate(ROUTE).route("x")
+    assert (made.rtl_start, made.direct_landing_start, made.endless_jump) == (None, None, None)
+    with pytest.raises(LogError, match=r"^x: route\.straight_to_waypoint: 4: a waypoint, or -1"):
+        RouteTable.model_validate(ROUTE | {"straight_to_waypoint": 4}).route("x")
+
+
 def test_a_return_comes_back_with_its_circle() -> None:
     circle = ReturnCircle(1.5, -2.0, 435.1, -80.0, 335.0)
     back = replace(SETUP.route, rtl_start=2, rtl_loiter=circle)
@@ -78,7 +86,7 @@ def test_a_return_comes_back_with_its_circle() -> None:
     assert made.rtl_loiter.radius == -80.0
     # A log of before there were returns says nothing of them.
     old = {key: value for key, value in ROUTE.items() if not key.startswith("return")}
-    assert RouteTable.model_validate(old).route("x").rtl_start == -1
+    assert RouteTable.model_validate(old).route("x").rtl_start is None
 
 
 def test_numbers_stand_under_the_unit_that_they_have() -> None:

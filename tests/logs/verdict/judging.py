@@ -73,7 +73,7 @@ def suggested(item: Finding, what: str, place: Place | None = None) -> Change:
 def bad_plan(setup: FlightSetup) -> Plan:
     return Plan(
         scenario=setup.scenario,
-        waypoints=setup.route.waypoints,
+        waypoints=setup.route.positions,
         violations=np.array([0, 2, 0, 0]),
         objectives=np.zeros(4),
         certificate=Certificate(0.1, math.inf, -0.05, 12.0, 100.0, 50.0, ("leg 2: slope 16.6 deg beyond 13.7 deg",)),

@@ -156,14 +156,14 @@ def test_the_gap_between_lines_of_a_survey(waypoints: np.ndarray, gap: float | N
 def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wider_than() -> None:
     """30 m by default, and twice the 90 m at which ArduPlane takes a waypoint for reached."""
     setup = make_setup()
-    survey = replace(setup, route=replace(setup.route, waypoints=lines(20.0)))
+    survey = replace(setup, route=setup.route.with_fields(position=lines(20.0)))
     assert setup.corridor == 30.0
     default = "Corridor: 30 m to either side of the legs, planfly's default (set [limits] corridor_m to change it)"
     assert corridor_line(survey) == (
         f"{default}; the corridor is wider than the 20 m between legs 0 and 2, so a flight within the corridor may"
         " not have followed the lines"
     )
-    assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == default
+    assert corridor_line(replace(setup, route=setup.route.with_fields(position=lines(31.0)))) == default
     assert corridor_line(setup) == default
     assert corridor_line(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))) == (
         "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m"

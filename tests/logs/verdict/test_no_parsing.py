@@ -68,7 +68,7 @@ def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [place_values(verdict.findings, rule) for rule in RULES]
     return [
-        failures(verdict, len(setup.route.waypoints)),
+        failures(verdict, len(setup.route.points)),
         values,
         rows,
         verdict_badge(verdict),

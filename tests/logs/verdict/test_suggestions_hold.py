@@ -21,7 +21,7 @@ JUDGED, FLOWN = range(scaled(100, len(KINDS))), range(scaled(100, len(KINDS) // 
 
 def taken(setup: FlightSetup, suggestion: Suggestion) -> FlightSetup:
     """The setup with one suggestion taken: all of its changes of the plan."""
-    points, speeds = setup.route.waypoints.copy(), setup.route.airspeed.copy()
+    points, speeds = setup.route.positions.copy(), setup.route.leg_airspeeds.copy()
     for change in suggestion:
         k = change.place.index
         assert k is not None, change
@@ -40,7 +40,7 @@ def taken(setup: FlightSetup, suggestion: Suggestion) -> FlightSetup:
         else:
             assert change.what == "height", change
             points[:, 2] += change.wanted
-    return replace(setup, route=replace(setup.route, waypoints=points, airspeed=speeds))
+    return replace(setup, route=setup.route.with_fields(position=points, airspeed=speeds))
 
 
 def turned(points: Floats, at: int, most: float) -> Floats:

@@ -64,5 +64,5 @@ def test_the_missions_are_what_they_say() -> None:
     kinds = [infeasible(number, 0.2).kind for number in range(len(KINDS))]
     assert kinds == list(KINDS)
     one, two = infeasible(3, 0.2), infeasible(3, 0.2)
-    assert (one.setup.route.waypoints == two.setup.route.waypoints).all()
+    assert (one.setup.route.positions == two.setup.route.positions).all()
     assert not feasible(3, 0.2).kind

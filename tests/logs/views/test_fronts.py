@@ -15,7 +15,7 @@ from planner.search.plan_front import Front, FrontPlan
 def front() -> Front:
     setup = example_log().setup
     certificate = Certificate(0.1, np.inf, 0.1, 9.0, 10.0, 50.0, ())
-    path = np.array(setup.route.waypoints)
+    path = np.array(setup.route.positions)
     plan = Plan(setup.scenario, path, np.zeros(4), np.ones(4), certificate, 7, "umda", 60, np.zeros((0, 3)))
     # Shortest and least energy; nothing; least exposed; highest.
     rows = [(9e3, 8.0, 60.0, 400.0, 3.6e5), (9.1e3, 7.0, 61.0, 401.0, 3.7e5), (9.2e3, 1.0, 60.0, 402.0, 3.8e5)]

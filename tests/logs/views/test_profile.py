@@ -87,7 +87,7 @@ def test_the_greatest_height_follows_the_ground_and_a_zone_takes_its_band() -> N
 
 
 def of(setup: FlightSetup, track: Track | None, verdict: Verdict | None = None) -> Chart:
-    paths = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
+    paths = {"plan_waypoints": None, "route_waypoints": setup.route.positions}
     return profile_chart(setup.scenario, **paths, track=track, verdict=verdict)
 
 

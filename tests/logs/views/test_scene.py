@@ -44,7 +44,7 @@ def test_a_step_to_the_viewer_stays_on_its_spot_and_comes_nearer(azimuth: float,
 
 
 def drawn(setup: Any, track: Any, verdict: Any) -> Any:
-    return draw_scene(SceneView(setup, track, failures(verdict, len(setup.route.waypoints))))
+    return draw_scene(SceneView(setup, track, failures(verdict, len(setup.route.points))))
 
 
 def legend(figure: Any) -> set[str]:
@@ -76,10 +76,10 @@ def test_a_path_behind_a_ridge_is_drawn_dashed() -> None:
 
     area = {"east_m": [-1200, 1200], "north_m": [-1500, 800], "ceiling_amsl_m": 900}
     hidden = make_setup(area=area, terrain={"kind": "peaks", "peak": ridge}, threats=[])
-    way = hidden.route.waypoints.copy()
+    way = hidden.route.positions.copy()
     way[:, 1], way[:, 2] = -500.0, 120.0
     way[:, 0] = np.linspace(-900.0, 900.0, 4)
-    assert dashed(replace(hidden, route=replace(hidden.route, waypoints=way))) > 100
+    assert dashed(replace(hidden, route=hidden.route.with_fields(position=way))) > 100
     assert dashed(make_setup(terrain={"kind": "flat", "amsl_m": 0}, threats=[])) == 0
 
 
@@ -112,7 +112,7 @@ def test_a_long_and_narrow_scene_is_no_strip() -> None:
     setup = make_setup(area=strip, terrain={"kind": "none"}, threats=[], **ends)
     straight = np.array([[-2000.0, 0.0, 300.0], [0.0, 0.0, 300.0], [2000.0, 0.0, 300.0]])
     straight = np.vstack([straight, [[2050.0, 0.0, 300.0]]])
-    setup = replace(setup, route=replace(setup.route, waypoints=straight))
+    setup = replace(setup, route=setup.route.with_fields(position=straight))
     figure = drawn(setup, None, None)
     west_south, east_south, east_north, _ = ground_corners(figure)
     # Seen from 45 degrees round: each metre east is cos 45 degrees to the right, each metre north as much to the right.

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flight.mission.itinerary import NO_ITEM
+from flight.mission.route import route_points
 from logs.views.failures import Failures
 from logs.views.scene import (
     MAX_GROUND,
@@ -54,16 +56,16 @@ def test_the_grid_has_the_terrains_heights_and_no_more_points_than_asked() -> No
 @pytest.mark.parametrize(("top", "stretch"), [(270.0, 1.0), (180.0, 1.5), (135.0, 2.0), (60.0, 3.0), (10.0, 3.0)])
 def test_heights_are_stretched_to_about_a_tenth_of_the_ground(top: float, stretch: float) -> None:
     """0.09 of 3000 m is 270 m: a route that rises so far stands as it is; one of 60 m is stretched most."""
-    way = SETUP.route.waypoints.copy()
+    way = SETUP.route.positions.copy()
     way[:, 2] = [0.0, 0.0, 0.0, top]
-    setup = replace(SETUP, route=replace(SETUP.route, waypoints=way))
+    setup = replace(SETUP, route=SETUP.route.with_fields(position=way))
     assert exaggeration(setup, np.array([[0.0, 3000.0], [0.0, 1000.0]]), None) == stretch
 
 
 def test_a_level_route_over_a_small_area_is_not_torn_apart() -> None:
     """It counts as 50 m of relief: 90 m of 1000 m are 1.8 times that."""
-    way = SETUP.route.waypoints * np.array([1.0, 1.0, 0.0])
-    setup = replace(SETUP, route=replace(SETUP.route, waypoints=way))
+    way = SETUP.route.positions * np.array([1.0, 1.0, 0.0])
+    setup = replace(SETUP, route=SETUP.route.with_fields(position=way))
     assert exaggeration(setup, np.array([[0.0, 1000.0], [0.0, 1000.0]]), None) == 1.5
 
 
@@ -103,14 +105,8 @@ def test_the_text_holds_the_scene_and_ends_no_script() -> None:
 def test_a_loiter_has_one_number_in_the_scene() -> None:
     """Its corners are one stop: the numbers are those of the map and of a ground station's list."""
     route = SETUP.route
-    looped = replace(route, waypoints=route.waypoints[[0, 1, 1, 2, 3]], items=np.array([-1, 2, 2, 3, 4]))
-    looped = replace(
-        looped,
-        airspeed=np.full(4, 25.0),
-        acceptance=np.zeros(5),
-        fly_over=np.zeros(5, dtype=bool),
-        arcs=np.array([0.0, 80.0, 80.0, 0.0, 0.0]),
-    )
+    way, items = route.positions[[0, 1, 1, 2, 3]], [NO_ITEM, 2, 2, 3, 4]
+    looped = replace(route, points=route_points(way, 25.0, item=items, arc_radius=[0.0, 80.0, 80.0, 0.0, 0.0]))
     data = scene_data(SceneView(replace(SETUP, route=looped), None, NOTHING))
     assert data["numbers"] == [[0, 0], [1, 1], [3, 2], [4, 3]]
 

@@ -130,7 +130,7 @@ def test_aircraft_battery_terrain_and_start(base: CampaignBase) -> None:
     assert ground is not None
     assert float(ground.height(500.0, 0.0)) == pytest.approx(107.0)
     # The route stays where it was planned.
-    np.testing.assert_array_equal(made.setup.route.waypoints, vary_flight(base, drawn()).setup.route.waypoints)
+    np.testing.assert_array_equal(made.setup.route.positions, vary_flight(base, drawn()).setup.route.positions)
 
 
 # ----------------------------------------------------------------------

@@ -153,7 +153,7 @@ def test_crossings_are_right_of_and_above() -> None:
 def test_a_loiter_is_crossed_once_however_many_corners_it_has() -> None:
     corners = [[0.0, 300.0, 100.0], [50.0, 350.0, 100.0], [100.0, 300.0, 100.0], [600.0, 300.0, 100.0]]
     route = route_along([[0.0, 0.0, 100.0], *corners], 25.0)
-    loiter = replace(route, items=np.array([1, 2, 2, 2, 3]), stops=np.array([0, 1, 1, 1, 2]))
+    loiter = route.with_fields(item=np.array([1, 2, 2, 2, 3]), stop=np.array([0, 1, 1, 1, 2]))
     track = flown([(0.0, 0.0, 100.0), (0.0, 296.0, 97.0), (600.0, 295.0, 100.0)], [0, 0, 3], [1, 1, 1])
     crossings = waypoint_crossings(loiter, track)
     assert crossings.shape == (3, 2)

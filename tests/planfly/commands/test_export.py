@@ -80,7 +80,7 @@ def test_maps_of_a_log(log_file: Path, tmp_path: Path) -> None:
     wanted = np.array([(item.lon_deg, item.lat_deg) for item in items])
     at = [k for k in range(len(items)) if k == 0 or items[k].x != items[k - 1].x or items[k].y != items[k - 1].y]
     assert np.array(plan)[:, :2] == pytest.approx(wanted[at], abs=2e-8)
-    assert [up for _, _, up in plan] == pytest.approx(list(log.setup.route.waypoints[:, 2]), abs=1e-3)
+    assert [up for _, _, up in plan] == pytest.approx(list(log.setup.route.positions[:, 2]), abs=1e-3)
     assert len(flown) == pytest.approx(2.0 * log.end_time, abs=3)
     assert flown[-1][2] == pytest.approx(log.track.position[-1, 2], abs=1e-3)
     gpx = gpxpy.parse((tmp_path / "f.gpx").read_text())

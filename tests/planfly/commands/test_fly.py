@@ -22,7 +22,7 @@ def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pyt
     name, log = str(tmp_path / "short.waypoints"), tmp_path / "f.mcap"
     Path(name).write_text(SHORT, encoding="ascii")
     assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
-    assert (read_log(log).setup.route.airspeed == 21.0).all()
+    assert (read_log(log).setup.route.leg_airspeeds == 21.0).all()
     # The next step is a line that a shell takes as it stands.
     assert capsys.readouterr().out.splitlines()[-1] == f"next      planfly report {shlex.quote(str(log))}"
     for options, message in (

@@ -81,7 +81,7 @@ def flies_all_legs(log: Path, name: str) -> None:
     flown = read_log(log)
     route = flown.setup.route
     # All that stands for a way back counts as one leg.
-    assert (route.legs if route.rtl_start < 0 else route.rtl_start + 1) == LEGS[name]
+    assert (route.legs if route.rtl_start is None else route.rtl_start + 1) == LEGS[name]
     assert set(np.minimum(flown.track.leg, LEGS[name] - 1)) == set(range(LEGS[name]))
 
 

@@ -270,7 +270,7 @@ def test_a_run_takes_what_a_flight_takes(tmp_path: Path, monkeypatch: pytest.Mon
     log = read_log(Path("out/flight.mcap"))
     wind = log.setup.scenario.wind
     assert (wind.speed, math.degrees(wind.from_course), wind.turbulence) == (5.0, pytest.approx(90.0), "none")
-    assert (log.setup.route.airspeed == 22.0).all()
+    assert (log.setup.route.leg_airspeeds == 22.0).all()
     assert (log.setup.autopilot.store().guidance, log.setup.nav, log.setup.aircraft) == ("path", "rtk", "aerosonde")
     assert log.track.time[1] - log.track.time[0] == pytest.approx(0.1)
     # The plan was made in that wind, too, and the report names the line that repeats it.

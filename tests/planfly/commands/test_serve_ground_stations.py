@@ -111,8 +111,8 @@ def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_
     assert (found["finished"], found["progress"]) == (True, [3, 3])
     assert vehicle.stop() == 0
     log = read_log(tmp_path / "logs" / "flight-001.mcap")
-    assert len(log.setup.route.waypoints) == 3
-    assert log.setup.route.waypoints[:, 2] == pytest.approx([100.0, 100.0, 110.0])
+    assert len(log.setup.route.points) == 3
+    assert log.setup.route.positions[:, 2] == pytest.approx([100.0, 100.0, 110.0])
 
 
 def test_mavsdk_flies_and_has_it_hold_go_elsewhere_go_on_and_return(
@@ -135,7 +135,7 @@ def test_mavsdk_flies_and_has_it_hold_go_elsewhere_go_on_and_return(
     # What is left within a second has no log.
     first, *logs = (read_log(path) for path in sorted((tmp_path / "logs").glob("*.mcap")))
     assert first.ended == "completed"
-    assert len(logs[0].setup.route.waypoints) == 3, "from the second place on"
+    assert len(logs[0].setup.route.positions) == 3, "from the second place on"
     assert logs[-1].setup.mission.items[-1].command == mavlink_messages.MAV_CMD_NAV_RETURN_TO_LAUNCH
     assert {log.setup.autopilot.parameters.wp_radius for log in logs} == {70.0}
 

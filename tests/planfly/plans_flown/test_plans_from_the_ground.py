@@ -181,7 +181,7 @@ def test_fresh_plans_do_no_harm(launch: str, aircraft: str, wanted: int, whose: 
         mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
         setup = make_setup(scenario, airframe, mission, 1, plan=plan)
         flown = fly_and_judge(setup, airframe, None, reference="never", autopilot=program)
-        harm, low = harm_of_flight(scenario, setup.route.waypoints[-1], flown.track.position)
+        harm, low = harm_of_flight(scenario, setup.route.positions[-1], flown.track.position)
         least = min(least, low)
         harmed += [f"{scenario.name}: {harm}"] if harm else []
         unflyable += [] if flown.verdict.flyable else [f"{scenario.name}: {flown.verdict.headline}"]

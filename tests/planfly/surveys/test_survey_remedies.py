@@ -86,7 +86,7 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
     def fly(setup: FlightSetup, *rest: Any) -> Any:
         [survey] = judged_surveys(setup)
         first = survey.lines[0]
-        lead_in = math.dist(setup.route.waypoints[first.begins], setup.route.waypoints[first.first])
+        lead_in = math.dist(setup.route.positions[first.begins], setup.route.positions[first.first])
         if abs(survey.offsets[1]) > 100.0 and lead_in >= 130.0:
             flights.answer = lambda metres: (metres >= 45.0, {})
         found = flights(setup, *rest)
@@ -158,7 +158,7 @@ def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.Monk
 
 def test_a_slower_flight_with_longer_turn_arounds(monkeypatch: pytest.MonkeyPatch) -> None:
     """The x8 cruises at 18 m/s, and a tenth above its slowest airspeed are 15.5 m/s: the slowest that is tried."""
-    [both] = judged_by(monkeypatch, lambda setup, m: m >= 130.0 and setup.route.airspeed[0] < 17.0).remedies
+    [both] = judged_by(monkeypatch, lambda setup, m: m >= 130.0 and setup.route.leg_airspeeds[0] < 17.0).remedies
     assert (both.kind, both.current, both.value, both.turn_around) == ("airspeed", 18.0, 15.5, 150.0)
     assert "15.5 m/s instead of 18 m/s (--airspeed 15.5), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
 

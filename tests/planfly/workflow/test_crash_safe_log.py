@@ -108,7 +108,7 @@ def test_a_short_flight_is_told_in_seconds() -> None:
 def test_a_speed_that_the_autopilot_ignores_lengthens_no_predicted_flight() -> None:
     """ArduPlane takes no DO_CHANGE_SPEED below AIRSPEED_MIN."""
     setup = dataclasses.replace(example_log().setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))
-    slow = dataclasses.replace(setup.route, airspeed=np.full(setup.route.legs, 0.001))
+    slow = setup.route.with_fields(airspeed=0.001)
     assert predicted_seconds(dataclasses.replace(setup, route=slow)) == pytest.approx(predicted_seconds(setup))
 
 

@@ -277,7 +277,7 @@ def test_a_mission_without_a_scenario_gets_one_made_around_it(short_mission: Pat
     assert setup.scenario.external
     assert setup.scenario.terrain is None
     # 0.01 degrees of a meridian near 46 degrees north are 1111.5 m.
-    assert np.linalg.norm(np.diff(setup.route.waypoints[:, :2], axis=0)) == pytest.approx(1111.5, abs=0.5)
+    assert np.linalg.norm(np.diff(setup.route.positions[:, :2], axis=0)) == pytest.approx(1111.5, abs=0.5)
 
 
 def test_a_parameter_that_is_assumed_for_a_landing_sequence_is_not_of_the_file(tmp_path: Path) -> None:
@@ -307,7 +307,7 @@ def test_a_mission_is_judged_in_the_scenario_that_is_named(short_mission: Path) 
     assert (slower.scenario.name, slower.seed) == ("field", 9)
     assert slower.scenario.wind.speed == 3.0
     assert slower.airspeed == airframe_for_setup(slower).airspeed == 21.0
-    assert (slower.route.airspeed == 21.0).all()
+    assert (slower.route.leg_airspeeds == 21.0).all()
 
 
 def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_mission: Path, tmp_path: Path) -> None:
@@ -319,7 +319,7 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_miss
     assert (own.scenario.name, own.seed, own.name) == ("small", 3, "small")
     assert own.plan is not None
     np.testing.assert_array_equal(own.plan.waypoints, plan.waypoints)
-    np.testing.assert_allclose(own.route.waypoints, plan.waypoints, atol=0.02)
+    np.testing.assert_allclose(own.route.positions, plan.waypoints, atol=0.02)
     other = open_flight(file, {"scenario": short_mission.parent / "field.toml", "seed": 4})
     assert (other.scenario.name, other.seed, other.name) == ("field", 4, "plan")
     assert other.plan is None

@@ -22,8 +22,8 @@ def test_a_thinned_log_holds_the_rows_that_were_judged(tmp_path: Path) -> None:
     mission = waypoint_mission(POINTS, np.array([25.0, 22.0]), scenario.origin)
     setup = make_setup(scenario, airframe, mission, 7)
     assert (setup.seed, setup.aircraft, setup.battery) == (7, "aerosonde", airframe.battery)
-    assert setup.route.airspeed.tolist() == [25.0, 22.0]
-    np.testing.assert_allclose(setup.route.waypoints, POINTS, atol=0.02)
+    assert setup.route.leg_airspeeds.tolist() == [25.0, 22.0]
+    np.testing.assert_allclose(setup.route.positions, POINTS, atol=0.02)
     reports: list[tuple[float, float, str]] = []
     whole = fly_and_judge(setup, airframe, None, lambda *report: reports.append(report))
     thin = fly_and_judge(setup, airframe, tmp_path / "f.mcap", every=3)

@@ -72,7 +72,7 @@ class Flights:
 
     def __call__(self, setup: FlightSetup, *_: Any) -> Any:
         flights = self
-        up = setup.route.waypoints[1, 2] - SESSION.judged.setup.route.waypoints[1, 2]
+        up = setup.route.positions[1, 2] - SESSION.judged.setup.route.positions[1, 2]
 
         class Fake:
             def __init__(self) -> None:

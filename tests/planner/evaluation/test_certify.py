@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.path_limits import Limits, turn_tangents
 from flight.guidance.path import fly_by_path
-from flight.mission.route import Route
+from flight.mission.route import Route, route_points
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, CERTIFIED_KILL_MARGIN_M
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
@@ -59,8 +59,7 @@ def test_certificate_against_the_path_that_guidance_flies(
         # Its corners cannot be flown as planned: there the certificate is of the legs as drawn.
         assert not fits(path, make_limits(scenario))
         return
-    count = len(path)
-    route = Route(path, np.full(count - 1, 25.0), np.zeros(count), np.zeros(count, bool), np.full(count, -1), "")
+    route = Route(route_points(path, 25.0), "")
     flown = sample_path(fly_by_path(route, make_limits(scenario)), 2.0)
     assert scenario.terrain is not None
     above = flown[:, 2] - scenario.terrain.height(flown[:, 0], flown[:, 1]) - scenario.limits.min_clearance_m

@@ -85,14 +85,14 @@ def test_it_leaves_its_circle_for_the_landing_within_10_m_of_its_height_and_only
     # With a circle 100 m higher it climbs there first.
     assert route.items[route.rtl_end] == 5
     high = kept_setup("autoland-1", RTL_ALTITUDE=200.0).route
-    assert high.waypoints[high.rtl_end - 1, 2] == pytest.approx(535.0, abs=1.0)
+    assert high.positions[high.rtl_end - 1, 2] == pytest.approx(535.0, abs=1.0)
 
 
 def test_without_autoland_a_return_ends_in_its_circle() -> None:
     for autoland in (0.0, 3.0, 4.0):
         route = kept_setup("autoland-1", RTL_AUTOLAND=autoland).route
-        assert route.rtl_end == len(route.waypoints)
-        assert math.isnan(route.landing_ground)
+        assert route.rtl_end == len(route.points)
+        assert route.landing_ground is None
         assert any("never reached" in note for note in route.notes)
         assert any("this is not simulated, and the RTL ends in its loiter" in note for note in route.notes) is (
             autoland == 4.0

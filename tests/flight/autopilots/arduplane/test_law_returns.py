@@ -204,7 +204,7 @@ def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     assert records["is_rtl"].tolist() == [False, False, *[True] * (len(records) - 2)]
     assert set(records["centre_east"][2:].round()) == {9500.0}
     assert setup.route.rtl_start == 1
-    assert (setup.route.airspeed[1:] == setup.airspeed).all()
+    assert (setup.route.leg_airspeeds[1:] == setup.airspeed).all()
     own = memory(leg=0)
     assert navigated(own, flying(EAST, NORTH), back(100.0)).leg == 0
 
@@ -220,9 +220,9 @@ def test_the_turn_before_a_return_is_one_to_0_north_0_east() -> None:
     (item,) = (one for one in setup.mission.items if one.seq == seq)
     item = replace(item, lat_deg=36.2712892, lon_deg=-84.1011091)
     for course, turn in ((126.3, 11.9), (114.4, 0.0), (24.0, 90.4), (-65.6, 180.0)):
-        way = np.array(setup.route.waypoints)
+        way = np.array(setup.route.positions)
         way[0] = way[1] - 900.0 * np.array([math.sin(math.radians(course)), math.cos(math.radians(course)), 0.0])
-        records = waypoint_records(replace(setup.route, waypoints=way), replace(setup.mission, items=(item,)))
+        records = waypoint_records(setup.route.with_fields(position=way), replace(setup.mission, items=(item,)))
         assert math.degrees(records["turn"][1]) == pytest.approx(turn, abs=0.1)
 
 

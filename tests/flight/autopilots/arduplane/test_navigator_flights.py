@@ -131,7 +131,7 @@ def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, read, 1), nav="perfect")
-    assert setup.route.arcs.max() == pytest.approx(radius, abs=0.5)
+    assert setup.route.arc_radii.max() == pytest.approx(radius, abs=0.5)
     done = fly_to_end(Flight(setup, airframe.aircraft))
     assert done.ended == "completed"
     track = Flown(done.track.time[::20], done.track.position[::20], np.zeros((0, 2)))

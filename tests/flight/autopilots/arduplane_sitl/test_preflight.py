@@ -16,7 +16,8 @@ from flight.autopilots.sitl.link import ReportedState
 from flight.autopilots.sitl.mission import UploadedMission, uploaded_mission
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
-from flight.mission.route import make_route
+from flight.mission.itinerary import NO_ITEM
+from flight.mission.route import make_route, route_points
 from flight.simulation.setup import FlightSetup, make_limits
 from tests.setups import setup_maker
 from world.errors import FlightError
@@ -167,15 +168,8 @@ def test_a_route_of_no_mission_is_its_waypoints_and_its_speeds() -> None:
 def test_the_end_of_a_lead_out_leg_is_a_place_too() -> None:
     setup = setup_of(place(1, 0.0), place(2, 900.0))
     route = setup.route
-    longer = replace(
-        route,
-        waypoints=np.vstack([route.waypoints, route.waypoints[-1] + [300.0, 0.0, 0.0]]),
-        airspeed=np.append(route.airspeed, 25.0),
-        acceptance=np.append(route.acceptance, 0.0),
-        fly_over=np.append(route.fly_over, False),
-        items=np.append(route.items, -1),
-        arcs=np.append(route.arcs, 0.0),
-    )
+    way = np.vstack([route.positions, route.positions[-1] + [300.0, 0.0, 0.0]])
+    longer = replace(route, points=route_points(way, 25.0, item=[*route.items, NO_ITEM]))
     east = [
         round(float(to_map(SCENARIO.origin, item.lat_deg, item.lon_deg)[0]))
         for item in uploaded_mission(replace(setup, route=longer)).items

@@ -43,19 +43,19 @@ def test_a_stretch_between_waypoints_has_no_leg() -> None:
 def test_a_part_of_a_route_keeps_what_belongs_to_its_waypoints() -> None:
     route = LOG.setup.route
     part = part_of_route(route, 1, 2)
-    assert part.waypoints.tolist() == route.waypoints[1:].tolist()
+    assert part.positions.tolist() == route.positions[1:].tolist()
     assert (part.legs, part.items.tolist()) == (1, route.items[1:].tolist())
     assert part_of_route(route, 0, 2) is route
     back = replace(route, rtl_start=1, rtl_loiter=ReturnCircle(0.0, 0.0, 400.0, 80.0))
     assert (part_of_route(back, 1, 2).rtl_start, part_of_route(back, 1, 2).rtl_loiter) == (0, back.rtl_loiter)
-    assert (part_of_route(back, 0, 1).rtl_start, part_of_route(back, 0, 1).rtl_loiter) == (-1, None)
+    assert (part_of_route(back, 0, 1).rtl_start, part_of_route(back, 0, 1).rtl_loiter) == (None, None)
 
 
 def test_a_flight_that_ends_in_its_first_lap_has_flown_none_of_the_second() -> None:
     """Three corners of a triangle, twice: what was near to a corner once was near to it on every lap."""
     corners = [(0.0, 0.0, 300.0), (0.0, 1500.0, 300.0), (1500.0, 1500.0, 300.0)]
     setup = make_setup([*corners, *corners, *corners])
-    laps = replace(setup, route=replace(setup.route, items=np.array([1, 2, 3] * 3)))
+    laps = replace(setup, route=setup.route.with_fields(item=np.array([1, 2, 3] * 3)))
     # To the last corner, and ten seconds on along the same course.
     track = fly_path(make_setup([*corners, (4000.0, 1500.0, 300.0)]), stop=3400.0)
     found = flown_legs(laps, track, MissionStretch(0.0, 1e4, "AUTO", "log"))

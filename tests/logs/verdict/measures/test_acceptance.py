@@ -28,7 +28,7 @@ def test_a_stated_radius_comes_before_the_paths_own() -> None:
     found = [acceptance_condition(route_requirements(setup), i) for i in range(4)]
     assert [item.radius for item in found] == pytest.approx([10.0, own + 10.0, 10.0, 10.0])
     assert [item.source for item in found] == ["fly-by path", "fly-by path", "fly-over", "fly-by path"]
-    stated = replace(setup, route=replace(setup.route, acceptance=np.array([0.0, 25.0, 7.0, 0.0])))
+    stated = replace(setup, route=setup.route.with_fields(acceptance_radius=np.array([0.0, 25.0, 7.0, 0.0])))
     found = [acceptance_condition(route_requirements(stated), i) for i in range(4)]
     assert [(item.radius, item.source) for item in found[1:3]] == [(25.0, "mission"), (7.0, "mission")]
 
@@ -88,9 +88,9 @@ def test_the_way_without_a_corner_has_to_have_room_for_its_own_turns() -> None:
 
 def test_the_corners_of_a_circle_are_no_jog() -> None:
     requirements = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
-    arcs = requirements.setup.route.arcs.copy()
+    arcs = requirements.setup.route.arc_radii.copy()
     arcs[1:3] = 3.0
-    object.__setattr__(requirements.setup.route, "arcs", arcs)
+    object.__setattr__(requirements.setup, "route", requirements.setup.route.with_fields(arc_radius=arcs))
     assert negligible_kink(requirements, 1) is None
 
 
@@ -116,7 +116,7 @@ def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
 def test_a_way_past_one_corner_of_a_circle_is_no_jog(circle: int) -> None:
     """12 m aside, so that both corners have to be left out."""
     requirements = demands_of([[0, 0, 300], [0, 1000, 300], [12, 1000, 300], [12, 2000, 300]])
-    arcs = requirements.setup.route.arcs.copy()
+    arcs = requirements.setup.route.arc_radii.copy()
     arcs[circle] = 3.0
-    object.__setattr__(requirements.setup.route, "arcs", arcs)
+    object.__setattr__(requirements.setup, "route", requirements.setup.route.with_fields(arc_radius=arcs))
     assert negligible_kink(requirements, 1) is None

@@ -20,7 +20,7 @@ def test_a_leg_ends_where_the_track_is_nearest_to_its_waypoint() -> None:
     setup, track = make_setup(), make_track()
     found = numbered(setup, track)
     # The flight goes through each waypoint, 5.7 m a row; a leg ends within a few rows of it, at the fly-by's apex.
-    for index, waypoint in enumerate(setup.route.waypoints[1:-1], 1):
+    for index, waypoint in enumerate(setup.route.positions[1:-1], 1):
         nearest = int(np.argmin(np.linalg.norm(track.position - waypoint, axis=1)))
         assert abs(int(np.searchsorted(found, index)) - nearest) < 12
     assert (np.diff(found) >= 0).all()

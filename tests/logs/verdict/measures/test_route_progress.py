@@ -90,7 +90,7 @@ def test_what_was_not_reached_is_named_once() -> None:
 def test_a_flight_that_ends_within_reach_of_a_waypoint_is_on_the_next_leg() -> None:
     """With an acceptance radius of 200 m, and 150 m before the waypoint."""
     setup = make_setup(TRIANGLE)
-    setup = replace(setup, route=replace(setup.route, acceptance=np.full(4, 200.0)))
+    setup = replace(setup, route=setup.route.with_fields(acceptance_radius=200.0))
     flown = fly_path(make_setup([[0, 0, 300], [0, 4000, 300]]), rate=10.0)
     aligned = align_track(route_requirements(setup), flown.rows(0, int(np.argmax(flown.position[:, 1] > 2850.0))))
     assert aligned is not None
@@ -104,7 +104,7 @@ def test_a_flight_that_ends_within_reach_of_a_turning_point_did_not_fly_back() -
     there_and_back = [[0, 0, 300], [0, 3000, 300], [0, 0, 300], [1500, 0, 300]]
     setup = make_setup(there_and_back)
     turns_at_waypoint = np.array([False, True, False, False])
-    setup = replace(setup, route=replace(setup.route, acceptance=np.full(4, 90.0), fly_over=turns_at_waypoint))
+    setup = replace(setup, route=setup.route.with_fields(acceptance_radius=90.0, fly_over=turns_at_waypoint))
     flown = fly_path(make_setup([[0, 0, 300], [0, 4000, 300]]), rate=10.0)
     aligned = align_track(route_requirements(setup), flown.rows(0, int(np.argmax(flown.position[:, 1] > 2950.0))))
     assert aligned is not None

@@ -221,7 +221,7 @@ def test_a_leg_that_the_wind_leaves_no_way_along_has_no_ground_speed() -> None:
 def test_waypoints_are_places_with_their_items(setup: FlightSetup) -> None:
     items = setup.route.items.copy()
     items[1] = -1
-    requirements = route_requirements(replace(setup, route=replace(setup.route, items=items)))
+    requirements = route_requirements(replace(setup, route=setup.route.with_fields(item=items)))
     assert [requirements.waypoint(k) for k in (1, 2)] == [Place("waypoint", 1), Place("waypoint", 2, item=2)]
 
 
@@ -265,7 +265,7 @@ def test_a_leg_names_the_item_that_it_leads_to_and_none_of_ours() -> None:
     setup = make_setup(RIGHT_ANGLE)
     # As after a jump back to item 4, and along a lead-out that no item asks for.
     items = np.array([4, 4, -1])
-    requirements = route_requirements(replace(setup, route=replace(setup.route, items=items)))
+    requirements = route_requirements(replace(setup, route=setup.route.with_fields(item=items)))
     assert [(requirements.leg(k).index, requirements.leg(k).to_item) for k in range(2)] == [(0, 4), (1, None)]
     assert [requirements.waypoint(k).item for k in range(3)] == [4, 4, None]
 

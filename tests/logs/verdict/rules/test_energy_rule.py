@@ -160,7 +160,7 @@ def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() 
 
 def test_what_is_not_known_is_not_judged() -> None:
     assert of(judge_geometry(make_setup(ROUTE)), "energy").ok is None
-    fast = replace(real_setup(), route=replace(real_setup().route, airspeed=np.full(3, 60.0)))
+    fast = replace(real_setup(), route=real_setup().route.with_fields(airspeed=60.0))
     assert of(judge_geometry(fast), "energy").ok is None
 
 
@@ -169,8 +169,8 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     square = [[0, 0, 500], [0, 2000, 500], [2000, 2000, 500], [2000, 0, 500]]
     setup = make_setup([*square, *square[1:]], table=load_envelope(AEROSONDE))
     items = np.array([1, 2, 3, 4, 2, 3, 4])
-    endless = replace(setup, route=replace(setup.route, items=items, endless_jump=5), battery=1000.0)
-    bounded = replace(setup, route=replace(setup.route, items=items), battery=1000.0)
+    endless = replace(setup, route=replace(setup.route.with_fields(item=items), endless_jump=5), battery=1000.0)
+    bounded = replace(setup, route=setup.route.with_fields(item=items), battery=1000.0)
     assert of(judge_geometry(bounded), "energy").ok
     item = of(judge_geometry(endless), "energy", FLIGHT)
     assert item.ok is False

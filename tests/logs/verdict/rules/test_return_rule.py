@@ -253,7 +253,7 @@ def test_a_mission_that_ends_within_10_m_of_its_scenarios_destination_is_judged_
 ) -> None:
     # sqrt(6^2 + 8^2) is 10 m, as FINAL_WAYPOINT_TOLERANCE_M, and sqrt(6^2 + 9^2) 10.8 m.
     setup = behind_a_hill(*BEHIND_THE_HILL)
-    destination = setup.route.waypoints[-1] - np.array([east, 0.0, above])
+    destination = setup.route.positions[-1] - np.array([east, 0.0, above])
     scenario = replace(setup.scenario, external=False, destination=destination)
     verdict = judge_geometry(setup.in_scenario(scenario))
     found = [item for item in verdict.findings if item.rule == "return"]
@@ -273,7 +273,7 @@ def test_a_mission_that_ends_within_10_m_of_its_scenarios_destination_is_judged_
 @pytest.mark.parametrize("last", [UNLIMITED, RTL])
 def test_a_mission_without_a_return_of_arduplanes_own_says_nothing_of_it(last: str) -> None:
     setup = behind_a_hill(BEHIND_THE_HILL[0], last, RTL_ALTITUDE=600.0)
-    scenario = replace(setup.scenario, external=False, destination=setup.route.waypoints[-1])
+    scenario = replace(setup.scenario, external=False, destination=setup.route.positions[-1])
     assert not [line for line in judge_geometry(setup.in_scenario(scenario)).lines if "Not judged: return" in line]
 
 

@@ -150,7 +150,7 @@ def test_a_speed_that_is_raised_for_a_minimum_ground_speed_is_held() -> None:
     """33 m/s instead of 25 on legs with a minimum ground speed, by the mission or MIN_GROUNDSPEED; 17 are too slow."""
     plain = make_setup(STRAIGHT)
     law = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MAX=40.0, MIN_GROUNDSPEED=20.0))
-    by_mission = replace(plain, route=replace(plain.route, min_ground_speed=np.full(3, 20.0)))
+    by_mission = replace(plain, route=plain.route.with_fields(min_ground_speed=20.0))
     for setup, fast in ((plain, False), (by_mission, True), (replace(plain, autopilot=law), True)):
         for off, ok in ((8.0, fast), (-8.0, False)):
             track = fly_path(setup, airspeed=lambda s, off=off: 0.0 * s + off)
@@ -199,13 +199,13 @@ def test_a_leg_that_is_too_steep_fails_by_its_slope_alone() -> None:
 def test_the_speed_that_is_demanded_is_judged_not_the_command(speed: float, demanded: float) -> None:
     """`do_change_speed` ignores a speed outside AIRSPEED_MIN..MAX; PX4 flies the nearest of its own limits."""
     setup = make_setup(STRAIGHT, airspeed=22.0)
-    commanded = replace(setup, route=replace(setup.route, airspeed=np.full(setup.route.legs, speed)))
+    commanded = replace(setup, route=setup.route.with_fields(airspeed=speed))
     assert of(judge_geometry(commanded), "speed", leg(0)).ok is False
     ignoring = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MIN=16.0, AIRSPEED_MAX=24.0))
     limiting = Px4(Px4Parameters.defaults().changed(FW_AIRSPD_MIN=16.0, FW_AIRSPD_MAX=24.0))
     for law, flown in ((ignoring, 22.0), (limiting, demanded)):
         made = replace(commanded, autopilot=law)
-        factor = law.speeds.true_airspeed_factor(float(made.route.waypoints[:2, 2].mean()))
+        factor = law.speeds.true_airspeed_factor(float(made.route.positions[:2, 2].mean()))
         item = of(judge_geometry(made), "speed", leg(0))
         assert item.planned == pytest.approx(flown * factor, abs=1e-6)
         assert item.reason.startswith(f"the mission commands {speed:g} m/s; ")

@@ -65,7 +65,7 @@ def test_an_equivalent_airspeed_that_is_commanded_is_a_higher_true_one() -> None
         assert item.limit == pytest.approx(BANKED, abs=1e-3)
         assert item.ok is (speed > BANKED)
     # What is asked for is what is commanded: 17.193 and 3 % are 17.71 m/s true, which are 16.87 equivalent.
-    slow = replace(equivalent, route=replace(setup.route, airspeed=np.full(2, 16.0)))
+    slow = replace(equivalent, route=setup.route.with_fields(airspeed=16.0))
     assert suggested(of(judge_geometry(slow), "stall"), "airspeed").wanted == pytest.approx(16.9)
 
 
@@ -85,7 +85,7 @@ def test_the_bank_of_a_turn_is_that_of_its_radius_and_of_what_there_is_time_for(
 
 def test_a_circle_wider_than_the_bank_limits_takes_less_bank() -> None:
     setup = corner(25.0)
-    wide = replace(setup, route=replace(setup.route, arcs=np.array([0.0, 300.0, 0.0])))
+    wide = replace(setup, route=setup.route.with_fields(arc_radius=np.array([0.0, 300.0, 0.0])))
     assert planned_bank(route_requirements(wide), 1, 25.0) == pytest.approx(math.atan(25.0**2 / (9.80665 * 300.0)))
 
 

@@ -23,7 +23,7 @@ STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
 
 def accepting(setup: FlightSetup, radius: float) -> FlightSetup:
     """The same with this acceptance radius stated for each waypoint, m."""
-    return replace(setup, route=replace(setup.route, acceptance=np.full(len(setup.route.waypoints), radius)))
+    return replace(setup, route=setup.route.with_fields(acceptance_radius=radius))
 
 
 def corner(turn_deg: float) -> list[list[float]]:
@@ -76,7 +76,7 @@ def test_of_a_flight_that_ended_before_a_waypoint_its_end_counts() -> None:
     whole = fly_path(setup)
     ended = whole.rows(0, int(np.searchsorted(whole.position[:, 1], 2000.0)))
     items = [of(judge(setup, ended), "waypoint", waypoint(k)) for k in (1, 2)]
-    assert items[0].flown == pytest.approx(setup.route.waypoints[1, 1] - ended.position[-1, 1], abs=0.01)
+    assert items[0].flown == pytest.approx(setup.route.positions[1, 1] - ended.position[-1, 1], abs=0.01)
     assert [item.ok for item in items] == [False, None]
 
 
@@ -195,7 +195,7 @@ def test_px4_turns_by_its_own_radius_and_says_so() -> None:
         "PX4 turns to the next leg 10 m before the waypoint, or once the aircraft has passed the waypoint; PX4 does not"
         " read the mission's 120 m"
     )
-    own = replace(setup, route=replace(setup.route, acceptance=np.zeros(3)))
+    own = replace(setup, route=setup.route.with_fields(acceptance_radius=0.0))
     told = of(judge_geometry(own), "waypoint", waypoint(1)).reason
     assert told == "PX4 turns to the next leg 10 m before the waypoint, or once the aircraft has passed the waypoint"
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from aircraft.envelope import Envelope
 from flight.mission.items import Mission, MissionItem
-from flight.mission.route import Route
+from flight.mission.route import Route, route_points
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.verdict.findings import Finding
@@ -55,15 +55,7 @@ def make_setup(**changes: Any) -> FlightSetup:
     return FlightSetup(
         scenario=scenario,
         mission=Mission(None, items, warnings=("line 7: CRLF",), source="his.waypoints"),
-        route=Route(
-            ROUTE,
-            np.full(3, 25.0),
-            np.zeros(4),
-            np.zeros(4, bool),
-            np.arange(4),
-            "starts trimmed",
-            ("item 9: no loiter",),
-        ),
+        route=Route(route_points(ROUTE, 25.0, item=np.arange(4)), "starts trimmed", ("item 9: no loiter",)),
         limits=make_limits(scenario, envelope, 25.0, math.radians(30.0)),
         aircraft="aerosonde",
         battery=100.0,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.mission.route import route_points
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
@@ -151,16 +152,7 @@ def landing_page(tmp_path_factory: pytest.TempPathFactory, setup: FlightSetup) -
     angles = np.linspace(0.0, 4.0 * np.pi, 20)
     circuit = np.column_stack([700.0 + 200.0 * np.cos(angles), 800.0 + 120.0 * np.sin(angles), np.full(20, 440.0)])
     points = np.vstack([[-900.0, -900.0, 420.0], circuit, [900.0, 900.0, 440.0]])
-    count = len(points)
-    route = replace(
-        setup.route,
-        waypoints=points,
-        airspeed=np.full(count - 1, 25.0),
-        acceptance=np.zeros(count),
-        fly_over=np.zeros(count, dtype=bool),
-        items=np.arange(-1, count - 1),
-        arcs=np.zeros(count),
-    )
+    route = replace(setup.route, points=route_points(points, 25.0, item=np.arange(len(points)) - 1))
     setup = replace(setup, route=route, plan=None)
     arguments: dict[str, Any] = {"ended": None, "versions": {"planfly": "0"}, "command": "planfly check small"}
     with pytest.MonkeyPatch.context() as patch:

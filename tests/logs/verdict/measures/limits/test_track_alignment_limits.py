@@ -60,7 +60,7 @@ def test_a_row_with_a_number_that_no_flight_has_is_bad(setup: FlightSetup, colum
 def test_a_flight_that_ends_ten_metres_short_has_arrived(
     setup: FlightSetup, acceptance: float, short: float, arrived: bool
 ) -> None:
-    stated = replace(setup, route=replace(setup.route, acceptance=np.full(3, acceptance)))
+    stated = replace(setup, route=setup.route.with_fields(acceptance_radius=acceptance))
     aligned = align_track(route_requirements(stated), fly_path(setup, stop=6000.0 - short))
     assert aligned is not None
     assert aligned.passed.tolist() == [True, True, arrived]

@@ -52,4 +52,4 @@ def test_without_terrain_heights_are_over_home_or_the_lowest_waypoint(home: floa
     setup = make_setup([[0.0, 0.0, 80.0], [0.0, 900.0, 100.0]])
     place = None if home is None else Home(46.0, 8.0, home)
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None), mission=replace(setup.mission, home=place))
-    assert heights_over_ground(route_requirements(bare), setup.route.waypoints).tolist() == up
+    assert heights_over_ground(route_requirements(bare), setup.route.positions).tolist() == up

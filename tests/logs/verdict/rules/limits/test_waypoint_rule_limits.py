@@ -16,7 +16,7 @@ def test_an_arc_may_miss_its_acceptance_by_two_centimetres(short: float, ok: boo
     """A right angle's arc passes its waypoint at R (root 2 - 1)."""
     setup = make_setup([[0, 0, 300], [0, 3000, 300], [3000, 3000, 300]])
     radius = bank_radius() * (math.sqrt(2.0) - 1.0) - short
-    stated = replace(setup, route=replace(setup.route, acceptance=np.full(3, radius)))
+    stated = replace(setup, route=setup.route.with_fields(acceptance_radius=radius))
     assert of(judge_geometry(stated), "waypoint", waypoint(1)).ok is ok
 
 
