@@ -70,7 +70,7 @@ def test_a_waypoint_or_item_that_is_none_is_minus_one() -> None:
     assert [ROUTE[key] for key in ("return_from_waypoint", "straight_to_waypoint", "endless_jump")] == [-1] * 3
     made = RouteTable.model_validate(ROUTE).route("x")
     assert (made.rtl_start, made.direct_landing_start, made.endless_jump) == (None, None, None)
-    with pytest.raises(LogError, match=r"^x: route\.straight_to_waypoint: 4: a waypoint, or -1"):
+    with pytest.raises(LogError, match=r"^x: route\.straight_to_waypoint: 4: expected a waypoint, or -1"):
         RouteTable.model_validate(ROUTE | {"straight_to_waypoint": 4}).route("x")
 
 
