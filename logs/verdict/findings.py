@@ -244,11 +244,11 @@ def _rounded_or_none(value: float | None) -> float | None:
     return round(float(value), 6) + 0.0  # no -0.0
 
 
-def badness(finding: Finding) -> tuple[int, float]:
+def worst_first_key(finding: Finding) -> tuple[int, float]:
     """Return a sort key that puts the worst finding first: failed, unjudged, then passed; each sorted by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
-    >>> badness(near) < badness(far)
+    >>> worst_first_key(near) < worst_first_key(far)
     True
     """
     return (

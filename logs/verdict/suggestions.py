@@ -20,7 +20,7 @@ from logs.verdict.measures.route_requirements import (
     performance_tables,
     slope_limit,
     steep_arc,
-    tighter_turn,
+    tighter_turn_limit,
     turn_lengths,
     turn_limit,
     turn_requirements,
@@ -290,7 +290,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
         next_points = points[local_corner + 1 :, :2] - points[local_corner, :2]
         points[local_corner + 1 :, :2] = points[local_corner, :2] + next_points @ np.array([[cos, -sin], [sin, cos]])
         trial = turn_requirements(replace(nearby_route, waypoints=points), tables)
-        limit, _ = tighter_turn(requirements, corner, float(trial.limit[local_corner]))
+        limit, _ = tighter_turn_limit(requirements, corner, float(trial.limit[local_corner]))
         if limit >= math.radians(degrees):
             return degrees
         max_turn = min(max_turn, limit) - SUGGESTION_ANGLE_MARGIN_RAD
@@ -423,7 +423,7 @@ def suggest_flying_lower(
 def suggest_staying_inside(
     _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest moving the path further inside the area."""
+    """Suggest moving the path further inside the scenario's area."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     return ((Change("inset", FLIGHT, None, _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)

@@ -144,7 +144,7 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Name each threat that the aircraft missed by less than its navigation error."""
+    """Return a note for each missile whose range was missed by less than the navigation error."""
     notes = []
     for finding in findings:
         facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}

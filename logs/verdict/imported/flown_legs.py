@@ -9,7 +9,7 @@ from flight.mission.route import part_of_route
 from flight.simulation.setup import FlightSetup, Gap, MissionStretch
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.measures.track_alignment import AlignedTrack, align_track, approaches
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track, closest_approaches
 from logs.verdict.tolerances import (
     CAPTURE_RADIUS_M,
     FINAL_WAYPOINT_TOLERANCE_M,
@@ -101,9 +101,10 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, waypoint_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align a track with only the first laps of a route that repeats its items, if these laps explain the flight.
+    """Align a track with the earliest laps that explain the flight, on a route that repeats its items.
 
-    A flight that ended within a lap was equally near to the waypoints of any later lap.
+    A flight that ended within a lap was equally near to the waypoints of any later lap.  Return `aligned` and
+    `waypoint_indices` unchanged if no shorter route explains the flight.
     """
     items, last = setup.route.items, int(waypoint_indices[-1])
     if len(waypoint_indices) == last - waypoint_indices[0] + 1:
@@ -215,7 +216,7 @@ def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Flo
     min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in tracks:
         for k, point in enumerate(points):
-            distance, _ = approaches(rows.position, point)
+            distance, _ = closest_approaches(rows.position, point)
             row = int(np.argmin(distance))
             if distance[row] < min_distances[k]:
                 min_distances[k], times[k] = float(distance[row]), float(rows.time[row])

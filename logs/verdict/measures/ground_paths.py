@@ -111,8 +111,8 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
     return setup.scenario.terrain is not None and has_ground_phases and setup.source is None
 
 
-def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """Return the index of the first waypoint of a mission item, and that item if it is a take-off."""
+def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
+    """Return the first waypoint of a mission item, and this item if it is a take-off, otherwise None."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]

@@ -110,7 +110,7 @@ def _line_rows(
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if no row lies between the neighbouring waypoints."""
+    """Measure a photo line on a flown track; return None if not reached, or with fewer than two rows."""
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -178,12 +178,12 @@ def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> F
 def _camera_on_rows(
     requirements: RouteRequirements, line: PhotoLine, axis: LineAxis, position: Floats, is_ahead: Flags
 ) -> Flags:
-    """Return True for each row at which the camera is on.
+    """Return a mask (n,): True for each row at which the camera is on.
 
     is_ahead: True for each row that flies along the line.
 
-    The camera is on from reaching the waypoint that switches it on to reaching the waypoint that switches it off.  Both
-    may be beyond the line's ends, and each is optional.
+    The camera is on from the row that reaches the waypoint where it is switched on, to the row that reaches the
+    waypoint where it is switched off.  Both waypoints may be beyond the line's ends, and each is optional.
     """
     follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(position))
     along = axis.project(position)[0]
@@ -355,8 +355,8 @@ def _with_side_overlap(
 ) -> OverlapMeasure:
     """Return the measure with the minimum overlap between neighbouring lines.
 
-    Lines are neighbours where they run side by side with no line between them, lost or not, and are not much further
-    apart than the survey's spacing: beyond a notch of the area is another part of it.
+    Two lines are neighbours where they run side by side, no other line (lost or not) lies between them, and their
+    distance is not much more than the survey's spacing.  A larger distance spans a notch in the survey's area.
     """
     ranks, offsets = _lateral_ranks(survey), np.array(survey.offsets)
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
@@ -407,7 +407,7 @@ def _with_side_overlap(
 
 
 def _lateral_ranks(survey: Survey) -> NDArray[np.int64]:
-    """Return for each line the number of lateral positions to its left that have a line, (n,)."""
+    """Return each line's rank by lateral offset, (n,); lines at the same offset share a rank."""
     order, ranks = np.argsort(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
     gaps = np.diff(np.array(survey.offsets)[order])
     ranks[order[1:]] = np.cumsum(gaps > _SAME_POSITION_SPACINGS * survey.spacing)

@@ -85,7 +85,8 @@ class Airspace:
 def judged_airspace(setup: FlightSetup) -> Airspace:
     """Return the exclusion and inclusion zones that apply to a setup's flight.
 
-    A fence that gives no zones, as in logs from before fences were judged, is omitted and reported.
+    A fence that cannot be converted to zones, as in logs from before fences were judged, is omitted; `fence_fault`
+    then states the reason.
 
     >>> from logs.recording.example_log import example_log
     >>> judged_airspace(example_log().setup).zones
@@ -534,7 +535,10 @@ def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> Planne
 def _leg_limits(
     route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the climb and dive over the ground, rad, and the ground speed, m/s, that are available along each leg."""
+    """Return each leg's climb and dive limits over the ground (rad) and ground speed (m/s), (legs,) each.
+
+    Each is the minimum at the start, the middle and the end of the leg; the ground speed is NaN if any is unknown.
+    """
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
@@ -594,10 +598,10 @@ class SteepArc:
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
     """Return the tighter of the scenario's and the aircraft's turn limits at a waypoint, rad, and its source."""
-    return tighter_turn(requirements, i, float(requirements.turn_limit[i]))
+    return tighter_turn_limit(requirements, i, float(requirements.turn_limit[i]))
 
 
-def tighter_turn(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
+def tighter_turn_limit(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
     """Return the tighter of the scenario's limit and an aircraft limit, rad, and its source."""
     scenario_limit = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.

@@ -19,7 +19,7 @@ from flight.autopilots.arduplane.tecs import (
     load_factor_roll_limit,
 )
 from flight.guidance.equivalent_airspeed import true_by_equivalent
-from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, steps
+from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, glide_steps
 from world.arrays import Codes, Floats
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
@@ -68,7 +68,7 @@ def remaining_glide_altitudes(
         glide_altitudes.min_altitude,
         glide_altitudes.destination,
         glide_altitudes.next_step,
-        steps()[0],
+        glide_steps()[0],
         glider,
         aircraft.record,
         aircraft.excess,

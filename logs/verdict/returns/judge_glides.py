@@ -289,7 +289,7 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 
 
 def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
-    """Return a mask of the cells on which a landing is possible, (n, e).
+    """Return a mask (n, e): True for each cell on which a landing is possible.
 
     They are flat, and in no exclusion zone that reaches down to `MARGIN` above the ground.
     """

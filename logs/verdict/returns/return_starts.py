@@ -90,7 +90,7 @@ def _empty_starts(*, is_flown: bool) -> ReturnStarts:
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return masks of the rows that are low in a flown take-off or landing, and of those too slow to fly, (n,) each."""
+    """Return two masks (n,): True for rows low in take-off or landing, and for rows too slow to fly."""
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)

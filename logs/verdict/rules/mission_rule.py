@@ -39,7 +39,7 @@ from flight.mission.itinerary import make_itinerary
 from flight.mission.preflight_notes import landing_slopes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
-from logs.verdict.measures.mission_ends import missing_ends_text, returns_after_last_item
+from logs.verdict.measures.mission_ends import judges_return_after_last_item, missing_ends_text
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -272,13 +272,13 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     with suppress(FlightError):
         aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return MissionParts(
-        returns=C.NAV_RETURN_TO_LAUNCH in commands or returns_after_last_item(setup),
+        returns=C.NAV_RETURN_TO_LAUNCH in commands or judges_return_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
         takes_off=procedures.take_off is not None,
         lands=procedures.approach is not None,
         loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
         has_fence=bool(setup.mission.fences),
-        fence_at_home=_fence_at_home(setup),
+        fence_at_home=_home_fence_violation(setup),
         smallest_inclusion=min(
             (item.params[0] for item in setup.mission.fences if item.command == C.NAV_FENCE_CIRCLE_INCLUSION),
             default=math.inf,
@@ -310,7 +310,7 @@ def _rally_distance(mission: Mission) -> float:
     )
 
 
-def _fence_at_home(setup: FlightSetup) -> str:
+def _home_fence_violation(setup: FlightSetup) -> str:
     """Return how home violates the mission's fence, such as "inside an exclusion polygon"; "" if it does not."""
     mission, checks = setup.mission, setup.autopilot.checks
     if mission.home is None or not mission.fences:

@@ -162,6 +162,6 @@ def test_speed_that_a_gust_along_the_track_took_is_not_lost(throttle: float, off
 def test_heights_within_a_decimetre_are_one(span: float, value: float) -> None:
     """A rate of 2 at the top that falls below it; heights are in hundreds of metres."""
     x, y = np.tile([-1.0, 1.0], 500), np.linspace(-span, 0.0, 1000)
-    found = slopes._plane_at_origin(2.0 + 100.0 * y, x, y, 10.0)
+    found = slopes._fit_plane_at_origin(2.0 + 100.0 * y, x, y, 10.0)
     assert found is not None
     assert found[0] == pytest.approx(value, abs=1e-3)
