@@ -143,7 +143,7 @@ class ArmingState:
         self.mission_state = PAUSED
         return CommandResult(ACCEPTED)
 
-    def restart_mission(self) -> None:
+    def continue_from_current_item(self) -> None:
         """Continue the mission from the item that was set in flight."""
         self.loiter_center = LoiterCenter()
 

@@ -83,7 +83,7 @@ class Parameters:
         return self.entries[self._numbers[name]].value
 
     def set_value(self, name: str, value: float) -> None:
-        """Set a value from within planfly.
+        """Set the value of a parameter, without the checks for stations.
 
         Raises KeyError for an unknown name.
         """
