@@ -327,7 +327,7 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the commanded airspeed nearest to the current one at which the aircraft holds a leg's slope, m/s, or None.
+    """Return the nearest airspeed to command (m/s) at which the aircraft holds a leg's slope, or None.
 
     slope: absolute value of the slope, rad.
     """
@@ -345,7 +345,7 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest commanded airspeed, below the current one, at which a turn fits its legs, m/s, or None."""
+    """Return the highest lower airspeed to command (m/s) at which a turn fits its legs, or None."""
     current_speed = float(max(requirements.setup.demanded_route.airspeed[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(

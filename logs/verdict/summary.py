@@ -197,7 +197,7 @@ def summary_lines(
 ) -> tuple[str, ...]:
     """Return the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
 
-    levels: answers of all levels; the last one is the verdict's own answer, whose headline is the first line.
+    levels: answers of all levels; the last answer is the verdict's own, whose headline is the first line.
     """
     *other_answers, own_answer = levels
     lines = [own_answer.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]

@@ -42,7 +42,7 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs flown in a stretch; return None if there are none.
+    """Find the legs flown in a stretch of the log that follows the mission; return None if there are none.
 
     A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  Its legs begin at the first
     waypoint that was passed, because the path to that waypoint is not a leg.  They end at the last waypoint that was
@@ -212,7 +212,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
 
 
 def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's minimum horizontal distance from the flight, m, and the time of this minimum, s, (w,)."""
+    """Return each waypoint's minimum horizontal distance (m) from the flight, and its time (s), (w,) each."""
     min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in tracks:
         for k, point in enumerate(points):

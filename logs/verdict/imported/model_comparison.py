@@ -229,7 +229,7 @@ def _flight_profile(
 
 
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
-    """Compare one leg of two profiles: the flown one, then the simulated one.
+    """Compare one leg of the flown profile with the same leg of the simulated profile.
 
     leg: number of the leg in the whole route.  rows: points of the profiles on the leg.
     """

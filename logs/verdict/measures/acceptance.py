@@ -87,7 +87,7 @@ def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
 
 
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Return the half width of the corridor along a leg, m, and the name of its source.
+    """Return the half width (m) of the corridor along a leg, and the name of its source.
 
     A corridor that the scenario does not state is wide enough for the planned turns at the leg's ends.  At a loiter
     that the autopilot joins and leaves by its center, the corridor includes the whole loiter and a turn back next to
@@ -124,7 +124,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
-    """Return the maximum horizontal distance of any point from its nearest leg, m, and the row of that point.
+    """Return the maximum horizontal distance (m) of any point from its nearest leg, and the point's row.
 
     points: (n, 3).  legs: (k + 1, 3), the ends of k consecutive legs.
 
@@ -152,8 +152,8 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 def negligible_kink_distance(requirements: RouteRequirements, i: int) -> float | None:
     """Return the distance at which a flyable shortcut passes waypoint i and its omitted neighbours, m.
 
-    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is that of the
-    farthest of them.  Return None if there is no such shortcut.
+    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is measured
+    from the farthest of them.  Return None if there is no such shortcut.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):

@@ -57,7 +57,7 @@ def straight_path(start: Sequence[float] | Floats, course: float, profile: Profi
 
 
 def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float]:
-    """Return a path's minimum height above ground, m, and where it occurs as a distance along the path, m.
+    """Return a path's minimum height above ground, and where it occurs as a distance along the path, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
     """

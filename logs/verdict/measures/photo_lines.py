@@ -40,7 +40,7 @@ class LineMeasure:
     photos, missed_photos: number of planned photos, and of those not taken; 0 if no distance between photos is stated.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
-    lost_spans: start and end of each unusable stretch, m from the line's start.
+    lost_spans: start and end of each unusable part, m from the line's start.
     """
 
     length: float

@@ -64,7 +64,7 @@ class Airspace:
         return Place(zone.kind, index, name=zone.name)
 
     def zones_near(self, points: Floats) -> NDArray[np.int64]:
-        """Return the numbers of all inclusions, and of exclusions near any segment of a path (n, 3) m.
+        """Return the numbers of all inclusion zones, and of the exclusion zones near a path (n, 3), m.
 
         >>> from world.airspace.zones import Cylinder
         >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
@@ -597,12 +597,12 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
-    """Return the tighter of the scenario's and the aircraft's turn limits at a waypoint, rad, and its source."""
+    """Return the tighter turn limit (rad) of scenario and aircraft at a waypoint, and its source."""
     return tighter_turn_limit(requirements, i, float(requirements.turn_limit[i]))
 
 
 def tighter_turn_limit(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
-    """Return the tighter of the scenario's limit and an aircraft limit, rad, and its source."""
+    """Return the tighter of the scenario's turn limit and an aircraft limit, rad, and its source."""
     scenario_limit = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.
     if scenario_limit is not None and scenario_limit <= aircraft_limit and requirements.setup.route.arcs[i] == 0.0:

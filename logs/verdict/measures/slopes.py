@@ -229,7 +229,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest signed altitude error from the leg's line, m, and True if the leg is too short for blends.
+    """Return the largest signed altitude error from the leg's line, m, and True for a leg of only blends.
 
     On a leg without any part clear of the slope blends, the error is taken between the turns; it is None if no row lies
     between the turns.
@@ -260,7 +260,7 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 def _saturation_times(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float, float]:
-    """Return the times at full and at idle throttle, s, and the speed loss and gain, m/s, as in `SlopeMeasure`."""
+    """Return times at full and idle throttle (s), and speed loss and gain (m/s), as in `SlopeMeasure`."""
     rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:

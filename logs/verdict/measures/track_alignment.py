@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
@@ -170,7 +170,7 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
     if first_return >= 0:
         # A return may end anywhere on its loiter, and the flown loiter may differ from the drawn one.
         end_return, loiter = route.rtl_end, route.rtl_loiter
-        loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
+        loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
         return_radius = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
         radii[first_return + 1 : end_return] = [
             max(return_radius, radius) for radius in radii[first_return + 1 : end_return]
@@ -238,7 +238,7 @@ def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats
 
 
 def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum horizontal distance from a target, m, and where it occurs.
+    """Return each track segment's minimum horizontal distance (m) from a target, and where it occurs.
 
     Both have shape (n - 1,).  The place is a fraction of the segment.
 

@@ -94,7 +94,7 @@ def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Flo
 def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot at waypoint `k`, m, and the overrun, m, as in `CornerPass`.
+    """Return the overshoot at waypoint `k` (m) and the overrun (m), as in `CornerPass`.
 
     start, end: times of the closest approach to this waypoint and to the next waypoint, s.
     """
@@ -216,7 +216,7 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
 def _course_change(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int
 ) -> tuple[float | None, float | None, bool]:
-    """Return the flown course change at waypoint `i` and its tolerance, rad, and True if both courses are fitted.
+    """Return waypoint `i`'s flown course change (rad), its tolerance, and True if both courses are fitted.
 
     Return None, None, False if either leg was flown too little.
     """
@@ -228,7 +228,7 @@ def _course_change(
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the maximum one-second mean of the bank, rad, and the minimum radius over one second, m.
+    """Return the maximum one-second mean of the bank (rad) and the minimum radius over one second (m).
 
     The radius is inf without a turn, or if the rows span less than a second.
     """

@@ -47,7 +47,7 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside the outline and the altitude band of zone `z`, m, and the nearest edge.
+    """Return a position's distances (m) outside zone `z`'s outline and altitude band, and the closest edge.
 
     A distance is negative inside; the distance from a band above ground is NaN if the terrain there is unknown.
     """
@@ -98,7 +98,7 @@ def copy_move_part(source: Record, target: Record) -> None:
 def depth_bounds(
     exclusion: bool, part: Record, length: float, height_change: float, max_distance: float
 ) -> tuple[float, float]:
-    """Return lower and upper bounds of the depth of a violation along one part of a move, m.
+    """Return lower and upper bounds of the violation's depth along one part of a move, m.
 
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
 
@@ -123,7 +123,7 @@ def depth_bounds(
 
 @inner
 def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record, length: float) -> float:
-    """Return an upper bound on the depth of a part of a move in a violation of zone `z`'s outline, m.
+    """Return an upper bound on how deep a part of a move violates the outline of zone `z`, m.
 
     The bound is inf if the part turns by more than a radian.  It uses the edges nearest to the part's ends: on a
     straight line, the distance from an edge, or from the centre of a circle, is largest at an end.  An arc of less than

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import ground_speed
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
 from world.arrays import Codes, Flags, Floats
 from world.highest_ground import highest_in_cells
@@ -223,7 +223,7 @@ _CROSSED_CELL = record_dtype(("east", np.int64), ("north", np.int64), "fraction"
 
 
 def glide_steps() -> tuple[Records, Records]:
-    """Return the 32 steps to nearby cells (dtype `STEP`), and the cells that they cross (dtype `_CROSSED_CELL`).
+    """Return the 32 steps to nearby cells, of dtype `STEP`, and the cells crossed, of `_CROSSED_CELL`.
 
     >>> made, between = glide_steps()
     >>> len(made), len({round(float(one.course), 6) for one in made})
@@ -287,7 +287,7 @@ def _fill_slopes(
     """Fill the table `slopes`, (c, h), with glide slopes by course and altitude."""
     for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
-        true_airspeed = airspeed * true_by_equivalent(altitude)
+        true_airspeed = airspeed * eas_to_tas_ratio(altitude)
         sink = max(0.0, -excess_power(excess, 0.0, true_airspeed, altitude, aircraft))
         horizontal_speed = math.sqrt(max(0.0, true_airspeed * true_airspeed - sink * sink))
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, altitude)
@@ -478,7 +478,7 @@ def _step_start_altitude(
 
 @inner
 def _raise_above_spheres(altitude: float, bottom: float, top: float) -> float:
-    """Return an altitude, m, or the top of the kill spheres if the altitude lies inside them."""
+    """Return an altitude (m), or the top of the kill spheres if the altitude lies inside them."""
     return top if bottom < altitude < top else altitude
 
 

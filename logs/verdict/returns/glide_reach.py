@@ -18,7 +18,7 @@ from flight.autopilots.arduplane.tecs import (
     MIN_ROLL_LIMIT_RAD,
     load_factor_roll_limit,
 )
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, glide_steps
 from world.arrays import Codes, Floats
 from world.geometry import wrap
@@ -109,7 +109,7 @@ def _fill_altitudes_left(
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
         wind_east, wind_north = wind * aircraft.wind_east, wind * aircraft.wind_north
         air_east, air_north = start.velocity_east - wind_east, start.velocity_north - wind_north
-        min_speed = glider.airspeed * true_by_equivalent(start.up)
+        min_speed = glider.airspeed * eas_to_tas_ratio(start.up)
         speed = max(min_speed, math.hypot(air_east, air_north))
         bank = min(glider.bank, load_factor_roll_limit(speed, min_speed, MIN_ROLL_LIMIT_RAD))
         tan_bank = math.tan(bank)

@@ -579,7 +579,7 @@ def simulate_judged_returns(
 
     Beyond the first item of a landing sequence, a return flies the mission's own approach, which descends to the
     landing; there only the ground, the spheres, the zones and the energy limit it.  If such a return becomes too low,
-    its clearance is that of the path up to this item.
+    its clearance is measured only up to this item.
 
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
@@ -726,9 +726,10 @@ def _recheck_in_jsbsim(
 ) -> tuple[list[SimulatedReturn], list[float]]:
     """Fly doubtful returns in JSBSim, the most doubtful first, and correct the point-mass results.
 
-    A doubtful return that is not flown (it begins in a turn, or `max_flights` are flown) is corrected by the nearest
-    flown one in its group of successive doubtful returns, if that one is worse in JSBSim.  Returns the corrected
-    returns, and the differences in clearance of the flown ones (JSBSim minus point mass, m).
+    A doubtful return that is not flown (it begins in a turn, or `max_flights` are flown) is corrected like the nearest
+    flown return in its group of successive doubtful returns, if the flown return is worse in JSBSim.
+
+    Returns the corrected returns, and for each flown return the difference in clearance (JSBSim minus point mass, m).
     """
     limit_ratios = [limit_ratio(ret) for ret in returns]
     reachable = [k for k, row in enumerate(starts.rows) if limit_ratios[k] < 1.0 and can_start_in_jsbsim(world, row)]

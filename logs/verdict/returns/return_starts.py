@@ -103,7 +103,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return the ground velocities at some rows, m/s, (n, 3); missing ones are computed from the positions."""
+    """Return the ground velocities at some rows, m/s, (n, 3); compute missing velocities from positions."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)

@@ -321,7 +321,7 @@ def _home_fence_violation(setup: FlightSetup) -> str:
 
 
 def _full_voltage(setup: FlightSetup) -> float:
-    """Return the voltage of the full battery, V; infinite without a battery, and for a guessed one."""
+    """Return the voltage of the full battery, V; infinite without a battery, and for a guessed battery."""
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 

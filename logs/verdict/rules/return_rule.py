@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Command
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
@@ -216,7 +216,7 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
     track = aligned.track
     east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
     # True radii grow with altitude as the square of true airspeed.
-    radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
+    radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
     is_at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, radius)) & (
         np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     )

@@ -262,7 +262,7 @@ def _is_caused_by_vertical_wind(requirements: RouteRequirements, aligned: Aligne
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the minimum and maximum airspeed of level flight along the whole leg, m/s, and faults of the command.
+    """Return minimum and maximum airspeed (m/s) of level flight on the whole leg, and the command's faults.
 
     The airspeeds are NaN if level flight is impossible at one end of the leg.
     """
