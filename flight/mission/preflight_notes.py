@@ -125,7 +125,7 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
 
 
 def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Yield a note if the altitude of an RTL to home is not above the ground within the RTL's loiter."""
+    """Yield a note if an RTL to home ends at or below the ground somewhere within its loiter radius."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
     radius = max(MIN_RTL_LOITER_RADIUS_M, abs(rules.radius))
