@@ -145,7 +145,7 @@ class SnapshotMaker:
 def _rotate_to_true_north(vector: Floats, convergence: float) -> tuple[float, float, float]:
     """Rotate a vector from the map's east, north and up to true east, north and up.
 
-    convergence: map course minus true course, rad.
+    convergence: grid convergence, the map course of true north, rad.
     """
     east, north, up = (float(value) for value in vector)
     cos, sin = math.cos(convergence), math.sin(convergence)

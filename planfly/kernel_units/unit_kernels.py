@@ -99,7 +99,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "flight.autopilots.planfly.law.planfly_loop",
         "flight.dynamics.compiled_frame.initialise_attitude",
         "flight.dynamics.compiled_frame.step_repeatedly",
-        "flight.guidance.equivalent_airspeed.true_by_equivalent",
+        "flight.guidance.equivalent_airspeed.eas_to_tas_ratio",
         "flight.guidance.path.profile_at",
         "flight.simulation.track._round_to_steps",
         _LAYOUT + "_copy_messages",

@@ -127,6 +127,7 @@ def fly_go_arounds(
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
 
     def fly(k: int, landing: LandingStart) -> Floats:
+        """Simulate go-around `k` to a landing sequence, fill its result, and return its positions, m, (t, 3)."""
         stages = np.concatenate([waypoint_ahead(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
         stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
@@ -176,7 +177,7 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """Return the stops of a landing sequence up to its first loiter, as n `WAYPOINT` records."""
+    """Return n `WAYPOINT` records, one for each stop of a landing sequence up to its first loiter."""
     stops = truncate_at_first_loiter(sequence)
     stages: Records = np.zeros(len(stops), WAYPOINT)
     for stage, stop in zip(stages, stops, strict=True):
