@@ -112,7 +112,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "logs.verdict.measures.path_sweeps._sphere_visits",
         "logs.verdict.measures.route_progress._match_rows",
         "logs.verdict.measures.track_alignment._match_chords",
-        "logs.verdict.measures.track_alignment.lifted_speed",
+        "logs.verdict.measures.track_alignment.airspeed_gain_in_rising_air",
         "world.wind._mean_wind_speeds",
         "world.wind.mean_wind_speed",
     ),

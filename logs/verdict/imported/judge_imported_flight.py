@@ -121,7 +121,7 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
 
 
 def heights_text(source: ImportedLog) -> str:
-    """Describe the height that was used, its datum, and the offsets of the log's other heights at the start.
+    """Describe a log's altitude source, its datum, and the offsets of other altitudes at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))

@@ -43,7 +43,7 @@ class GroundPath(NamedTuple):
 
 
 def track_path(track: Track) -> GroundPath:
-    """Return the positions of a flown track with their horizontal distance from its start."""
+    """Return the positions of a flown track with their horizontal distances along the track."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
     return GroundPath(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))

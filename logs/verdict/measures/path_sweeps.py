@@ -194,7 +194,7 @@ def _add_stay(
 ) -> None:
     """Add one block's time and exposure inside sphere `m` to `visits`.
 
-    step: number of segments that are joined to one.
+    step: number of consecutive segments that are treated as one straight segment.
     """
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
     k = block * _BLOCK_SEGMENTS

@@ -403,7 +403,7 @@ class RouteRequirements:
         return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last)}
 
     def leg_unit(self, leg: int) -> Floats:
-        """Return the east and north components of a leg's course, (2,)."""
+        """Return the unit vector (east, north) of a leg's course, (2,)."""
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def apexes(self) -> Floats:
@@ -424,7 +424,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
     envelope: False to omit the aircraft's limits and judge by only the flown evidence.
     """
-    route, limits = true_route(setup), setup.limits
+    route, limits = true_airspeed_route(setup), setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     tables = performance_tables(route, limits)
     turns = turn_requirements(route, tables)
@@ -499,7 +499,7 @@ def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     return tuple(survey for survey in surveys if mode == "lines" or survey.takes_photos())
 
 
-def true_route(setup: FlightSetup) -> Route:
+def true_airspeed_route(setup: FlightSetup) -> Route:
     """Return a setup's route with the true airspeeds that are demanded in flight.
 
     ArduPlane's airspeeds are equivalent: they are converted at each leg's mean altitude.
@@ -508,9 +508,9 @@ def true_route(setup: FlightSetup) -> Route:
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
-    >>> true_route(setup) is setup.route
+    >>> true_airspeed_route(setup) is setup.route
     True
-    >>> faster = true_route(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
+    >>> faster = true_airspeed_route(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
     >>> bool((faster.airspeed > setup.route.airspeed).all())
     True
     """

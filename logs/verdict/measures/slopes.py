@@ -157,9 +157,10 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 
 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
-    """Return the tolerance of an angle fitted over a distance (m) with an RMS residual (m), rad.
+    """Return the tolerance (rad) of an angle fitted over a distance (m) with an RMS residual (m).
 
-    Residuals of twice the RMS at the ends would rotate the line by the second term.
+    The tolerance is ``floor`` (rad) plus the angle by which residuals of twice the RMS at the ends would rotate the
+    line.
     """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 

@@ -152,7 +152,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
         clearance=clearance,
         clearance_fraction=clearance_fraction,
-        lift_gain=lifted_speed(usable_track.time, usable_track.airspeed, usable_track.wind[:, 2]),
+        lift_gain=airspeed_gain_in_rising_air(usable_track.time, usable_track.airspeed, usable_track.wind[:, 2]),
         tick=float(np.median(np.diff(usable_track.time))),
         draws_current=bool(usable_track.current.any()),
     )
@@ -321,7 +321,7 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
 
 
 @compiled
-def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Floats:
+def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Floats:
     """Return the airspeed that an aircraft on a fixed path gains from rising air, m/s, (t,).
 
     The gain decays with the time constant `SPEED_MEMORY_S`.

@@ -18,7 +18,7 @@ from logs.verdict.measures.slopes import (
     measure_slope,
     straight_span,
 )
-from logs.verdict.measures.track_alignment import AlignedTrack, align_track, lifted_speed
+from logs.verdict.measures.track_alignment import AlignedTrack, airspeed_gain_in_rising_air, align_track
 from logs.verdict.tolerances import ROUGH_COURSE_ERROR_RAD, SLOPE_ERROR_FLOOR_RAD
 from tests.synthetic import Profile, edited, fly_path, make_setup
 
@@ -123,7 +123,7 @@ def test_rising_air_lends_speed_that_fades() -> None:
     time = np.arange(0.0, 60.0, 0.1)
     rising = np.where(time < 5.0, 1.0, 0.0).astype(np.float32)
     speed = np.full(time.size, 25.0, dtype=np.float32)
-    gained = lifted_speed(time, speed, rising)
+    gained = airspeed_gain_in_rising_air(time, speed, rising)
     assert gained.max() == pytest.approx(9.81 / 25.0 * 5.0, rel=0.25)
     assert gained[-1] < 0.05 * gained.max()
 
