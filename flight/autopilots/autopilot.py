@@ -63,7 +63,7 @@ _SOURCE_NAMES: dict[Origin, str] = {
 
 
 def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return a text for each pair of values in the wrong order of which at least one is from the user's file.
+    """Return a text for each pair of values in the wrong order, if at least one of the two is from the user's file.
 
     orders: groups of parameter names; within a group the values must not decrease from one name to the next.
 

@@ -81,7 +81,7 @@ class ArmingState:
     def arm(self, should_arm: bool, param2: float) -> CommandResult:
         """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
 
-        param2: second parameter of the command; MAVLink's and MAVProxy's values force it.
+        param2: second parameter of the command; the values in `_FORCE_VALUES` force the command.
 
         The result is IN_PROGRESS if the command must be repeated after the verdict.
         """

@@ -410,7 +410,10 @@ class MissionServer:
         return self._ack(station, result, kind, problem)
 
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Store an item of an upload, and request the next item, or replace the list after the last item."""
+        """Store an item of an upload, and request the next item, or replace the list after the last item.
+
+        Without an upload, answer a go-to item, and acknowledge a repeated last item again.
+        """
         upload = self._uploads.get(kind)
         if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
             return [self._answer_go_to(message, station, kind)]

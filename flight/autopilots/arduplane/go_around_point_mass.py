@@ -100,7 +100,8 @@ def fly_go_arounds(
     """Simulate n go-arounds, each from a start on a landing glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    end_altitude, pitch: altitude above which the climb ends, m AMSL, and pitch angle during the climb, rad.
+    end_altitude: altitude above which the climb ends, m AMSL.
+    pitch: pitch angle during the climb, rad.
     landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  If the
         sequence contains a loiter, the go-around ends there, after one circle.
 

@@ -166,7 +166,7 @@ def negligible_kink_distance(requirements: RouteRequirements, i: int) -> float |
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return how far the straight path past the waypoints first..last passes from the farthest of them, m.
+    """Return the largest distance (m) of the waypoints first..last from the straight path that omits them.
 
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.

@@ -144,7 +144,7 @@ def measure_line(
 
 
 def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, float], ...]:
-    """Return the start and end of each run of steps with `is_set`, m."""
+    """Return the start and end (m) of each run of consecutive steps for which `is_set` is True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], is_set.astype(int), [0]]))) * step_length
     return tuple((float(start), float(end)) for start, end in zip(edges[::2], edges[1::2], strict=True))
 
@@ -211,7 +211,11 @@ def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
 
 
 def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
-    """Return True for each step of a line between two consecutive rows with `is_set`."""
+    """Return a mask of a line's steps: True for each step that the track between two set rows touches.
+
+    along: distance of each row along the line, m.
+    is_set: mask of the rows; only consecutive set rows count.
+    """
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)

@@ -67,7 +67,7 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clearance: float, *, excludes_blends: bool = False
 ) -> tuple[float, float]:
-    """Return the start and end of the part of a leg between the turns at its ends, m from the leg's start.
+    """Return the start and end (m from the leg's start) of the part of a leg between its turns.
 
     clearance: distance kept from the turns, m.
     excludes_blends: True to exclude the slope blends as well.

@@ -45,7 +45,7 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left on arrival at the best destination of each start, m, (n,), and the destination's cell.
+    """Return, for each of n starts, the altitude (m) left on arrival at the best destination, and its cell.
 
     starts: (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.

@@ -343,7 +343,7 @@ _PX4_LOCATED_COMMANDS = frozenset(
 
 
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
-    """Yield the items that PX4 refuses at upload.
+    """Yield a remark on each item that PX4 refuses at upload.
 
     refuses: True if PX4 is to fly; a command without coordinates in a frame with coordinates is only then reported,
         because every file of Mission Planner has such commands.
@@ -379,7 +379,7 @@ def _height_above_home(mission: Mission, item: MissionItem) -> float:
 
 
 def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
-    """Yield take-off items that are not above home, or that come after another navigation item."""
+    """Yield a remark on each take-off item that is not above home or comes after another navigation item."""
     has_earlier_place = False
     for item in mission.items:
         if item.command in TAKEOFFS:
@@ -392,7 +392,7 @@ def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_landing(mission: Mission) -> Iterator[_Remark]:
-    """Yield items at fault in the order of DO_LAND_START, landings and return to launch."""
+    """Yield a remark on each item that breaks the order of DO_LAND_START, landings and return to launch."""
     commands = [item.command for item in mission.items]
     land_starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
     landings = [k for k, command in enumerate(commands) if command in LANDINGS]
@@ -463,7 +463,7 @@ def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin
 
 
 def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield the first flown item if it is too far from home; without a home, yield a remark that says so."""
+    """Yield a remark if the first flown item is too far from home, or if the mission has no home."""
     flown_items = _flown_items(mission)
     if mission.home is None or not flown_items:
         yield True, None, "no home, so no distance to the first waypoint"
@@ -493,7 +493,7 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield gates that are too close to a waypoint, and the longest leg if older PX4 releases refuse it."""
+    """Yield remarks on gates too close to a waypoint, and on the longest leg if older PX4 releases refuse it."""
     yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
@@ -511,7 +511,10 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
-    """Yield flown items below home; stop at the first item above home if the file has no home."""
+    """Yield a remark on each flown item below home.
+
+    If the file has no home, the check ends with a remark on the first item whose height is above home.
+    """
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
             reason = "the file has heights above home but no home: PX4 refuses them until the vehicle has a home"
@@ -522,7 +525,7 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
-    """Yield route points that violate the mission's own fence by PX4's test."""
+    """Yield a remark on each route point that violates the mission's own fence by PX4's test."""
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return
