@@ -123,9 +123,7 @@ def fly_go_arounds(
     (True, True, True)
     """
     results = np.zeros(len(starts), RETURN_RESULT)
-    record, climb_parameters, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
-    climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
-    climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
+    record, climb = parameters.record(), _make_climb(parameters, end_altitude)
 
     def fly(k: int, landing: LandingStart) -> Floats:
         """Simulate go-around `k` to a landing sequence, fill its result, and return its positions, m, (t, 3)."""
@@ -137,7 +135,7 @@ def fly_go_arounds(
             starts[k],
             stages,
             record,
-            climb_parameters,
+            _climb_parameters(parameters, pitch),
             climb,
             aircraft.record,
             aircraft.excess,
@@ -166,6 +164,14 @@ def fly_go_arounds(
             track, landing = fly(k, nearest_sequence), nearest_sequence
         flights.append((track, landing))
     return GoArounds(results, tuple(track for track, _ in flights), tuple(landing for _, landing in flights))
+
+
+def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
+    """Return the `CLIMB` record of a go-around, whose climb ends above an altitude, m AMSL."""
+    climb: Record = np.zeros(1, CLIMB)[0]
+    climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
+    climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
+    return climb
 
 
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:

@@ -326,14 +326,12 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate the flight from stage to stage for at most ``timeout`` s, and fill in ``result``.
+    """Simulate the flight from stage to stage for at most ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    climb: climb at the start, a record of `CLIMB`.
-    climb_parameters: control parameters during the climb.
+    climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
-    result: a record of `RETURN_RESULT`.
     """
     # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
