@@ -16,7 +16,7 @@ import planfly
 from logs.verdict.returns.judge_returns import (
     POINT_MASS_ERROR_M,
     POINT_MASS_POSITION_ERROR_M,
-    is_reachable_start,
+    can_start_in_jsbsim,
     judge_returns,
     make_return_world,
 )
@@ -47,7 +47,7 @@ def compare_returns(aircraft: str, wind: tuple[float, float], count: int, seed: 
         turbulence="none",
     )
     world, starts = make_return_world(flown.setup), flown_starts(flown.setup, flown.track, _INTERVAL_S)
-    reachable = np.array([k for k in range(len(starts)) if is_reachable_start(world, starts.rows[k])])
+    reachable = np.array([k for k in range(len(starts)) if can_start_in_jsbsim(world, starts.rows[k])])
     chosen = np.random.default_rng(seed).choice(reachable, size=min(count, len(reachable)), replace=False)
     chosen_starts = starts.subset(np.sort(chosen))
     point_mass = judge_returns(world, chosen_starts, 0.0)

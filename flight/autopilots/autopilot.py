@@ -63,7 +63,7 @@ _SOURCE_NAMES: dict[Origin, str] = {
 
 
 def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return a text for each pair of values in the wrong order of which at least one is from the user's file.
+    """Return a text for each pair of values in the wrong order, if at least one of the two is from the user's file.
 
     orders: groups of parameter names; within a group the values must not decrease from one name to the next.
 
@@ -299,12 +299,12 @@ class Autopilot(ABC):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Reading and checks of missions, and the settings on which they depend."""
+        """Rules by which the autopilot reads and checks missions, and the settings on which they depend."""
         return MissionChecks()
 
     @property
     def deviations(self) -> Deviations:
-        """Deviations from the plan, and from its altitudes in gusts."""
+        """Deviations of a flight from its plan: tracking error, and altitude errors in gusts."""
         return Deviations()
 
     @property
@@ -320,14 +320,14 @@ class Autopilot(ABC):
         )
 
 
-def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:
+def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 8) -> str:
     """Return a description of a program with its version, checksum and changed parameters.
 
-    named: maximum number of changed parameters that the description names; the number of others is appended.
+    max_named: maximum number of changed parameters that the description names; the number of others is appended.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    remainder = f", +{len(changed) - named} more" if len(changed) > named else ""
+    remainder = f", +{len(changed) - max_named} more" if len(changed) > max_named else ""
     return (
         f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{remainder}"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:max_named]) or 'none'}{remainder}"
     )

@@ -53,7 +53,7 @@ def nearest_release(versions: Sequence[_Version], release: tuple[int, int]) -> _
     return older[-1] if older else versions[0]
 
 
-def choose_for_file(
+def choose_release_for_file(
     versions: Sequence[_Version], stated: _Version | None, found: FileRelease | None, params: str, title: str
 ) -> tuple[_Version, tuple[str, ...]]:
     """Return the release to simulate with a parameter file, and a note if the file is from another release.

@@ -36,7 +36,7 @@ def with_parameter(text: str, source: str, values: Mapping[str, float]) -> str:
         lines[index] = _with_value(lines[index], values[name])
     if not stated_names:
         model_line = lines[next(iter(entries.values())).where.number - 1]
-        lines.append(_line_like(model_line, *next(iter(values.items()))))
+        lines.append(_format_parameter_line(model_line, *next(iter(values.items()))))
     return "\n".join(lines) + "\n"
 
 
@@ -48,8 +48,8 @@ def _with_value(line: str, value: float) -> str:
     return _NAME_AND_VALUE.sub(rf"\g<1>{value:.10g}", line)
 
 
-def _line_like(model_line: str, name: str, value: float) -> str:
-    """Return a line with a name and a value in the format of another line."""
+def _format_parameter_line(model_line: str, name: str, value: float) -> str:
+    """Return a parameter's line in the format of another line."""
     columns = model_line.split("\t")
     if len(columns) == _QGC_COLUMN_COUNT:
         return "\t".join([columns[0], str(AUTOPILOT), name, f"{value:.10g}", str(_REAL_TYPE)])

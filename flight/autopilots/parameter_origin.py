@@ -239,7 +239,7 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
     entries = parse_parameters(text, str(path))
     origin = parameter_origin(text, entries)
     if origin.autopilot not in ("", autopilot):
-        raise other_autopilot(f"{path}", origin.autopilot, origin.evidence, autopilot)
+        raise other_autopilot_error(f"{path}", origin.autopilot, origin.evidence, autopilot)
     if origin.vehicle:
         allowed = "planfly flies fixed-wing aircraft"
         message = f"{path}: parameters of {origin.vehicle} ({TITLES[origin.autopilot]}): {allowed}"
@@ -247,7 +247,9 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
     return entries
 
 
-def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]) -> None:
+def refuse_unknown_parameters(
+    path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]
+) -> None:
     """Raise ParameterError if an autopilot uses no name in a file and the names do not look like its parameters.
 
     known: values of the file that the autopilot uses.
@@ -260,7 +262,7 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
     raise ParameterError(message, file=path, value=names, allowed=allowed)
 
 
-def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
+def other_autopilot_error(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
     """Return the error for a parameter file that was written for a different autopilot.
 
     where: the file, for the message.

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Self, get_args
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Origin, ParameterValue, StoredParameters, find_contradictions
 from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
-from flight.autopilots.parameter_origin import read_parameters_for, refuse_unknown
+from flight.autopilots.parameter_origin import read_parameters_for, refuse_unknown_parameters
 from world.errors import ParameterError
 from world.files import TextLine
 
@@ -178,7 +178,7 @@ class ParameterSet:
         if path is not None:
             entries = read_parameters_for(Path(path), cls.table.autopilot)
             values, unused = cls.table.read(entries)
-            refuse_unknown(Path(path), cls.table.autopilot, entries, values)
+            refuse_unknown_parameters(Path(path), cls.table.autopilot, entries, values)
             sources.append(("file", values))
         aircraft_file = aircraft.folder / AIRCRAFT_FILE
         if aircraft_file.exists():
@@ -239,7 +239,7 @@ class ParameterSet:
         return True
 
     @classmethod
-    def _without_unknown(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
+    def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
         """Return the sources without the parameters that the release lacks, and the names removed from the file.
 
         An autopilot without such parameters, as here, returns all sources and no names.
@@ -252,7 +252,7 @@ class ParameterSet:
 
         Raises ParameterError if a minimum is not below its maximum.
         """
-        known_sources, unknown_names = cls._without_unknown(sources, *fields)
+        known_sources, unknown_names = cls._without_unknown_parameters(sources, *fields)
         unused = (*unused, *unknown_names)
 
         def find_value(definition: Definition) -> ParameterValue:

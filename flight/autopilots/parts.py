@@ -17,7 +17,7 @@ from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
 from flight.dynamics.instructions import Code
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.ground_ways import GroundPhases
 from flight.mission.return_path import DEFAULT_RETURN_RULES, ReturnRules
 from world.arrays import Floats, Heights
@@ -141,7 +141,7 @@ class SpeedRules:
 
     def true_airspeed_factor(self, amsl: float) -> float:
         """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""
-        return float(true_by_equivalent(amsl)) if self.equivalent else 1.0
+        return float(eas_to_tas_ratio(amsl)) if self.equivalent else 1.0
 
     def flown_airspeeds(self, commanded: Floats, cruise: float) -> Floats:
         """Return the airspeed that the autopilot flies on each leg, m/s, (l,): true or equivalent like the commands.

@@ -126,7 +126,7 @@ def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_A
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Return the named modes of the linear dynamics with the matrix A of `flight.dynamics.trim.linearise`, (8, 8).
+    """Return the named modes of the linear dynamics with the (8, 8) matrix A of `flight.dynamics.trim.linearise`.
 
     The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
     and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is

@@ -487,7 +487,7 @@ class Fdm:
     # Functions for trims and linearization.
 
     def surface_limits(self) -> tuple[float, float, float]:
-        """Return the elevator, aileron and rudder limits, rad, in either direction."""
+        """Return the elevator, aileron and rudder limits in either direction, rad."""
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
@@ -516,7 +516,7 @@ class Fdm:
         return self._evaluate(euler(axes), air + self._wind, (0.0, 0.0, 0.0), commands, settle=True)[:6]
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
-        """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands (4,).
+        """Return the state derivatives (8,) of (u, v, w, p, q, r, roll, pitch) with these commands (4,).
 
         Surfaces and motor are at their commanded values. An engine keeps the speed of the last `apply_trim`.
         """

@@ -185,13 +185,13 @@ class Simulator(Protocol):
         """Set the state that a trim vector (8,) describes; return its body accelerations (6,), m/s^2 and rad/s^2."""
 
     def surface_limits(self) -> tuple[float, float, float]:
-        """Return the elevator, aileron and rudder limits, rad, in either direction."""
+        """Return the elevator, aileron and rudder limits in either direction, rad."""
 
     def first_guess(self) -> Floats:
         """Return a trim vector (8,) as the initial guess."""
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
-        """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) for commands."""
+        """Return the state derivatives (8,) of (u, v, w, p, q, r, roll, pitch) with these commands (4,)."""
 
 
 def solve_trim(
@@ -272,10 +272,10 @@ def trim(
     simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
     values = solve_trim(simulator.apply_trim, fixed_values, simulator.surface_limits(), start)
-    return None if values is None else from_vector(values, amsl)
+    return None if values is None else trim_from_vector(values, amsl)
 
 
-def from_vector(values: Floats, amsl: float) -> Trim:
+def trim_from_vector(values: Floats, amsl: float) -> Trim:
     """Return the trim at an altitude (m) from a trim vector, whose elements are in the order of `QUANTITIES`."""
     airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
@@ -394,7 +394,7 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
 
 
 def euler(axes: Floats) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw, rad, of a rotation (3, 3) from body to north-east-down axes."""
+    """Return roll, pitch and yaw (rad) of a rotation (3, 3) from body to north-east-down axes."""
     return (
         math.atan2(axes[2, 1], axes[2, 2]),
         math.asin(min(1.0, max(-1.0, -float(axes[2, 0])))),

@@ -208,7 +208,7 @@ def quaternion_of_matrix(m: Matrix) -> Quaternion:
 
 @inlined
 def euler_angles(m: Matrix) -> Vector:
-    """Return roll, pitch and yaw of a body, rad, from the matrix that transforms vectors into the body's axes.
+    """Return roll, pitch and yaw (rad) from the matrix that transforms vectors into the body's axes.
 
     Yaw is 0 to 2 pi; with the nose straight up or down it is 0.
     """

@@ -11,7 +11,7 @@ _MAX_ALTITUDE_M = 11_000.0
 
 
 @compiled
-def true_by_equivalent(amsl: float) -> float:
+def eas_to_tas_ratio(amsl: float) -> float:
     """Return the ratio of true to equivalent airspeed in the standard atmosphere at an altitude (m AMSL).
 
     The ratio is 1.05 at 1,000 m.

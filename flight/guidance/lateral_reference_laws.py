@@ -72,7 +72,7 @@ _PASSED_TIME_S = 3.0
 
 @inner
 def l1_length(speed: float, period: float, damping: float) -> float:
-    """Return the L1 distance (`_L1_dist` of AP_L1_Control), m, at a ground speed (m/s).
+    """Return the L1 distance (m) at a ground speed (m/s), as `_L1_dist` of AP_L1_Control.
 
     period, damping: NAVL1_PERIOD, s, and NAVL1_DAMPING.
     """

@@ -81,7 +81,7 @@ class ArmingState:
     def arm(self, should_arm: bool, param2: float) -> CommandResult:
         """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
 
-        param2: second parameter of the command; MAVLink's and MAVProxy's values force it.
+        param2: second parameter of the command; the values in `_FORCE_VALUES` force the command.
 
         The result is IN_PROGRESS if the command must be repeated after the verdict.
         """
@@ -143,7 +143,7 @@ class ArmingState:
         self.mission_state = PAUSED
         return CommandResult(ACCEPTED)
 
-    def restart_mission(self) -> None:
+    def continue_from_current_item(self) -> None:
         """Continue the mission from the item that was set in flight."""
         self.loiter_center = LoiterCenter()
 

@@ -220,8 +220,8 @@ class FlightFactory(Protocol):
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission; the prepared flight is None if the mission cannot be flown."""
 
-    def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
-        """Return the requested route from a position (3,) on the map.
+    def prepare_diversion(self, request: DivertFlight, position: Floats) -> PreparedFlight:
+        """Prepare the flight of the requested route from a position (3,) on the map.
 
         Raises PlanflyError if there is no such route.
         """
@@ -435,7 +435,7 @@ class _LoggedFlight:
         end_reason: text on the end of the current route.
         """
         try:
-            prepared = self._factory.divert(request, self._flight.position)
+            prepared = self._factory.prepare_diversion(request, self._flight.position)
         except PlanflyError as error:
             send_event(self._connection, FlightDiverted(self._mode, str(error)))
             return False

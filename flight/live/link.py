@@ -64,7 +64,7 @@ class Decoder:
     def __init__(self) -> None:
         self._mav = mavlink.MAVLink(None)
 
-    def message(self, frame: MavlinkFrame) -> Any | None:
+    def decode(self, frame: MavlinkFrame) -> Any | None:
         """Return the message of a frame, or None if pymavlink cannot decode the frame."""
         try:
             return self._mav.decode(bytearray(frame.raw))
@@ -445,7 +445,7 @@ class Link:
                 if reason is RefusalReason.FUTURE:
                     self._notice_clock_ahead(source[0])
                 continue
-            message = self._decoder.message(frame)
+            message = self._decoder.decode(frame)
             if message is None:
                 continue
             peer = self.peers.get(source)
@@ -512,15 +512,15 @@ class Link:
             if len(self.peers) >= MAX_PEERS:
                 return None
             # Each station gets one sequence of frames: it would treat gaps between two sequences as lost packets.
-            peer = Peer(source, system, component, now, self._frame_sequence(source))
+            peer = Peer(source, system, component, now, self._frame_encoder(source))
             # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * index / len(PERIODS) for index, name in enumerate(PERIODS)}
             self.peers[source] = peer
         peer.last_heard_time = now
         return peer
 
-    def _frame_sequence(self, address: Address) -> Any:
-        """Return the encoder that numbers the frames to an address."""
+    def _frame_encoder(self, address: Address) -> Any:
+        """Return the encoder for frames to an address, which counts their sequence numbers."""
         return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod

@@ -352,7 +352,7 @@ class MissionServer:
             kind = MissionType(getattr(message, "mission_type", 0))
         except ValueError:
             if message.get_type() == "MISSION_CLEAR_ALL" and message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
-                return self._clear(station, tuple(MissionType), mavlink.MAV_MISSION_TYPE_ALL, now)
+                return self._clear_lists(station, tuple(MissionType), mavlink.MAV_MISSION_TYPE_ALL, now)
             if message.get_type() in _HANDLERS:
                 return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, int(message.mission_type))]
             return []
@@ -371,12 +371,12 @@ class MissionServer:
                 upload.wait = min(2.0 * upload.wait, MAX_RETRY_PERIOD_S)
                 upload.was_repeated = True
                 upload.unanswered_count += not upload.items
-                replies.append(self._request(upload, kind, now))
+                replies.append(self._request_next_item(upload, kind, now))
         for kind, finished in self._finished.items():
             if finished.remaining_count > 0 and now - finished.last_request_time >= CONFIRMATION_PERIOD_S:
                 finished.remaining_count -= 1
                 finished.last_request_time = now
-                replies.append(_request(finished.station, finished.count - 1, kind))
+                replies.append(_item_request(finished.station, finished.count - 1, kind))
         return replies
 
     def _start_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
@@ -390,12 +390,12 @@ class MissionServer:
             return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, text)]
         self._drop_other_uploads(station)
         if count == 0:
-            return self._clear(station, (kind,), kind, now)
+            return self._clear_lists(station, (kind,), kind, now)
         # MISSION_COUNT always begins a new upload: a station that starts over with the same count must not have its
         # items mixed.
         upload = self._uploads[kind] = _Upload(station, count, now, now, now)
         self._finished.pop(kind, None)
-        return [self._request(upload, kind, now)]
+        return [self._request_next_item(upload, kind, now)]
 
     def _answer_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
         """Fly to the position or altitude of an item that is not part of a mission."""
@@ -410,7 +410,10 @@ class MissionServer:
         return self._ack(station, result, kind, problem)
 
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Store an item of an upload, and request the next item, or replace the list after the last item."""
+        """Store an item of an upload, and request the next item, or replace the list after the last item.
+
+        Without an upload, answer a go-to item, and acknowledge a repeated last item again.
+        """
         upload = self._uploads.get(kind)
         if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
             return [self._answer_go_to(message, station, kind)]
@@ -438,7 +441,7 @@ class MissionServer:
         upload.wait = min(max(MIN_RETRY_PERIOD_S, 1.5 * (now - upload.first_request_time)), MAX_RETRY_PERIOD_S)
         upload.first_request_time = now
         if len(upload.items) < upload.count:
-            return [self._request(upload, kind, now)]
+            return [self._request_next_item(upload, kind, now)]
         del self._uploads[kind]
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
@@ -471,10 +474,10 @@ class MissionServer:
         )
         return [MissionReply(station, item)]
 
-    def _clear_list(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        return self._clear(station, (kind,), kind, now)
+    def _on_clear_request(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+        return self._clear_lists(station, (kind,), kind, now)
 
-    def _clear(
+    def _clear_lists(
         self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
     ) -> list[MissionReply]:
         """Clear lists, and acknowledge with a MAV_MISSION_TYPE; clear none if one of them must not change."""
@@ -491,14 +494,17 @@ class MissionServer:
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, acknowledged_type)]
 
     def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Free the lock of a station that cancels its upload (MISSION_ACK with an error)."""
+        """Discard the upload of a station that cancels it (MISSION_ACK with an error).
+
+        If the station supports only MISSION_REQUEST_INT and did not get those requests, request the item again.
+        """
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
             return []
         if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.unanswered_count >= _INT_REQUEST_ATTEMPTS:
             # The station accepts only MISSION_REQUEST_INT, and did not get those requests.
             upload.unanswered_count = 0
-            return [self._request(upload, kind, now)]
+            return [self._request_next_item(upload, kind, now)]
         del self._uploads[kind]
         return []
 
@@ -521,12 +527,12 @@ class MissionServer:
         """Drop the uploads of other, silent stations when a station takes the lock."""
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
-    def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
+    def _request_next_item(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
         """Return the request for the next item of an upload."""
         upload.last_request_time = now
         if upload.unanswered_count >= _INT_REQUEST_ATTEMPTS or upload.has_floats:
-            return _request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
-        return _request(upload.station, len(upload.items), kind)
+            return _item_request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
+        return _item_request(upload.station, len(upload.items), kind)
 
     def _reject_upload(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
         """Discard an upload, and return the ACK with the reason."""
@@ -538,7 +544,7 @@ class MissionServer:
         return MissionReply(station, message, text)
 
 
-def _request(
+def _item_request(
     station: Station, seq: int, kind: MissionType, message_class: Any = mavlink.MAVLink_mission_request_int_message
 ) -> MissionReply:
     return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
@@ -572,6 +578,6 @@ _HANDLERS = {
     "MISSION_REQUEST_LIST": MissionServer._send_count,
     "MISSION_REQUEST_INT": MissionServer._send_item,
     "MISSION_REQUEST": MissionServer._send_item,
-    "MISSION_CLEAR_ALL": MissionServer._clear_list,
+    "MISSION_CLEAR_ALL": MissionServer._on_clear_request,
     "MISSION_ACK": MissionServer._cancel_upload,
 }

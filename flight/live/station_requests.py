@@ -83,7 +83,7 @@ class Parameters:
         return self.entries[self._numbers[name]].value
 
     def set_value(self, name: str, value: float) -> None:
-        """Set a value from within planfly.
+        """Set the value of a parameter, without the checks for stations.
 
         Raises KeyError for an unknown name.
         """
@@ -336,7 +336,10 @@ class Requests:
         return (CommandResult(ACCEPTED), [reply]) if reply is not None else (CommandResult(UNSUPPORTED), [])
 
     def _set_interval(self, name: str, interval: float, peer: Peer, now: float) -> CommandResult:
-        """Set the interval of a message, us: negative to switch the message off, 0 for the default interval."""
+        """Set the interval of a message to a peer.
+
+        interval: microseconds; negative to switch the message off, 0 for the default interval.
+        """
         if name not in PERIODS:
             return CommandResult(ACCEPTED if name == "HEARTBEAT" and interval in (0.0, 1e6) else UNSUPPORTED)
         if not math.isfinite(interval):

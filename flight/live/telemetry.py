@@ -113,8 +113,8 @@ class SnapshotMaker:
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course plus the convergence.
         convergence = self._map.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
-        v_east, v_north, v_up = _to_true(row.velocity, convergence)
-        wind_east, wind_north, _ = _to_true(row.wind, convergence)
+        v_east, v_north, v_up = _rotate_to_true_north(row.velocity, convergence)
+        wind_east, wind_north, _ = _rotate_to_true_north(row.wind, convergence)
         roll, pitch, yaw = (float(value) for value in row.attitude)
         p, q, r = (float(value) for value in row.rates)
         return Snapshot(
@@ -142,10 +142,10 @@ class SnapshotMaker:
         )
 
 
-def _to_true(vector: Floats, convergence: float) -> tuple[float, float, float]:
+def _rotate_to_true_north(vector: Floats, convergence: float) -> tuple[float, float, float]:
     """Rotate a vector from the map's east, north and up to true east, north and up.
 
-    convergence: map course minus true course, rad.
+    convergence: grid convergence, the map course of true north, rad.
     """
     east, north, up = (float(value) for value in vector)
     cos, sin = math.cos(convergence), math.sin(convergence)

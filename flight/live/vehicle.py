@@ -123,7 +123,10 @@ class Downlink:
             self._stream_parameters(peer)
 
     def _send_telemetry(self, peer: Peer, now: float) -> None:
-        """Send the telemetry messages that are due to a station; check a message that is off again later."""
+        """Send the telemetry messages that are due to a station.
+
+        A message that the station has switched off becomes due again after a heartbeat's period.
+        """
         for name, due_time in peer.due.items():
             if now < due_time:
                 continue
@@ -463,7 +466,7 @@ class Vehicle:
         if self.arming.flying and not problem:
             self.status.current = seq
             if self.arming.mode == AUTO:
-                self.arming.restart_mission()
+                self.arming.continue_from_current_item()
             return CommandResult(ACCEPTED)
         if problem:
             return CommandResult(DENIED, f"item {seq} refused: {problem}")

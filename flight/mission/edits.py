@@ -64,7 +64,9 @@ def move_item(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> M
     8.0
     """
     item = movable_item(mission, index)
-    return _with_item(mission, index, replace(item, lat_deg=round_to_grid(lat_deg), lon_deg=round_to_grid(lon_deg)))
+    return _with_replaced_item(
+        mission, index, replace(item, lat_deg=round_to_grid(lat_deg), lon_deg=round_to_grid(lon_deg))
+    )
 
 
 def raise_items(mission: Mission, indices: Iterable[int], height_change: float) -> Mission:
@@ -81,7 +83,7 @@ def raise_items(mission: Mission, indices: Iterable[int], height_change: float) 
     for index in indices:
         item = movable_item(mission, index)
         if math.isfinite(item.alt):
-            mission = _with_item(mission, index, replace(item, alt=_round_to_milli(item.alt + height_change)))
+            mission = _with_replaced_item(mission, index, replace(item, alt=_round_to_milli(item.alt + height_change)))
     return mission
 
 
@@ -93,7 +95,7 @@ def set_altitude(mission: Mission, index: int, amsl: float, current_amsl: float)
     item = movable_item(mission, index)
     if math.isfinite(item.alt):
         return raise_items(mission, (index,), amsl - current_amsl)
-    return _with_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_round_to_milli(amsl)))
+    return _with_replaced_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_round_to_milli(amsl)))
 
 
 def insertion_index(mission: Mission, previous_index: int) -> int:
@@ -172,7 +174,7 @@ def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: f
     if has_own_speed:
         change = mission.items[index - 1]
         new_change = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
-        mission, item_index = _with_item(mission, index - 1, new_change), index
+        mission, item_index = _with_replaced_item(mission, index - 1, new_change), index
     else:
         mission, item_index = (
             _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)),
@@ -190,7 +192,7 @@ def _speed_item(seq: int, airspeed: float) -> MissionItem:
     return MissionItem(seq, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), params, 0.0, 0.0, 0.0)
 
 
-def _with_item(mission: Mission, index: int, item: MissionItem) -> Mission:
+def _with_replaced_item(mission: Mission, index: int, item: MissionItem) -> Mission:
     """Return the mission with the item at an index replaced.
 
     Raises MissionError for an invalid item.

@@ -167,7 +167,7 @@ def fence_problem(
         lat, lon = [corner.lat_deg for corner in shape], [corner.lon_deg for corner in shape]
         corners_east, corners_north = to_map(origin, lat, lon)
         if item.command in POLYGONS:
-            is_inside = _in_polygon(np.asarray(corners_east), np.asarray(corners_north), east, north)
+            is_inside = _is_in_polygon(np.asarray(corners_east), np.asarray(corners_north), east, north)
             name = "polygon"
         else:
             is_inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
@@ -266,7 +266,7 @@ def number_items(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     return tuple(replace(item, seq=k) for k, item in enumerate(items))
 
 
-def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
+def _is_in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
     """Return True if a position lies in a polygon, by counting the crossings of a ray to the east."""
     start_east, start_north = corners_east, corners_north
     end_east, end_north = np.roll(start_east, -1), np.roll(start_north, -1)

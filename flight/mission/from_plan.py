@@ -151,7 +151,7 @@ def acceptance_radii(
     points: (w, 3) m, in flying order.
     """
     if tracking is not None:
-        return _acceptance_for_tracking(scenario, points, airspeed, tracking)
+        return _acceptance_radii_for_tracking(scenario, points, airspeed, tracking)
     wind = max(math.hypot(*scenario.wind.velocity_at(float(amsl))) for amsl in points[:, 2])
     turns, lateral_acceleration = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE_M)
@@ -168,11 +168,16 @@ def acceptance_radii(
 
 
 def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
-    """Return the distance between the corner and the fly-by arc of each turn (rad), m.  radius: of the arcs, m."""
+    """Return the distance between the corner and the fly-by arc of each turn (rad), m.
+
+    radius: radius of the arcs, m.
+    """
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
-def _acceptance_for_tracking(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
+def _acceptance_radii_for_tracking(
+    scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError
+) -> Floats:
     """Return the acceptance radii for which the autopilot's tracking error is smallest, (w,) whole m.
 
     Each radius applies to the highest ground speed in the turn at its waypoint.

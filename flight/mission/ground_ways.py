@@ -54,7 +54,7 @@ class TakeOff:
     acceleration: float
 
     def release(self) -> tuple[Floats, Floats]:
-        """Return the position, m, and velocity, m/s, at release from rail or hand: east, north, up, (3,) each.
+        """Return the position (m) and velocity (m/s) at release from rail or hand: east, north, up, (3,) each.
 
         On a runway the position is on the ground; the caller adds the height at which the aircraft stands.
         """
@@ -103,14 +103,14 @@ class Approach:
     home_altitude: float
 
     def distances_from_landing_point(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return the distances of positions (n, 3) past the landing point and to the right of the landing course, m.
+        """Return along-track and cross-track distances of positions (n, 3) from the landing point, m.
 
-        Both results have the shape (n,).
+        Both have shape (n,), and are positive past the landing point and to the right of the landing course.
         """
-        return _along_and_right(position, self.point, self.course)
+        return _track_offsets(position, self.point, self.course)
 
     def distances_from_strip_center(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return the distances of positions (n, 3) from the strip's center: along the strip and to its right, m, (n,).
+        """Return along-track and cross-track distances of positions (n, 3) from the strip's center, m.
 
         The strip has its stated course, or the landing's course if none is stated. A landing against the stated course
         uses the same strip.
@@ -118,11 +118,14 @@ class Approach:
         axis = self.course if self.strip.course is None else self.strip.course
         if math.cos(self.course - axis) < 0.0:
             axis += math.pi
-        return _along_and_right(position, np.array([self.strip.east, self.strip.north]), axis)
+        return _track_offsets(position, np.array([self.strip.east, self.strip.north]), axis)
 
 
-def _along_and_right(position: Floats, start: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the distances of positions (n, 3) from a start point: along a course (rad), and to the right of it, m."""
+def _track_offsets(position: Floats, start: Floats, course: float) -> tuple[Floats, Floats]:
+    """Return along-track and cross-track distances of positions (n, 3) from a start point, m.
+
+    course: course of the track, rad.
+    """
     east, north = position[..., 0] - start[0], position[..., 1] - start[1]
     sin, cos = math.sin(course), math.cos(course)
     return east * sin + north * cos, east * cos - north * sin

@@ -85,8 +85,8 @@ def implied_scenario(
             north_m=area[1].tolist(),
             ceiling_amsl_m=min(max_altitude + AREA_MARGIN_M, MAX_ALTITUDE_M),
         ),
-        start=_raised_above_ground(placed_mission.stops[0].map_position, terrain),
-        destination=_raised_above_ground(placed_mission.stops[-1].map_position, terrain),
+        start=_end_table_above_ground(placed_mission.stops[0].map_position, terrain),
+        destination=_end_table_above_ground(placed_mission.stops[-1].map_position, terrain),
         flight=flight,
     )
     return ImpliedScenario(scenario_from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
@@ -168,8 +168,8 @@ def _position_text(lats: Floats, lons: Floats) -> str:
     return f"latitude {lats.min():.4f}..{lats.max():.4f}, longitude {lons.min():.4f}..{lons.max():.4f}"
 
 
-def _raised_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
-    """Return a position as the table of a scenario's end, raised to 1 m above the ground if it is lower."""
+def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
+    """Return the table of a start or destination, raised to 1 m above the ground if it is lower."""
     east, north, amsl = position
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)

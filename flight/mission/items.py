@@ -212,7 +212,7 @@ class MissionItem:
 
     @property
     def has_position(self) -> bool:
-        """True if the item has a position; latitude and longitude of 0, 0 or NaN are none."""
+        """True if the item has a position; latitude and longitude of 0, 0 or NaN are no position."""
         if not (math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)):
             return False
         return is_located(self.command, self.frame) and (self.x, self.y) != (0, 0)

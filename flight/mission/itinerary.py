@@ -838,7 +838,7 @@ def _first_position(mission: Mission) -> Home:
 
 
 def _error_without_position(mission: Mission) -> MissionError:
-    """Return the error for a mission without a position to fly to; it says that a gate is none."""
+    """Return the error for a mission without a position to fly to; a gate is no such position."""
     has_gates = any(item.command == Command.CONDITION_GATE for item in mission.items)
     reason = f"; {GATES_ARE_NO_WAYPOINTS}" if has_gates else ""
     return MissionError(

@@ -372,7 +372,7 @@ def _place_stops(
             and math.dist(placed_stops[-1].map_position[:2], placed_stop.map_position[:2]) < SAME_POSITION_DISTANCE_M
         ):
             if vertical_legs and _is_vertical(placed_stops[-1], placed_stop):
-                placed_stops.append(stop.at(_offset_vertical_leg(placed_stops, placed_stop.map_position[2])))
+                placed_stops.append(stop.at(_vertical_leg_end(placed_stops, placed_stop.map_position[2])))
                 continue
             merged_stop = _merge_stops(source, placed_stops[-1], placed_stop, notes)
             placed_stops[-1] = merged_stop.at(placed_stops[-1].map_position)
@@ -512,10 +512,11 @@ def _is_vertical(previous: RoutePoint, stop: RoutePoint) -> bool:
     )
 
 
-def _offset_vertical_leg(stops: list[RoutePoint], up: float) -> Position:
-    """Return the last position, moved by `VERTICAL_LEG_LENGTH_M` m along its course and to the altitude ``up``, m AMSL.
+def _vertical_leg_end(stops: list[RoutePoint], up: float) -> Position:
+    """Return the end of a vertical leg after the last stop, at the altitude ``up``, m AMSL.
 
-    Without a course the last position is moved to the east.
+    The end is the last stop's position, moved `VERTICAL_LEG_LENGTH_M` along the course of the last leg, or to the east
+    if there is no leg.
     """
     course = math.pi / 2.0
     if len(stops) > 1:

@@ -124,17 +124,20 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
     return float(np.hypot(*(leg_starts + fractions[:, None] * leg_vectors - np.array(point)).T).min())
 
 
-def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Yield a note if the altitude of an RTL to home is not above the ground within the RTL's loiter."""
-    if not home or scenario.terrain is None or math.isnan(rules.height):
+def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
+    """Yield a note if an RTL to home ends at or below the ground somewhere within its loiter radius.
+
+    home_points: home; empty if the mission has no home.
+    """
+    if not home_points or scenario.terrain is None or math.isnan(rules.height):
         return
     radius = max(MIN_RTL_LOITER_RADIUS_M, abs(rules.radius))
     angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
     distances = np.linspace(0.0, radius, _RING_COUNT)[:, None]
     ground = scenario.terrain.height(
-        home[0].east + distances * np.sin(angles), home[0].north + distances * np.cos(angles)
+        home_points[0].east + distances * np.sin(angles), home_points[0].north + distances * np.cos(angles)
     )
-    ground_height = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
+    ground_height = float(np.nanmax(ground, initial=-math.inf)) - home_points[0].up
     if ground_height >= rules.height:
         yield (
             f"an RTL loiters {rules.height:.0f} m above home, and within {radius:.0f} m of home the ground rises to"

@@ -356,7 +356,7 @@ class _ReturnBuilder:
         self._first_climb_altitude = -math.inf
 
     @property
-    def _is_step(self) -> bool:
+    def _is_line_point(self) -> bool:
         """True if the descent is too small for a slope and is flown at once."""
         return abs(self._slope_start[2] - self._circle.up + self._slope_base) < self._min_slope_height
 
@@ -423,7 +423,7 @@ class _ReturnBuilder:
         leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
         if self._altitude_difference > 0.0:
             break_distance = self._altitude_difference / self._ability.climb_slope
-        elif self._is_step:
+        elif self._is_line_point:
             break_distance = -self._altitude_difference / self._dive_slope
         else:
             descent = self._slope_start[2] - self._circle.up
@@ -529,7 +529,7 @@ class _ReturnBuilder:
     def _slope_altitude(self, east: float, north: float) -> float:
         """Return the altitude of the slope to the target at a point, m AMSL; for a step, the target's altitude."""
         start_altitude, end_altitude = self._slope_start[2], self._circle.up
-        if self._is_step:
+        if self._is_line_point:
             return end_altitude
         remaining_fraction = 1.0 - min(1.0, max(0.0, self._slope_fraction(east, north)))
         return min(

@@ -62,9 +62,9 @@ class _Line(NamedTuple):
     flown: frozenset[int]
 
     @property
-    def steps(self) -> list[MissionItem]:
+    def point_items(self) -> list[MissionItem]:
         """The items that are points of the line."""
-        return [item for item in self.items if _is_step(item, self.flown)]
+        return [item for item in self.items if _is_line_point(item, self.flown)]
 
 
 class _SurveyItems(NamedTuple):
@@ -126,8 +126,8 @@ def with_layout(
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
         corners, line_items = route.positions[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
         line = _Line(corners, line_items, flown)
-        if _waypoint_of_item(mission, route)[line.steps[0].seq] != photo_line.first:
-            line = line._replace(items=(_make_waypoint(line.steps[0], corners[0], origin), *line_items))
+        if _waypoint_of_item(mission, route)[line.point_items[0].seq] != photo_line.first:
+            line = line._replace(items=(_make_waypoint(line.point_items[0], corners[0], origin), *line_items))
         lines.append(line)
     if layout.course is not None:
         turned_lines = _lines_on_course(lines, survey, layout.course, origin)
@@ -137,12 +137,14 @@ def with_layout(
     max_lead_length = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
     (first, _), (_, end) = items.lines[0], items.lines[-1]
     new_items = [*mission.items[: items.begin]]
-    new_items += _without_leads(
+    new_items += _without_lead_waypoints(
         mission, route, mission.items[items.begin : first], survey.lines[0].first, max_lead_length
     )
     for number, line in enumerate(_order_lines(lines, layout)):
         new_items += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
-    new_items += _without_leads(mission, route, mission.items[end : items.end], survey.lines[-1].last, max_lead_length)
+    new_items += _without_lead_waypoints(
+        mission, route, mission.items[end : items.end], survey.lines[-1].last, max_lead_length
+    )
     # Renumber all items: two items with one number would be ambiguous.
     numbered = [replace(item, seq=seq) for seq, item in enumerate([*new_items, *mission.items[items.end :]], 1)]
     return renumber_items(replace(mission, items=tuple(numbered)))
@@ -153,7 +155,7 @@ def _flown_items(route: Route) -> frozenset[int]:
     return frozenset(int(seq) for seq in route.items)
 
 
-def _is_step(item: MissionItem, flown: Collection[int]) -> bool:
+def _is_line_point(item: MissionItem, flown: Collection[int]) -> bool:
     """Return True if an item is a point of a line: a navigation item, or a gate on the route.
 
     flown: numbers of the items that the route leads to.  A gate that is not flown, such as any gate of ArduPlane's, is
@@ -182,12 +184,12 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
         first = max(
             item_index
             for item_index in range(index(line.first), index(line.first + 1))
-            if _is_step(mission.items[item_index], flown)
+            if _is_line_point(mission.items[item_index], flown)
         )
         if mission.items[first].command not in (Command.NAV_WAYPOINT, Command.CONDITION_GATE):
             first += 1
         end_index = index(line.last) + 1
-        while end_index < item_count and not _is_step(mission.items[end_index], flown):
+        while end_index < item_count and not _is_line_point(mission.items[end_index], flown):
             end_index += 1
         lines.append((first, end_index))
     first_line, last_line = survey.lines[0], survey.lines[-1]
@@ -202,16 +204,16 @@ def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
     """
     waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
-        if _is_step(item, waypoint_by_seq):
+        if _is_line_point(item, waypoint_by_seq):
             waypoint = waypoint_by_seq.get(item.seq, waypoint)
             waypoints[item.seq] = waypoint
     return waypoints
 
 
-def _without_leads(
+def _without_lead_waypoints(
     mission: Mission, route: Route, items: Sequence[MissionItem], end: int, max_lead_length: float
 ) -> list[MissionItem]:
-    """Return items before or after a survey, without its lead waypoints, which the new layout replaces.
+    """Return the items before or after a survey without its lead waypoints, which the new layout replaces.
 
     end: index of the waypoint at that end of the survey.
     max_lead_length: distance from that waypoint within which a waypoint is a lead, m; more distant waypoints belong to
@@ -254,14 +256,14 @@ def _reverse_line(line: _Line) -> _Line:
 
     Its waypoints are reversed; the commands between them keep their positions in the list.
     """
-    reversed_steps = reversed(line.steps)
-    items = tuple(next(reversed_steps) if _is_step(item, line.flown) else item for item in line.items)
+    reversed_items = reversed(line.point_items)
+    items = tuple(next(reversed_items) if _is_line_point(item, line.flown) else item for item in line.items)
     return _Line(line.corners[::-1], items, line.flown)
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
     """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
-    steps = line.steps
+    steps = line.point_items
     entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     entry_direction, exit_direction = (
         direction / max(float(np.hypot(*direction)), 1e-9) for direction in (entry_direction, exit_direction)
@@ -272,7 +274,7 @@ def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, or
         exit_waypoint = _make_waypoint(steps[-1], line.corners[-1] + turn_around * exit_direction, origin)
         return [*items, *line.items, exit_waypoint]
     # Without waypoints beyond them, gates lead to no end of the line.
-    return [*items, *(_as_waypoint(item) if _is_step(item, line.flown) else item for item in line.items)]
+    return [*items, *(_as_waypoint(item) if _is_line_point(item, line.flown) else item for item in line.items)]
 
 
 def _as_waypoint(item: MissionItem) -> MissionItem:
@@ -291,7 +293,7 @@ def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin)
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
     """Return lines on another course over the hull of the present lines, or None if that is impossible."""
-    waypoint_items = [item for line in lines for item in line.steps]
+    waypoint_items = [item for line in lines for item in line.point_items]
     if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
     hull = convex_hull(np.concatenate([line.corners for line in lines]))
@@ -374,7 +376,7 @@ def _move_items(line: _Line, ends: Floats, origin: GeoOrigin) -> tuple[MissionIt
 
     ends: ends of the other line, (2, 2) m.
     """
-    waypoint_indices = [index for index, item in enumerate(line.items) if _is_step(item, line.flown)]
+    waypoint_indices = [index for index, item in enumerate(line.items) if _is_line_point(item, line.flown)]
     moved = []
     for index, item in enumerate(line.items):
         if index in (waypoint_indices[0], waypoint_indices[-1]):
@@ -383,7 +385,7 @@ def _move_items(line: _Line, ends: Floats, origin: GeoOrigin) -> tuple[MissionIt
                 for value in to_geo(origin, *ends[0 if index == waypoint_indices[0] else 1].tolist())
             )
             item = replace(item, lat_deg=lat, lon_deg=lon)
-        elif _is_step(item, line.flown):
+        elif _is_line_point(item, line.flown):
             continue
         moved.append(item)
     return tuple(moved)

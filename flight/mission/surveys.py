@@ -152,15 +152,15 @@ class LineAxis:
         self.length = float(self.along[-1])
 
     def project(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Project points (n, 2 or 3) m on the nearest leg of the line.
+        """Project points (n, 2 or 3), m, onto the nearest leg of the line.
 
-        Return three arrays (n,): the points' distances along the line, m, their distances to the right of the line, m,
-        and the course of the nearest leg, rad.
+        Return three arrays (n,): the along-track distances, m, the cross-track distances (right positive), m, and the
+        course of the nearest leg, rad.
         """
         min_distance = np.full(len(points), np.inf)
         coordinates = np.zeros((3, len(points)))
         for index, (direction, length) in enumerate(zip(self._directions, self._lengths, strict=True)):
-            along, right = _along_and_right(
+            along, right = _track_components(
                 points[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
             )
             min_along = -math.inf if index == 0 else 0.0
@@ -333,7 +333,7 @@ class _Runs:
         return self.runs[run - 1][1] == self.runs[run][0]
 
     def spacing(self, run: int, other_run: int) -> float | None:
-        """Return the distance between two runs, m, or None if they cannot be neighboring lines.
+        """Return the distance between two runs (m), or None if they cannot be neighboring lines.
 
         Neighboring lines are parallel, overlap, and are far enough apart.
         """
@@ -347,7 +347,7 @@ class _Runs:
         min_length = min(length, other_length)
         if min_length < _MIN_LINE_LENGTH_M:
             return None
-        start, end = (self._along_and_right_of(run, waypoint) for waypoint in self.runs[other_run])
+        start, end = (self._track_offsets(run, waypoint) for waypoint in self.runs[other_run])
         if abs(end[0] - start[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
             return None
         spacing = abs(0.5 * (start[1] + end[1]))
@@ -360,8 +360,8 @@ class _Runs:
             return None
         return spacing
 
-    def _along_and_right_of(self, run: int, waypoint: int) -> tuple[float, float]:
-        """Return a waypoint's distance along a run and to the right of it, m."""
+    def _track_offsets(self, run: int, waypoint: int) -> tuple[float, float]:
+        """Return a waypoint's along-track and cross-track (right positive) distances from a run's start, m."""
         (start_east, start_north), (east, north) = self._positions[self.runs[run][0]], self._positions[waypoint]
         course_east, course_north = self._directions[run]
         east, north = east - start_east, north - start_north
@@ -587,7 +587,7 @@ def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLi
     return line._replace(first=first, last=last) if first < last else line
 
 
-def _along_and_right(offsets: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the components of offsets (n, 2) m along a course and to the right of the course: two arrays (n,) m."""
+def _track_components(offsets: Floats, course: float) -> tuple[Floats, Floats]:
+    """Return the along-track and cross-track (right positive) components of offsets (n, 2), m, (n,) each."""
     east, north = math.sin(course), math.cos(course)
     return offsets[:, 0] * east + offsets[:, 1] * north, offsets[:, 0] * north - offsets[:, 1] * east

@@ -177,7 +177,7 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
 
 
 def _trigger_distance(items: list[Any]) -> float:
-    """Return the longest distance between photos that the items state, m, or 0 if no item states one."""
+    """Return the longest distance between photos that the items state (m), or 0 if no item states one."""
     distances = [0.0]
     for item in items:
         params = item.get("params") if isinstance(item, dict) else None
@@ -250,7 +250,7 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
 def _landing_commands(item: dict[str, Any], source: str, location: str) -> list[tuple[int, int, list[Any]]]:
     """Return the optional commands of a landing pattern, as command, frame and parameters.
 
-    Raises MissionError for an approach speed that is no speed.
+    Raises MissionError for an approach speed that is not a number above 0, or that is too high.
     """
     commands: list[tuple[int, int, list[Any]]] = []
     if item.get("useDoChangeSpeed") is True:

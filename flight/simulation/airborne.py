@@ -16,7 +16,7 @@ from aircraft.path_limits import Limits, ground_speed_on
 from flight.autopilots.parts import ControlLaw
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.path import fly_by_path, waypoint_records
@@ -122,7 +122,7 @@ class Airborne(ABC):
         )
         if setup.route.rtl_loiter is not None:
             # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
-            radius_factor = true_by_equivalent(setup.route.rtl_loiter.up) ** 2
+            radius_factor = eas_to_tas_ratio(setup.route.rtl_loiter.up) ** 2
             time_limit += rtl_loiter_timeout(radius_factor * setup.route.rtl_loiter.radius)
         if waypoints["is_mission_end"][-1]:
             time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
@@ -208,7 +208,7 @@ class Airborne(ABC):
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return by how much loiters that are too tight for the bank limit lengthen the flight, m.
+    """Return the extra length that is flown in loiters too tight for the bank limit, m.
 
     An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires,
     and once more until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing, because
@@ -232,7 +232,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
             setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
         )
         # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
-        flown_radius *= true_by_equivalent(altitude) ** 2
+        flown_radius *= eas_to_tas_ratio(altitude) ** 2
         if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
             extra_length = (
                 2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)

@@ -25,7 +25,7 @@ class LocalMap:
     """Map projection of geodetic radians for compiled code, fitted around one flight.
 
     position: (latitude, longitude) to (east, north).
-    angle: (latitude, longitude) to the map course of true north (rad), and 0.
+    angle: (latitude, longitude) to the grid convergence (rad), which is the map course of true north, and 0.
     center_longitude: longitude of the map's center, rad; longitudes are normalised to within pi of it.
     """
 
@@ -78,7 +78,7 @@ class LocalMap:
         return local
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
-        """Return the map course of true north at a position, rad."""
+        """Return the grid convergence at a position, rad: the map course of true north."""
         lon = self.center_longitude + math.remainder(math.radians(lon_deg) - self.center_longitude, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
 

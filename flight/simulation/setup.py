@@ -38,7 +38,7 @@ StretchEnd = Literal["mode", "log", "landed"]
 
 @dataclass(frozen=True, slots=True)
 class MissionStretch:
-    """A stretch flown along the mission.
+    """Part of a log in which the vehicle flew the mission.
 
     start, end: s on the log's clock.
     mode: the vehicle's name for the mode, "" for a log without modes.
@@ -55,7 +55,7 @@ class MissionStretch:
 
 @dataclass(frozen=True, slots=True)
 class HeightOffset:
-    """Offset of another altitude in the log from the one in use, m, at the start of the judged flight."""
+    """Offset of another altitude in the log from the altitude in use, m, at the judged flight's start."""
 
     name: str
     offset: float

@@ -153,7 +153,7 @@ def find_release(
 def _to_true_north(east: float, north: float, convergence: float) -> tuple[float, float]:
     """Return the true north and east components of a map vector.
 
-    convergence: map course of true north, rad.
+    convergence: grid convergence, the map course of true north, rad.
     """
     cos, sin = math.cos(convergence), math.sin(convergence)
     return north * cos + east * sin, east * cos - north * sin

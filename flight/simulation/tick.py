@@ -14,7 +14,7 @@ from numba import literal_unroll
 from numpy.typing import NDArray
 
 from flight.dynamics.state import COMMANDS, STATE
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.gains import GAINS, Gains
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
@@ -52,7 +52,7 @@ AIR = record_dtype(
 )
 # Map and ground data at the aircraft's position.
 PLACE = record_dtype(
-    "north_cos",  # of the map course of true north
+    "north_cos",  # of the grid convergence, the map course of true north
     "north_sin",
     "ground",  # m AMSL, NaN where it is unknown
     "clearance",  # m above that ground
@@ -345,7 +345,7 @@ def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: floa
     """
     memory.is_in_rtl, memory.cross_track = True, math.nan
     offset_east, offset_north = motion.east - waypoint.centre_east, motion.north - waypoint.centre_north
-    airspeed_factor = true_by_equivalent(motion.up)
+    airspeed_factor = eas_to_tas_ratio(motion.up)
     radius = abs(waypoint.loiter_radius) * airspeed_factor * airspeed_factor
     is_near = math.hypot(offset_east, offset_north) < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     bearing = math.atan2(offset_east, offset_north)
@@ -449,7 +449,7 @@ def _update_wind(
 ) -> None:
     """Set the mean wind and the next gust at the aircraft in ``air``, along true north, east and down.
 
-    convergence_cos, convergence_sin: cosine and sine of the map course of true north.
+    convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
     """
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The wind's map course minus the map course of true north.
@@ -506,12 +506,12 @@ def _fill_row(
 
 
 @inner
-def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:
+def _fill_wind(row: Record, state: Record, convergence_cos: float, convergence_sin: float) -> None:
     """Set the wind of a `flight.simulation.track.TRACK_ROW` record, in map axes.
 
-    cos, sin: cosine and sine of the map course of true north.
+    convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
     """
     wind = row.wind
-    wind[0] = state.wind_east * cos + state.wind_north * sin
-    wind[1] = state.wind_north * cos - state.wind_east * sin
+    wind[0] = state.wind_east * convergence_cos + state.wind_north * convergence_sin
+    wind[1] = state.wind_north * convergence_cos - state.wind_east * convergence_sin
     wind[2] = -state.wind_down

@@ -194,7 +194,7 @@ _STEPS_PER_UNIT = np.exp2(
 
 
 def quantise(rows: Rows) -> Rows:
-    """Return a copy of the rows of a flight, rounded to the resolution of `DIGITS` and without negative zeros.
+    """Return a copy of a flight's rows, rounded to the resolution of `DIGITS` and without negative zeros.
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
@@ -408,7 +408,7 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
 
 def saturated_rows(track: Track, control: int, min_command: float, max_command: float) -> NDArray[np.bool_]:
-    """Return a mask of the rows at which the command of a control is saturated, (t,).
+    """Return a mask (t,): True for each row at which the command of a control is saturated.
 
     control: column of `Track.commands`.
 

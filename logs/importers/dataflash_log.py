@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Home, MissionItem, round_to_grid
 from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
@@ -319,7 +319,7 @@ class _Reader:
             return np.ones(len(time))
         order = np.argsort(position.time, kind="stable")
         altitudes = np.clip(np.interp(time, position.time[order], position.values[order, 2]), -500.0, 20_000.0)
-        return np.array([true_by_equivalent(float(altitude)) for altitude in altitudes])
+        return np.array([eas_to_tas_ratio(float(altitude)) for altitude in altitudes])
 
     def _battery(self) -> LogSeries | None:
         """Return the battery's current (A) and the energy used (Wh), (n, 2); None if neither was measured."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Home, Mission, MissionItem, round_to_grid
 from flight.simulation.setup import Damage
 from logs.importers.clean_positions import remove_clock_jumps
@@ -400,7 +400,7 @@ class VehicleMessages:
             sensed = np.any(hud.values[:, 0] > 0.0) and not np.array_equal(hud.values[:, 0], hud.values[:, 3])
             if sensed:
                 up = np.clip(hud.values[:, 1], -500.0, 20_000.0)
-                ratio = np.array([true_by_equivalent(float(height)) for height in up])
+                ratio = np.array([eas_to_tas_ratio(float(height)) for height in up])
                 yield "airspeed", LogSeries("VFR_HUD", hud.time, hud.values[:, :1] * ratio[:, None])
             yield "throttle", LogSeries("VFR_HUD", hud.time, hud.values[:, 2:3] * 0.01)
         yield "battery", self._battery_with_energy()

@@ -222,7 +222,7 @@ def corridor_line(setup: FlightSetup) -> str:
 
 
 def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the minimum distance between a leg and the leg after the next, m, and the first leg's number.
+    """Return the minimum distance (m) of a leg from the leg after the next, and the first leg's number.
 
     Only legs that lie side by side are compared: their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`,
     and at least half of the shorter leg lies next to the longer leg.  Return None if there are no such legs.

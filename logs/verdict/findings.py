@@ -95,7 +95,7 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """Value that was compared with the limit: of the flown and the planned value, the one that fits the margin."""
+        """Value that was compared with the limit: the flown or the planned value, whichever fits the margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
         errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
@@ -208,7 +208,7 @@ def make_finding(
     faults: faults with which the reason begins.
     facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
-    A failed finding whose number is within the limit and the tolerance gets no margin, because it fails for another
+    A failed finding whose number is within the limit and the tolerance has no margin, because it fails for another
     reason.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
@@ -244,11 +244,11 @@ def _rounded_or_none(value: float | None) -> float | None:
     return round(float(value), 6) + 0.0  # no -0.0
 
 
-def badness(finding: Finding) -> tuple[int, float]:
+def worst_first_key(finding: Finding) -> tuple[int, float]:
     """Return a sort key that puts the worst finding first: failed, unjudged, then passed; each sorted by margin.
 
     >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
-    >>> badness(near) < badness(far)
+    >>> worst_first_key(near) < worst_first_key(far)
     True
     """
     return (

@@ -110,7 +110,7 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
 def _level_answers(
     requirements: RouteRequirements, flight_findings: tuple[Finding, ...], flyable: bool
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answers of geometry, with its disagreements with the flight, and of the flight itself.
+    """Return the answer by geometry, with its disagreements with the flight, and the flight's own answer.
 
     If the envelope is not applied, only the flight's own answer is returned.
     """
@@ -136,7 +136,7 @@ def _level_answers(
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
-    """Return the answer of the reference flight with planfly's guidance, with its disagreements with the flight."""
+    """Return the airframe's answer, by the reference flight, with its disagreements with the flight."""
     failed = frozenset(airframe.failed)
     passes_by_place = {
         (finding.rule, finding.place): (finding.rule, finding.place) not in failed for finding in flight_findings

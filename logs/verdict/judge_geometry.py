@@ -11,11 +11,11 @@ from logs.verdict.findings import (
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
     Finding,
-    badness,
     finding_reason,
     make_finding,
     message,
     undecided_findings,
+    worst_first_key,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -180,7 +180,7 @@ def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
         place = finding.place
         has_stop = place.kind in ("leg", "waypoint") and place.number is not None
         key = (finding.rule, finding.check, place.kind, place.number, place.item, place.to_item) if has_stop else (k,)
-        if key not in worst_by_stop or badness(finding) < badness(worst_by_stop[key]):
+        if key not in worst_by_stop or worst_first_key(finding) < worst_first_key(worst_by_stop[key]):
             worst_by_stop[key] = finding
     return tuple(worst_by_stop.values())
 
@@ -195,7 +195,7 @@ def with_suggestions(
     """Return the findings, with ``suggestions`` added to failed or undecided findings that a change could fix.
 
     Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
-    None gets a suggestion if more than `MAX_SUGGESTED_FINDINGS` need one.
+    If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
     """
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
     places = [

@@ -5,7 +5,7 @@ from world.html_table import html_table
 
 
 def verdict_html(verdict: Presentation) -> str:
-    """Write the headline, a row for each rule, and a row for each failed finding with its remedy."""
+    """Return an HTML table with the headline, and a row for each rule and for each failed finding."""
     rows: list[tuple[str, ...]] = []
     for rule in verdict.rules:
         rows.append((rule.words.title, rule.count_text, "", ""))

@@ -82,7 +82,7 @@ class Presentation:
         """The findings that leave the verdict undecided."""
         return undecided_findings(self.findings)
 
-    def worth_listing(self, max_open: int) -> list[tuple[int, Finding]]:
+    def findings_to_list(self, max_open: int) -> list[tuple[int, Finding]]:
         """Return the findings to show in a short list, each with its index in `findings`.
 
         These are failed and undecided findings, then for each rule the passed finding closest to its limit.

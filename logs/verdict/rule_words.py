@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 from logs.verdict.headline_phrases import (
     HeadlinePhrase,
-    name_circle,
-    name_event,
-    name_excess,
-    name_missed_waypoint,
-    name_missile,
-    name_photo_line,
-    name_reason,
-    name_shortfall,
-    name_zone,
+    event_phrase,
+    excess_phrase,
+    missed_waypoint_phrase,
+    missile_phrase,
+    photo_line_phrase,
+    reason_phrase,
+    shortfall_phrase,
+    small_circle_phrase,
+    zone_phrase,
 )
 
 
@@ -57,7 +57,7 @@ class RuleWords:
     question: str
     margin: Margin | None
     urgency: int = 0
-    phrase: HeadlinePhrase = name_excess
+    phrase: HeadlinePhrase = excess_phrase
     unjudged: str = ""
     unjudged_unit: str = "leg"
     explains_unjudged: bool = False
@@ -111,7 +111,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="loiters",
             question="Can each loiter circle be held within the bank limit in this wind, and was it completed?",
             margin=Margin("radius", "m", 10.0),
-            phrase=name_circle,
+            phrase=small_circle_phrase,
         ),
         RuleWords(
             name="slope",
@@ -125,7 +125,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="clearance",
             question="Does each leg stay the required height above the ground?",
             margin=Margin("height above ground", "m", 10.0),
-            phrase=name_shortfall,
+            phrase=shortfall_phrase,
             unjudged="terrain",
             explains_unjudged=True,
         ),
@@ -142,7 +142,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="zones",
             question="Do the path and the flight stay outside exclusion zones and inside inclusion zones?",
             margin=Margin("depth", "m", 10.0),
-            phrase=name_zone,
+            phrase=zone_phrase,
             unjudged="airspace",
             unjudged_unit="zone",
             explains_unjudged=True,
@@ -152,7 +152,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="threats",
             question="Do the path and the flight stay outside each missile's sphere?",
             margin=Margin("time inside", "s"),
-            phrase=name_missile,
+            phrase=missile_phrase,
             explains_unjudged=True,
         ),
         RuleWords(
@@ -160,7 +160,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="bounds",
             question="Does the flight stay inside the area's box, above its floor and below its ceiling?",
             margin=Margin("distance inside", "m", 10.0),
-            phrase=name_shortfall,
+            phrase=shortfall_phrase,
             explains_unjudged=True,
         ),
         RuleWords(
@@ -168,7 +168,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="waypoints",
             question="Was each waypoint reached, within the radius that the mission or the autopilot sets for it?",
             margin=Margin("closest approach", "m", 10.0),
-            phrase=name_missed_waypoint,
+            phrase=missed_waypoint_phrase,
         ),
         RuleWords(
             name="corridor",
@@ -182,7 +182,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             noun="photo line",
             question="How much of each photo line of a survey is flown so that its photos can be used?",
             margin=Margin("share of the photo line", "%", 5.0),
-            phrase=name_photo_line,
+            phrase=photo_line_phrase,
         ),
         RuleWords(
             name="speed",
@@ -190,7 +190,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             question="Can the aircraft fly level at each leg's commanded airspeed, and hold the leg's course in this"
             " wind?",
             margin=Margin("airspeed", "m/s", 1.0),
-            phrase=name_reason,
+            phrase=reason_phrase,
             unjudged="airspeed",
         ),
         RuleWords(
@@ -214,7 +214,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             noun="climb-out",
             question="Is the climb from home to the mission's first waypoint clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
-            phrase=name_reason,
+            phrase=reason_phrase,
             unjudged="climb-out",
             explains_unjudged=True,
         ),
@@ -225,7 +225,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             " obstacles?",
             margin=Margin("height above ground", "m", 10.0),
             urgency=4,
-            phrase=name_reason,
+            phrase=reason_phrase,
             unjudged="launch",
             explains_unjudged=True,
         ),
@@ -242,7 +242,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="approach",
             question="Is the glide to the landing point clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
-            phrase=name_reason,
+            phrase=reason_phrase,
             unjudged="approach",
             explains_unjudged=True,
         ),
@@ -252,7 +252,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             question="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles"
             " and zones?",
             margin=Margin("strip", "m", 20.0),
-            phrase=name_reason,
+            phrase=reason_phrase,
             unjudged="touchdown",
             explains_unjudged=True,
         ),
@@ -262,7 +262,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             noun="go-around",
             question="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
             margin=None,
-            phrase=name_reason,
+            phrase=reason_phrase,
             is_warning=True,
         ),
         RuleWords(
@@ -293,7 +293,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             question="Are all values finite, are bank and airspeed plausible, and is the ground never touched?",
             margin=Margin("largest bank", "deg", 10.0),
             urgency=4,
-            phrase=name_event,
+            phrase=event_phrase,
         ),
         RuleWords(
             name="completion",
@@ -301,7 +301,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             question="Was the plan feasible, flown to its last waypoint, and recorded completely and consistently?",
             margin=Margin("flown", "legs"),
             urgency=3,
-            phrase=name_event,
+            phrase=event_phrase,
         ),
     )
 }

@@ -20,7 +20,7 @@ from logs.verdict.measures.route_requirements import (
     performance_tables,
     slope_limit,
     steep_arc,
-    tighter_turn,
+    tighter_turn_limit,
     turn_lengths,
     turn_limit,
     turn_requirements,
@@ -282,7 +282,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
         next_points = points[local_corner + 1 :, :2] - points[local_corner, :2]
         points[local_corner + 1 :, :2] = points[local_corner, :2] + next_points @ np.array([[cos, -sin], [sin, cos]])
         trial = turn_requirements(nearby_route.with_fields(position=points), tables)
-        limit, _ = tighter_turn(requirements, corner, float(trial.limit[local_corner]))
+        limit, _ = tighter_turn_limit(requirements, corner, float(trial.limit[local_corner]))
         if limit >= math.radians(degrees):
             return degrees
         max_turn = min(max_turn, limit) - SUGGESTION_ANGLE_MARGIN_RAD
@@ -319,7 +319,7 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the commanded airspeed nearest to the current one at which the aircraft holds a leg's slope, m/s, or None.
+    """Return the nearest airspeed to command (m/s) at which the aircraft holds a leg's slope, or None.
 
     slope: absolute value of the slope, rad.
     """
@@ -337,7 +337,7 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest commanded airspeed, below the current one, at which a turn fits its legs, m/s, or None."""
+    """Return the highest lower airspeed to command (m/s) at which a turn fits its legs, or None."""
     current_speed = float(max(requirements.setup.demanded_route.leg_airspeeds[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(
@@ -415,7 +415,7 @@ def suggest_flying_lower(
 def suggest_staying_inside(
     _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest moving the path further inside the area."""
+    """Suggest moving the path further inside the scenario's area."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
     return ((Change("inset", FLIGHT, None, _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)

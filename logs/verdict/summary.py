@@ -144,7 +144,7 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Name each threat that the aircraft missed by less than its navigation error."""
+    """Return a note for each missile whose range was missed by less than the navigation error."""
     notes = []
     for finding in findings:
         facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}
@@ -197,7 +197,7 @@ def summary_lines(
 ) -> tuple[str, ...]:
     """Return the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
 
-    levels: answers of all levels; the last one is the verdict's own answer, whose headline is the first line.
+    levels: answers of all levels; the last answer is the verdict's own, whose headline is the first line.
     """
     *other_answers, own_answer = levels
     lines = [own_answer.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]

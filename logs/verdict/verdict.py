@@ -195,7 +195,10 @@ class Verdict:
         )
 
     def to_junit(self, name: str) -> str:
-        """Write the verdict as JUnit XML for continuous integration.  name: name of the judged plan or flight."""
+        """Return the verdict as JUnit XML for continuous integration.
+
+        name: name of the judged plan or flight.
+        """
         return junit_text({name: self.present()})
 
     def _repr_html_(self) -> str:

@@ -204,7 +204,7 @@ class ServedFlights:
         mission_judged = MissionJudged(request.number, True, can_arm, texts, home, items, start)
         return PreparedFlight(setup, flight.map), mission_judged
 
-    def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
+    def prepare_diversion(self, request: DivertFlight, position: Floats) -> PreparedFlight:
         """Prepare a flight in another mode, which starts at the current position.
 
         position: east, north and altitude, m, (3,).

@@ -28,11 +28,11 @@ from logs.verdict.returns.judge_returns import (
     Returns,
     ReturnWorld,
     SimulatedReturn,
-    badness,
+    can_start_in_jsbsim,
     classify_return,
-    is_reachable_start,
     limit_ratio,
     most_violated_zone,
+    worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import measured_text
@@ -179,7 +179,7 @@ def worst_separated_returns(
         if (
             is_near
             or starts.is_low[start_index]
-            or not is_reachable_start(world, start_rows[start_index])
+            or not can_start_in_jsbsim(world, start_rows[start_index])
             or not _is_lead_in_clear(world, start_rows[start_index])
         ):
             continue
@@ -191,7 +191,7 @@ def worst_separated_returns(
 
 def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
     """Return a sort key that puts the worst outcome first, and safe returns last, the closest to a limit first."""
-    return (KINDS.index("safe"), limit_ratio(candidate)) if candidate.safe else badness(candidate)
+    return (KINDS.index("safe"), limit_ratio(candidate)) if candidate.safe else worst_first_key(candidate)
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:

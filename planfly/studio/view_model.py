@@ -237,7 +237,9 @@ def verdict_json(verdict: Verdict) -> Json:
 
 def findings_json(verdict: Verdict) -> list[Json]:
     """Return page data of the failed and undecided findings, then of the finding closest to its limit for each rule."""
-    return [_finding_json(number, finding) for number, finding in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
+    return [
+        _finding_json(number, finding) for number, finding in verdict.present().findings_to_list(_MAX_LISTED_FINDINGS)
+    ]
 
 
 def _finding_json(number: int, finding: Finding) -> Json:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
-from logs.verdict.rules.survey_rule import lost_text, overlap_text
+from logs.verdict.rules.survey_rule import overlap_text, unusable_parts_text
 from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 
@@ -44,7 +44,7 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
     if measure is None:
         return f"line {number:<3} not flown"
     text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.usable:5.1f} % can be used"
-    loss_text = lost_text(measure)
+    loss_text = unusable_parts_text(measure)
     photos_text = f"; {measure.missed_photos} of {measure.photos} photos missed" if measure.missed_photos else ""
     return f"{text}{': ' if loss_text else ''}{loss_text}{photos_text}"
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from flight.autopilots.parameter_origin import ARDUPILOT, PX4, TITLES, other_autopilot, read_origin
+from flight.autopilots.parameter_origin import ARDUPILOT, PX4, TITLES, other_autopilot_error, read_origin
 from flight.mission.items import Mission
 from world.errors import MissionError, ParameterError
 from world.scenario import Scenario, with_flight
@@ -38,7 +38,9 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     if mission_autopilot != table.autopilot and table.autopilot in TITLES:
         if table.autopilot_from is None:
             raise MissionError.from_error(
-                other_autopilot(mission.source, mission_autopilot, _FIRMWARE_TEXTS[mission_autopilot], table.autopilot)
+                other_autopilot_error(
+                    mission.source, mission_autopilot, _FIRMWARE_TEXTS[mission_autopilot], table.autopilot
+                )
             )
         other_file = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
         allowed = "expected files of one autopilot"

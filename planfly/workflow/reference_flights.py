@@ -13,7 +13,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, with_reference
-from logs.verdict.measures.route_requirements import RouteRequirements, true_route
+from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import most_urgent_failure
 from logs.verdict.trials import least_change
@@ -118,7 +118,7 @@ def judge_airframe_flight(
     airspeeds, which are higher true airspeeds at a higher altitude.
     should_abort: see `judge_with_reference_flights`.
     """
-    airframe_route = true_route(setup)
+    airframe_route = true_airspeed_route(setup)
     trial = Trial(
         replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=airframe_route), aircraft, should_abort
     )

@@ -58,17 +58,17 @@ def describe_failed_arming_checks(
         if not lowest <= values[name] <= highest:
             limit_text = f"at least {lowest:g}" if math.isinf(highest) else f"at most {highest:g}"
             yield f"{name} {values[name]:g} prevents arming, which needs {limit_text}"
-    yield from _check_mission(parameters, values, mission)
-    yield from _check_pulses(values)
-    yield from _check_radio_failsafes(parameters, values)
+    yield from _describe_mission_faults(parameters, values, mission)
+    yield from _describe_pulse_faults(values)
+    yield from _describe_radio_failsafe_faults(parameters, values)
     for monitor in monitored_batteries(parameters):
-        yield from _check_battery(
+        yield from _describe_battery_faults(
             values, monitor, mission.full_voltage, has_current=measures_current(parameters, monitor)
         )
-    yield from _check_fences(parameters, values, mission)
+    yield from _describe_fence_faults(parameters, values, mission)
 
 
-def _check_mission(
+def _describe_mission_faults(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
     """Describe missing items and forbidden marks (`AP_Arming::mission_checks`, `AP_Arming_Plane::mission_checks`)."""
@@ -86,7 +86,7 @@ def _check_mission(
         yield f"ARMING_MIS_ITEMS {bits} prevents arming without a rally point"
 
 
-def _check_pulses(values: Mapping[str, float]) -> Iterator[str]:
+def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
     """Describe trims beyond their range (`AP_Arming::servo_checks`, `rc_calibration_checks`)."""
     outputs = [f"SERVO{output}" for output in range(1, _OUTPUT_COUNT + 1) if values[f"SERVO{output}_FUNCTION"] > 0.0]
     channels = [f"RC{channel}" for channel in range(1, RADIO_CHANNEL_COUNT + 1)]
@@ -97,7 +97,7 @@ def _check_pulses(values: Mapping[str, float]) -> Iterator[str]:
             yield f"{name}_TRIM {trim:g} prevents arming, which needs {range_text}"
 
 
-def _check_radio_failsafes(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
+def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
     """Describe a radio failsafe at idle throttle, and timeouts in the wrong order.
 
     At idle `Plane::rc_failsafe_active` sees no radio up to THR_FS_VALUE, or from there with a reversed channel, and
@@ -118,7 +118,7 @@ def _check_radio_failsafes(parameters: ArduPilotParameters, values: Mapping[str,
         yield f"FS_LONG_TIMEOUT {long_timeout:g} prevents arming in ArduPlane 4.6, which needs {limit_text}"
 
 
-def _check_battery(
+def _describe_battery_faults(
     values: Mapping[str, float], monitor: str, full_voltage: float, *, has_current: bool
 ) -> Iterator[str]:
     """Describe thresholds of a monitor that a full battery does not meet (`AP_BattMonitor_Backend::arming_checks`)."""
@@ -138,7 +138,9 @@ def _check_battery(
             yield f"{monitor}_{level}_VOLT {voltage:g} prevents arming, which needs {limit_text}"
 
 
-def _check_fences(parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts) -> Iterator[str]:
+def _describe_fence_faults(
+    parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
+) -> Iterator[str]:
     """Describe a fence without limits, with unusable limits, or not around home (`AC_Fence::pre_arm_check`)."""
     kinds = int(parameters.fence_type)
     has_mission_fence = bool(kinds & _MISSION_FENCE_BIT and mission.has_fence)

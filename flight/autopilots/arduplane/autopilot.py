@@ -40,7 +40,7 @@ from flight.autopilots.parts import (
     SpeedRules,
     TurnRules,
 )
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.ground_ways import Approach, GroundPhases, TakeOff
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
@@ -228,7 +228,7 @@ class ArduPlane(Autopilot):
 
         It is WP_RADIUS for a right angle, a fraction of WP_RADIUS for a smaller turn, and more in thin air.
         """
-        factor = float(true_by_equivalent(amsl))
+        factor = float(eas_to_tas_ratio(amsl))
         return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
 
     @property
@@ -537,11 +537,11 @@ def read_loiter_radius(loiter: Loiter) -> float:
 
 
 def _radius_growth(up: float) -> float:
-    """Return the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level.
+    """Return the ratio of a loiter's radius at an altitude (m AMSL) to the radius at sea level.
 
     The ratio is the square of the ratio of true to equivalent airspeed.
     """
-    return float(true_by_equivalent(up)) ** 2
+    return float(eas_to_tas_ratio(up)) ** 2
 
 
 def _mission_notes(parameters: ArduPilotParameters) -> list[str]:

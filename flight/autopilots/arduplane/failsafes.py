@@ -116,7 +116,7 @@ def failsafe_causes(
 
 
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
-    """Return the reactions to a low and a critical battery, for each battery monitor that is on.
+    """Return the reactions to a low and a critical battery, for BATT and for each other battery monitor that is on.
 
     The reaction is "never" without a monitor or without a threshold that the monitor can reach.
     """

@@ -100,7 +100,8 @@ def fly_go_arounds(
     """Simulate n go-arounds, each from a start on a landing glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    end_altitude, pitch: altitude above which the climb ends, m AMSL, and pitch angle during the climb, rad.
+    end_altitude: altitude above which the climb ends, m AMSL.
+    pitch: pitch angle during the climb, rad.
     landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  If the
         sequence contains a loiter, the go-around ends there, after one circle.
 
@@ -122,11 +123,10 @@ def fly_go_arounds(
     (True, True, True)
     """
     results = np.zeros(len(starts), RETURN_RESULT)
-    record, climb_parameters, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
-    climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
-    climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
+    record, climb = parameters.record(), _make_climb(parameters, end_altitude)
 
     def fly(k: int, landing: LandingStart) -> Floats:
+        """Simulate go-around `k` to a landing sequence, fill its result, and return its positions, m, (t, 3)."""
         stages = np.concatenate([waypoint_ahead(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
         stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
@@ -135,7 +135,7 @@ def fly_go_arounds(
             starts[k],
             stages,
             record,
-            climb_parameters,
+            _climb_parameters(parameters, pitch),
             climb,
             aircraft.record,
             aircraft.excess,
@@ -166,6 +166,14 @@ def fly_go_arounds(
     return GoArounds(results, tuple(track for track, _ in flights), tuple(landing for _, landing in flights))
 
 
+def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
+    """Return the `CLIMB` record of a go-around, whose climb ends above an altitude, m AMSL."""
+    climb: Record = np.zeros(1, CLIMB)[0]
+    climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
+    climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
+    return climb
+
+
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
     """Return the control parameters of the climb: TECS_SPDWEIGHT 2, and both pitch limits at ``pitch`` (rad)."""
     climb_parameters = parameters.record()
@@ -176,7 +184,7 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """Return the stops of a landing sequence up to its first loiter, as n `WAYPOINT` records."""
+    """Return n `WAYPOINT` records, one for each stop of a landing sequence up to its first loiter."""
     stops = truncate_at_first_loiter(sequence)
     stages: Records = np.zeros(len(stops), WAYPOINT)
     for stage, stop in zip(stages, stops, strict=True):

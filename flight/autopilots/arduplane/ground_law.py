@@ -37,7 +37,7 @@ from flight.autopilots.arduplane.tecs import (
     update_tecs,
 )
 from flight.dynamics.instructions import Code
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path
 from flight.simulation.compiled_loop import advance_model, read_state
@@ -297,7 +297,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
     """Set the commands for one tick of the take-off; once the take-off is complete, begin the first leg."""
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
-    eas2tas = true_by_equivalent(estimated.up)
+    eas2tas = eas_to_tas_ratio(estimated.up)
     # The track is measured against the path only after the take-off.
     work.memory.leg, work.memory.distance = ground.leg, pieces[0].start
     work.memory.cross_track, work.memory.height_error = 0.0, 0.0
@@ -453,7 +453,7 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
     """
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
-    eas2tas = true_by_equivalent(estimated.up)
+    eas2tas = eas_to_tas_ratio(estimated.up)
     work.memory.is_finished = False
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:

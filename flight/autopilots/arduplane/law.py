@@ -9,7 +9,7 @@ from flight.autopilots.arduplane.navigator import navigate_legs, target_position
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, IMMEDIATE_CLIMB
 from flight.autopilots.arduplane.tecs import airspeed_target, limited_nav_roll, update_tecs
 from flight.dynamics.instructions import Code
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
@@ -425,7 +425,7 @@ def control_as_ardupilot(
     guidance.height_error = estimated.up - profile_at(nodes, guidance.distance)[0]
     if guidance.is_finished and target.loiters_to_altitude:
         guidance.height_error = estimated.up - target.up
-    eas2tas = true_by_equivalent(estimated.up)
+    eas2tas = eas_to_tas_ratio(estimated.up)
     if not memory.is_initialised:
         initialise_memory(state, estimated, waypoints, guidance, parameters, memory)
     memory.time_to_update -= dt

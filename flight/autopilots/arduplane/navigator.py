@@ -17,7 +17,7 @@ import math
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.parameters import CLIMB_BEFORE_TURN
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
@@ -171,7 +171,7 @@ def _follow_line(
 
 @inner
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
-    """Return L1's angle, rad; in a turn of almost 180 degrees, the last angle if the new one would reverse the turn.
+    """Return L1's angle, rad, or the last angle if the new one would reverse a turn of almost 180 degrees.
 
     Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the heading.
 
@@ -286,7 +286,7 @@ def _update_loiter(
 
     loiter: waypoint on the loiter; its loiter_radius is the radius at the altitude of the waypoint.
     """
-    eas2tas_ratio = eas2tas / true_by_equivalent(loiter.up)
+    eas2tas_ratio = eas2tas / eas_to_tas_ratio(loiter.up)
     radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
     if not memory.loiter_started and distance > _APPROACH_LINE_RADII_RATIO * radius:

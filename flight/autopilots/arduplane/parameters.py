@@ -482,7 +482,7 @@ class ArduPilotParameters(ParameterSet):
         return {name: value for name, value in values.items() if name not in _NEEDED_BY_AIRCRAFT}
 
     @classmethod
-    def _without_unknown(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
+    def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
         """Return the sources without the parameters that release 4.6 lacks, and the names removed from the file.
 
         For 4.6 a further source states the fixed values that 4.6 uses; other releases have all parameters.

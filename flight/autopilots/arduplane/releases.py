@@ -11,7 +11,7 @@ from typing import NamedTuple, get_args
 
 from flight.autopilots.arduplane.parameters import TABLE
 from flight.autopilots.arduplane.renamed_parameters import NAMES_BEFORE_4_7, NAMES_SINCE_4_7, describe_renamed
-from flight.autopilots.file_releases import FileRelease, choose_for_file, commented_release, nearest_release
+from flight.autopilots.file_releases import FileRelease, choose_release_for_file, commented_release, nearest_release
 from flight.autopilots.parameter_files import MAX_BYTES, parse_parameters
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
@@ -23,9 +23,9 @@ _PROGRAM_RELEASE = re.compile(r"\bV?(\d{1,2})\.(\d{1,2})")
 
 
 def simulated_release(program: str) -> ArduPlaneVersion:
-    """Return the simulated release for a program: the newest one that is not newer than the program's release.
+    """Return the simulated release for a program: the newest that is not newer than the program's release.
 
-    It is the oldest simulated release for an older program, and the newest one if the program states no release.
+    For an older program return the oldest simulated release, and for a program without a stated release the newest.
 
     >>> programs = ("ArduPlane V4.5.7", "ArduPlane V4.6.3 (3fc7011a)", "ArduPlane V4.7.0-dev", "ArduPilot")
     >>> [simulated_release(program) for program in programs]
@@ -91,7 +91,7 @@ def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> Relea
     text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
     names = list(parse_parameters(text, params))
     found = file_release(text, names)
-    version, notes = choose_for_file(_VERSIONS, stated, found, params, "ArduPlane")
+    version, notes = choose_release_for_file(_VERSIONS, stated, found, params, "ArduPlane")
     if renamed := describe_renamed(names, TABLE.by_any_name, version):
         notes = (*notes, f"{params}: {renamed}")
     return ReleaseChoice(version, notes)

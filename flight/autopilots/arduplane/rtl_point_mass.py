@@ -36,7 +36,7 @@ from flight.autopilots.arduplane.tecs import (
     wind_up_ste_integrator,
 )
 from flight.dynamics.state import STATE
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
@@ -271,7 +271,7 @@ def truncate_at_first_loiter(stops: Sequence[LandingStart]) -> Sequence[LandingS
 
 
 def fill_stage(stage: Record, stop: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Fill the record of a stage from a stop of a landing sequence, which is a waypoint or the center of a loiter."""
+    """Fill a stage's record from a stop of a landing sequence: a waypoint, or the center of a loiter."""
     stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = stop.position
     stage.pass_by, stage.home_up = stop.pass_by, stop.home_up
     # The turn to the next leg is unknown: use a right angle, as at a mission's end.
@@ -326,12 +326,12 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate the flight from stage to stage for at most ``timeout`` s, and fill in ``result``.
+    """Simulate the flight from stage to stage for at most ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    climb, climb_parameters: climb at the start, a record of `CLIMB`, and the control parameters during the climb.
+    climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions, result: (t, 3) array to fill with one position per second, until full, and a record of `RETURN_RESULT`.
+    positions: array (t, 3), m, to fill with one position per second until it is full.
     """
     # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
@@ -348,7 +348,7 @@ def fly_stages(
         time = tick * dt
         if tick % STORED_EVERY_TICKS == 0:
             _store_position(estimated, positions, result)
-        eas2tas, is_last = true_by_equivalent(estimated.up), stage + 1 == stages.shape[0]
+        eas2tas, is_last = eas_to_tas_ratio(estimated.up), stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
         if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):

@@ -18,7 +18,7 @@ MIN_ROLL_LIMIT_RAD = math.radians(25.0)
 
 @inner
 def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> float:
-    """Return the bank that gives a lateral acceleration (m/s^2), rad, limited to ROLL_LIMIT_DEG.
+    """Return the bank (rad) for a lateral acceleration (m/s^2), limited to ROLL_LIMIT_DEG.
 
     Follows `AP_L1_Control::nav_roll_cd`.
 
@@ -46,7 +46,7 @@ def min_airspeed(bank: float, parameters: Record) -> float:
 
 @inner
 def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank: float) -> float:
-    """Return the maximum bank at which the wing does not stall at an airspeed, rad, but at least ``min_bank``.
+    """Return the maximum bank (rad) without a stall at an airspeed, but at least ``min_bank``.
 
     airspeed: m/s.
     min_level_airspeed: minimum airspeed in straight flight, m/s; both airspeeds are equivalent, or both are true.
@@ -58,7 +58,7 @@ def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank:
 
 @inner
 def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
-    """Return the bank that gives a lateral acceleration (m/s^2), rad, limited to ROLL_LIMIT_DEG and by the stall.
+    """Return the bank (rad) for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall.
 
     Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
 

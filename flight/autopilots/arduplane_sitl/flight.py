@@ -72,7 +72,7 @@ class AutopilotFlight(SitlFlight):
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
             self._hold_during(self._preflight.identify(flight_parameters.values))
-            program = _program_of_messages(self._link, digest, flight_parameters)
+            program = _reported_program(self._link, digest, flight_parameters)
             flown_autopilot = autopilot.in_release(simulated_release(program.version))
             self.setup = replace(setup, autopilot=replace(flown_autopilot, program=program))
             self._stack = stack.pop_all()
@@ -104,7 +104,7 @@ class AutopilotFlight(SitlFlight):
             yield
 
 
-def _program_of_messages(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
+def _reported_program(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
     """Return the description of the program that flew, from the messages that it sent."""
     reported = link.reported
     known = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}

@@ -144,7 +144,7 @@ def guide(
         bank = _field_bank_command(estimated, pieces[memory.piece].curvature, gains, memory, course, dt)
     else:
         bank = _cross_track_bank_command(state, estimated, pieces, gains, memory, course, dt)
-    steer_height(state, estimated, nodes, gains, memory, commands, course, dt)
+    follow_altitude_profile(state, estimated, nodes, gains, memory, commands, course, dt)
     steer_bank(state, gains, memory, commands, bank, dt)
 
 
@@ -177,7 +177,9 @@ def _cross_track_bank_command(
     turn_acceleration = (
         future_speed * future_speed * mean_curvature(pieces, piece, start, start + speed * gains.turn_smoothing)
     )
-    offset_correction = _correct_roll_offset(pieces[piece].curvature, gains, memory, turn_acceleration, speed, crab, dt)
+    offset_correction = _roll_offset_correction(
+        pieces[piece].curvature, gains, memory, turn_acceleration, speed, crab, dt
+    )
     correction = _lateral_correction(state, estimated, gains, memory, speed, course_error, crab, dt)
     # The bank lags, so the correction leads.  A longer tick itself adds lag: with the full lead the aircraft would
     # oscillate in roll (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
@@ -186,7 +188,7 @@ def _cross_track_bank_command(
     correction += offset_correction + gains.push_lead * min(1.0, (FULL_LEAD_TICK_S / dt) ** 2) * correction_rate
     lift_acceleration = GRAVITY + memory.slope_acceleration
     bank_demand = math.atan((turn_acceleration + correction) / (lift_acceleration * crab))
-    bank_demand = _limit_nose_angle(bank_demand, wrap(state.yaw - course), memory.max_bank)
+    bank_demand = _limit_bank_by_nose_angle(bank_demand, wrap(state.yaw - course), memory.max_bank)
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     max_path_curvature = max_curvature(pieces, piece, distance, distance + speed * gains.arc_slowing_time)
     memory.max_arc_speed = math.sqrt(
@@ -202,7 +204,7 @@ def _cross_track_bank_command(
 
 
 @inner
-def _limit_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
+def _limit_bank_by_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
     """Return the bank demand, reduced if it would turn the nose too far from the course, rad.
 
     At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  A larger angle would not help against a
@@ -218,7 +220,7 @@ def _limit_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) ->
 
 
 @inner
-def _correct_roll_offset(
+def _roll_offset_correction(
     curvature: float, gains: Record, memory: Record, turn_acceleration: float, speed: float, crab: float, dt: float
 ) -> float:
     """Return the acceleration to the right (m/s^2) that corrects the offset caused by rolling into and out of arcs.
@@ -308,7 +310,7 @@ def _unexplained_acceleration(
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:
-    """Return the bank command of L1, rad, and switch to the next leg if L1 has reached the waypoint."""
+    """Return the bank command of L1 (rad), and switch to the next leg if L1 has reached the waypoint."""
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     l1_distance = l1_length(speed, gains.l1_period, damping)
@@ -353,7 +355,7 @@ def _field_bank_command(
 
 
 @inner
-def steer_height(
+def follow_altitude_profile(
     state: Record,
     estimated: Record,
     nodes: Records,
@@ -363,7 +365,7 @@ def steer_height(
     course: float,
     dt: float,
 ) -> None:
-    """Set the elevator to follow the altitude profile, and the throttle to hold the airspeed.
+    """Set the elevator to follow the path's altitude profile, and the throttle to hold the airspeed.
 
     course: course of the path at the aircraft, rad.
     """

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple, Self, get_args
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
-from flight.autopilots.file_releases import choose_for_file, commented_release
+from flight.autopilots.file_releases import choose_release_for_file, commented_release
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
@@ -31,7 +31,7 @@ from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
 from flight.autopilots.px4.open_settings import describe_open_settings
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import LANDINGS, Command
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
@@ -155,7 +155,7 @@ class Px4(Autopilot):
             file = Path(table.params)
             text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
             found = commented_release(text, "PX4")
-        version, notes = choose_for_file(_VERSIONS, table.px4_version, found, str(table.params), "PX4")
+        version, notes = choose_release_for_file(_VERSIONS, table.px4_version, found, str(table.params), "PX4")
         return cls(Px4Parameters.load(aircraft, table.params, version, notes))
 
     @classmethod
@@ -343,7 +343,7 @@ class Px4(Autopilot):
                 math.pi * parameters["NPFG_ROLL_TC"] / parameters["NPFG_DAMPING"] * parameters["NPFG_PERIOD_SF"]
             )
             period = max(period, min_period)
-        speed = parameters["FW_AIRSPD_TRIM"] * float(true_by_equivalent(amsl))
+        speed = parameters["FW_AIRSPD_TRIM"] * float(eas_to_tas_ratio(amsl))
         switch_distance = parameters["NPFG_SW_DST_MLT"] * period * parameters["NPFG_DAMPING"] * speed
         return max(parameters["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE_M, switch_distance), 6))
 

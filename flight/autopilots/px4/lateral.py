@@ -26,7 +26,7 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 
 @inner
-def feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bearing: float) -> float:
+def bearing_feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bearing: float) -> float:
     """Return the feasibility of a course, 0..1: 1 with enough airspeed, 0 if the wind is too strong for the course.
 
     Follows `bearingFeasibility`.
@@ -89,7 +89,7 @@ def adapted_period(
     """Return the period of the guidance on a track, s: long enough for the roll lag, short enough for a curve in wind.
 
     curvature: curvature of the track, 1/m.
-    track_feasibility: feasibility of the track's course, 0..1; see `feasibility`.
+    track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
     track_proximity: 0 far from the track, 1 on the track.
     """
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
@@ -180,7 +180,7 @@ def guide_to_path(
     track_error = tangent_north * offset_east - tangent_east * offset_north
     wind_cross_track = wind_east * tangent_north - wind_north * tangent_east
     wind_dot_track = wind_east * tangent_east + wind_north * tangent_north
-    track_feasibility = feasibility(airspeed, wind_cross_track, wind_dot_track)
+    track_feasibility = bearing_feasibility(airspeed, wind_cross_track, wind_dot_track)
     damping = parameters.npfg_damping
     error_bound = track_error_bound(ground_speed, straight_track_period(parameters) * damping)
     look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(track_error) / error_bound)) ** 2
@@ -196,7 +196,7 @@ def guide_to_path(
     bearing_north = math.cos(look_ahead_angle) * side * tangent_east + math.sin(look_ahead_angle) * tangent_north
     wind_cross_bearing = wind_east * bearing_north - wind_north * bearing_east
     wind_dot_bearing = wind_east * bearing_east + wind_north * bearing_north
-    course_feasibility = feasibility(airspeed, wind_cross_bearing, wind_dot_bearing)
+    course_feasibility = bearing_feasibility(airspeed, wind_cross_bearing, wind_dot_bearing)
     min_airspeed = math.hypot(parameters.min_ground_speed - wind_dot_bearing, wind_cross_bearing)
     ground_speed_on_bearing = wind_dot_bearing + math.sqrt(
         max(0.0, target_airspeed * target_airspeed - wind_cross_bearing * wind_cross_bearing)
@@ -324,6 +324,6 @@ def follow_loiter(
 
 @inner
 def roll_setpoint(lateral_acceleration: float, parameters: Record) -> float:
-    """Return the roll setpoint that gives a lateral acceleration (m/s^2), rad, limited to FW_R_LIM."""
+    """Return the roll setpoint (rad) that gives a lateral acceleration (m/s^2), limited to FW_R_LIM."""
     roll = math.atan(lateral_acceleration / GRAVITY)
     return min(parameters.roll_limit, max(-parameters.roll_limit, roll))

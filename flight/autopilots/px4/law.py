@@ -13,7 +13,7 @@ from flight.autopilots.px4.navigator import find_target, is_last_target, navigat
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
 from flight.dynamics.instructions import Code
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
 from flight.simulation.compiled_loop import advance_model, read_state
@@ -164,7 +164,7 @@ def control_as_px4(
     """
     find_on_path(estimated, pieces, guidance)
     guidance.height_error = estimated.up - profile_at(nodes, guidance.distance)[0]
-    eas_to_tas = true_by_equivalent(estimated.up)
+    eas_to_tas = eas_to_tas_ratio(estimated.up)
     if not memory.is_initialised:
         _initialise_memory(state, estimated, waypoints, guidance, parameters, memory, eas_to_tas)
     commanded_airspeed = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[memory.leg].airspeed))

@@ -108,7 +108,7 @@ def navigate(
 
 @inner
 def find_target(waypoints: Records, memory: Record) -> int:
-    """Return the index of the target waypoint: the next one that is not a gate."""
+    """Return the index of the target: the next waypoint that is not a gate."""
     target_index: int = memory.leg + 1
     while waypoints[target_index].is_gate:
         target_index += 1
@@ -249,7 +249,7 @@ def is_last_target(waypoints: Records, memory: Record) -> bool:
 
 @inner
 def _setpoint_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of the position setpoint of a waypoint, m: the waypoint, or the center of its loiter."""
+    """Return east and north of a waypoint's position setpoint, m: the waypoint, or its loiter's center."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0

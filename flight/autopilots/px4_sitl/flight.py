@@ -75,7 +75,7 @@ class Px4Flight(SitlFlight):
                 else NEWEST_PX4
             )
             flown_autopilot = replace(
-                autopilot.in_release(version), program=_program_of_messages(link, digest, flight_parameters)
+                autopilot.in_release(version), program=_reported_program(link, digest, flight_parameters)
             )
             self.setup = replace(setup, autopilot=flown_autopilot)
             self._stack = stack.pop_all()
@@ -116,7 +116,7 @@ def _has_started(process: AutopilotProcess) -> bool:
     return any(STARTED in line for line in process.lines())
 
 
-def _program_of_messages(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:
+def _reported_program(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:
     """Return the description of the program that flew, from the messages that it sent."""
     reported = link.reported
     unknown = parameters.changed.keys() - reported.parameters.keys()

@@ -23,7 +23,7 @@ from flight.autopilots.sitl.exchange import (
     Lockstep,
     RailEnd,
     position_on_sphere,
-    to_body,
+    to_body_axes,
 )
 from flight.autopilots.sitl.servos import ServoMap
 from flight.dynamics.fdm import Fdm
@@ -95,7 +95,7 @@ class Sensors:
     def sensor_message(self, motion: BodyMotion) -> Any:
         """Return HIL_SENSOR with the readings of inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
-        field = to_body((motion.roll, motion.pitch, motion.yaw), self._field)
+        field = to_body_axes((motion.roll, motion.pitch, motion.yaw), self._field)
         pressure, temperature, density = atmosphere(self._home[2] - motion.down)
         return mavlink.MAVLink_hil_sensor_message(
             round(motion.time * 1e6),

@@ -175,7 +175,7 @@ def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tupl
         acceleration * direction_east,
         -acceleration * sin_incline - GRAVITY,
     )
-    force = to_body((end.roll, end.pitch, end.yaw), specific_force)
+    force = to_body_axes((end.roll, end.pitch, end.yaw), specific_force)
     airspeed = math.hypot(velocity_north - end.wind_north, velocity_east - end.wind_east, velocity_down)
     return BodyMotion(
         time,
@@ -196,12 +196,14 @@ def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tupl
     )
 
 
-def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, float]) -> tuple[float, float, float]:
+def to_body_axes(
+    attitude: tuple[float, float, float], vector: tuple[float, float, float]
+) -> tuple[float, float, float]:
     """Return the body-axis components of a vector given by its north, east and down components.
 
     attitude: roll, pitch and yaw, rad.
 
-    >>> [round(value, 3) for value in to_body((0.0, 0.0, math.pi / 2), (1.0, 0.0, 9.8))]
+    >>> [round(value, 3) for value in to_body_axes((0.0, 0.0, math.pi / 2), (1.0, 0.0, 9.8))]
     [0.0, -1.0, 9.8]
     """
     (roll, pitch, yaw), (north, east, down) = attitude, vector

@@ -150,7 +150,7 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
 
 @inner
 def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, float]:
-    """Return the signed distances of the aircraft to the right of the last leg, and past the end of this leg, m."""
+    """Return the cross-track distance from the last leg (right positive) and the distance past its end, m."""
     start, end = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(end.east - start.east, end.north - start.north)
     east, north = (end.east - start.east) / length, (end.north - start.north) / length

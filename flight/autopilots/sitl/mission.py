@@ -37,7 +37,7 @@ class UploadedMission:
     """Mission as it is uploaded to the autopilot.
 
     home: home position; alt is AMSL.
-    items: items numbered from 1; the last one is the extra waypoint, or the item that ends the autopilot's mission.
+    items: items numbered from 1; the last item is the extra waypoint, or the item that ends the autopilot's mission.
     rally: rally points for an RTL, numbered from 0; empty without an RTL.
     last: number of the item at which the last leg begins; 0 for the last item.
     """

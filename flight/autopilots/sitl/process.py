@@ -27,9 +27,9 @@ _PR_SET_PDEATHSIG = 1
 
 
 def check_binary(binary: Path, kind: str) -> str:
-    """Return the SHA-256, as hex, of an autopilot's program.
+    """Check that an autopilot's program can be run, and return its SHA-256 as hex.
 
-    Raises FlightError, in one line, if the file cannot be run.
+    Raises FlightError, in one line, if the program cannot be run.
 
     kind: name of the expected autopilot.
 

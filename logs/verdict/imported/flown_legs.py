@@ -9,7 +9,7 @@ from flight.mission.route import part_of_route
 from flight.simulation.setup import FlightSetup, Gap, MissionStretch
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.measures.track_alignment import AlignedTrack, align_track, approaches
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track, closest_approaches
 from logs.verdict.tolerances import (
     CAPTURE_RADIUS_M,
     FINAL_WAYPOINT_TOLERANCE_M,
@@ -42,7 +42,7 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs flown in a stretch; return None if there are none.
+    """Find the legs flown in a stretch of the log that follows the mission; return None if there are none.
 
     A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  Its legs begin at the first
     waypoint that was passed, because the path to that waypoint is not a leg.  They end at the last waypoint that was
@@ -101,9 +101,10 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, waypoint_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align a track with only the first laps of a route that repeats its items, if these laps explain the flight.
+    """Align a track with the earliest laps that explain the flight, on a route that repeats its items.
 
-    A flight that ended within a lap was equally near to the waypoints of any later lap.
+    A flight that ended within a lap was equally near to the waypoints of any later lap.  Return `aligned` and
+    `waypoint_indices` unchanged if no shorter route explains the flight.
     """
     items, last = setup.route.items, int(waypoint_indices[-1])
     if len(waypoint_indices) == last - waypoint_indices[0] + 1:
@@ -211,11 +212,11 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
 
 
 def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's minimum horizontal distance from the flight, m, and the time of this minimum, s, (w,)."""
+    """Return each waypoint's minimum horizontal distance (m) from the flight, and its time (s), (w,) each."""
     min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in tracks:
         for k, point in enumerate(points):
-            distance, _ = approaches(rows.position, point)
+            distance, _ = closest_approaches(rows.position, point)
             row = int(np.argmin(distance))
             if distance[row] < min_distances[k]:
                 min_distances[k], times[k] = float(distance[row]), float(rows.time[row])

@@ -121,7 +121,7 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
 
 
 def heights_text(source: ImportedLog) -> str:
-    """Describe the height that was used, its datum, and the offsets of the log's other heights at the start.
+    """Describe a log's altitude source, its datum, and the offsets of other altitudes at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
@@ -256,7 +256,11 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     unjudged_text = "; ".join(
         filter(
             None,
-            [_missing_part_text(findings, source.missing), _pauses_text(flown_stretches), _uncertainty_text(findings)],
+            [
+                _missing_part_text(findings, source.missing),
+                _pauses_text(flown_stretches),
+                _undecided_part_text(findings),
+            ],
         )
     )
     flyable = bool(flown_stretches) and not has_failed and not unjudged_text
@@ -315,8 +319,8 @@ def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
     return float(time[0]), float(time[-1])
 
 
-def _uncertainty_text(findings: Sequence[Finding]) -> str:
-    """Name the findings that are undecided because the aircraft's model is uncertain; return "" if there are none."""
+def _undecided_part_text(findings: Sequence[Finding]) -> str:
+    """Describe the findings that leave the verdict undecided; return "" if there are none."""
     text = undecided_text(findings)
     return f"not judged in full: {text}" if text else ""
 
@@ -325,7 +329,7 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch, and number its legs and waypoints as in the whole route."""
     findings = []
     for finding in track_findings(legs.requirements, legs.aligned):
-        checked_finding = _check_gaps(_check_data(setup, legs, finding), legs)
+        checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
         if legs.partial:
             checked_finding = _unjudge_if_unreached(checked_finding, legs)
         findings.append(_renumber_place(checked_finding, legs.first, setup))
@@ -353,7 +357,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
     return findings
 
 
-def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
+def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
     """Mark a finding as not judged if the log lacks data that its rule needs."""
     source = setup.source
     if source is None:
@@ -400,7 +404,7 @@ def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = Fa
     return replace(finding, ok=None, reason=reason, brief=cause, placed=False, margin=None, facts=facts, suggestions=())
 
 
-def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
+def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     """Mark a passed finding as not judged if the log has a pause on its leg, or on the legs at its waypoint."""
     if finding.ok is not True or finding.place.index is None or finding.place.kind not in ("leg", "waypoint"):
         return finding

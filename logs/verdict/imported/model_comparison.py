@@ -10,7 +10,7 @@ from flight.simulation.setup import FlightSetup, MissionStretch
 from flight.simulation.track import ROLL, THROTTLE, Track
 from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.measures.track_alignment import AlignedTrack, align_track, along_across
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track, project_onto_leg
 from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
 from world.arrays import Floats
 from world.errors import LogError
@@ -202,7 +202,7 @@ def _flight_profile(
             parts.append(np.full((len(fields(Profile)), len(leg_distances)), math.nan))
             continue
         rows = aligned.leg_rows(leg)
-        distance_along, lateral_offset = along_across(requirements, leg, track.position[rows])
+        distance_along, lateral_offset = project_onto_leg(requirements, leg, track.position[rows])
         # If a flight goes back, as on a loiter, the first pass applies.
         is_forward = np.concatenate([[True], distance_along[1:] > np.maximum.accumulate(distance_along)[:-1]])
         line_altitude = requirements.points[leg, 2] + distance_along * math.tan(requirements.slopes[leg])
@@ -229,7 +229,7 @@ def _flight_profile(
 
 
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
-    """Compare one leg of two profiles: the flown one, then the simulated one.
+    """Compare one leg of the flown profile with the same leg of the simulated profile.
 
     leg: number of the leg in the whole route.  rows: points of the profiles on the leg.
     """

@@ -16,7 +16,7 @@ from logs.verdict.measures.route_requirements import (
     performance_tables,
     sharpest_fly_over_turn,
     slope_limit,
-    tighter_turn,
+    tighter_turn_limit,
     turn_requirements,
 )
 from logs.verdict.tolerances import (
@@ -87,7 +87,7 @@ def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
 
 
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Return the half width of the corridor along a leg, m, and the name of its source.
+    """Return the half width (m) of the corridor along a leg, and the name of its source.
 
     A corridor that the scenario does not state is wide enough for the planned turns at the leg's ends.  At a loiter
     that the autopilot joins and leaves by its center, the corridor includes the whole loiter and a turn back next to
@@ -124,7 +124,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
-    """Return the maximum horizontal distance of any point from its nearest leg, m, and the row of that point.
+    """Return the maximum horizontal distance (m) of any point from its nearest leg, and the point's row.
 
     points: (n, 3).  legs: (k + 1, 3), the ends of k consecutive legs.
 
@@ -149,10 +149,11 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 # both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
 
 
-def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
-    """Return how far a flyable path without waypoint i passes from the waypoints that it omits, m, or None without one.
+def negligible_kink_distance(requirements: RouteRequirements, i: int) -> float | None:
+    """Return the distance at which a flyable shortcut passes waypoint i and its omitted neighbours, m.
 
-    The path omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.
+    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is measured
+    from the farthest of them.  Return None if there is no such shortcut.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
@@ -165,7 +166,7 @@ def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
 
 
 def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
-    """Return how far the straight path past the waypoints first..last passes from the farthest of them, m.
+    """Return the largest distance (m) of the waypoints first..last from the straight path that omits them.
 
     Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
     if the path is vertical, or if there is no room for the turns at its ends.
@@ -186,7 +187,7 @@ def shortcut_distance(requirements: RouteRequirements, first: int, last: int) ->
 def _distance_from_leg(point: list[float], start: list[float], end: list[float]) -> float:
     """Return the horizontal distance of a point (east, north) from a leg, m.
 
-    For one point, `farthest_from_legs` takes ten times as long.
+    For one point, this is ten times faster than `farthest_from_legs`.
     """
     leg_east, leg_north = end[0] - start[0], end[1] - start[1]
     east, north = point[0] - start[0], point[1] - start[1]
@@ -210,7 +211,7 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
     for new_corner, old_corner in ((before - start, before), (first - start, after)):
         if not 0 < old_corner < requirements.legs:
             continue
-        limit, _ = tighter_turn(requirements, old_corner, float(turns.limit[new_corner]))
+        limit, _ = tighter_turn_limit(requirements, old_corner, float(turns.limit[new_corner]))
         if abs(float(turns.turns[new_corner])) > limit + PLAN_TOLERANCE_RAD:
             return False
     return True
@@ -219,7 +220,7 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
 def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, after: int) -> bool:
     """Return True if the turn at a corner between two other waypoints fits their legs, without neighbouring turns.
 
-    `_gap_has_room` takes ten times as long as this necessary condition.  The first and last waypoint have no turn.
+    This necessary condition is ten times faster than `_gap_has_room`.  The first and last waypoint have no turn.
     """
     route = requirements.setup.route
     if not 0 < corner < requirements.legs:
@@ -240,7 +241,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
         aircraft_limit = sharpest_fly_over_turn(run_out / radius)
     else:
         aircraft_limit = 2.0 * math.atan(min(run_in, run_out) / radius)
-    limit, _ = tighter_turn(requirements, corner, aircraft_limit)
+    limit, _ = tighter_turn_limit(requirements, corner, aircraft_limit)
     return abs(math.remainder(course_out - course_in, 2.0 * math.pi)) <= limit + PLAN_TOLERANCE_RAD
 
 
@@ -257,8 +258,8 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
     """Return the height of a leg's step, m, positive, or None if it exceeds `NEGLIGIBLE_STEP_M`.
 
-    The leg exceeds its slope limit.  A sequence of legs that is too steep overall and includes this leg is one step:
-    the height of a staircase is the total height of its stairs.
+    This applies to a leg that exceeds its slope limit.  A sequence of legs that is too steep overall and includes this
+    leg is one step: the height of a staircase is the total height of its stairs.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0

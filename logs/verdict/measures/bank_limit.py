@@ -9,10 +9,10 @@ _SAME_BANK_RAD = 1e-6
 
 
 def bank_limit_text(setup: FlightSetup) -> str:
-    """Return the bank limit of a setup, and who sets it.
+    """Return a text on a setup's bank limit and its source, such as "the aircraft's bank limit of 29°".
 
-    The limit is the lowest of the aircraft's, the autopilot's and the scenario's. A mission that came without a
-    scenario has no limit of a scenario.
+    The source is the aircraft, the autopilot or the scenario, if there is a scenario.  The text begins with "a" if
+    none of their limits equals the setup's limit.
 
     >>> from logs.recording.example_log import example_log
     >>> bank_limit_text(example_log().setup)

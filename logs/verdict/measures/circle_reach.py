@@ -50,7 +50,7 @@ def find_hazards(
 
 
 def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
-    """Return the reach of the loiter after a mission's last waypoint, m, and descriptions of the hazards within reach.
+    """Return the reach (m) of the loiter after the last waypoint, and texts on the hazards within reach.
 
     The reach is the aircraft's maximum distance from that waypoint.  Return None if the autopilot does not loiter at
     the last waypoint, or if the mission does not end at a plain waypoint.

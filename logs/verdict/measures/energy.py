@@ -36,13 +36,13 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
             float(route.leg_airspeeds[leg]),
             float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
         )
-        power = power_at(speed, altitude, air_angle(requirements, leg, speed, altitude))
+        power = power_at(speed, altitude, air_climb_angle(requirements, leg, speed, altitude))
         energies.append(power * float(duration) / 3600.0)
         peak_power = max(peak_power, power) if math.isfinite(power) else math.nan
     return energies, peak_power
 
 
-def air_angle(requirements: RouteRequirements, leg: int, speed: float, altitude: float) -> float:
+def air_climb_angle(requirements: RouteRequirements, leg: int, speed: float, altitude: float) -> float:
     """Return the climb angle relative to the air on a leg in the mean wind, rad; negative in a descent.
 
     speed: true airspeed, m/s.

@@ -52,7 +52,7 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
 
 
 def ground_phase_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask of the rows that belong to a flown take-off or to the landing leg, (t,).
+    """Return a mask (t,): True for each row in a flown take-off or on the landing leg.
 
     >>> from logs.recording.example_log import example_log
     >>> bool(ground_phase_rows(example_log().track, GroundPhases()).any())
@@ -65,7 +65,7 @@ def ground_phase_rows(track: Track, procedures: GroundPhases) -> Flags:
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:
-    """Return the end time of each leg but the last, s, for the whole route including its landing."""
+    """Return the end time (s) of each leg except the last, for the whole route including its landing."""
     ground_phases, end_times = requirements.ground_phases, aligned.leg_ends()
     if ground_phases is None or ground_phases.procedures.approach is None:
         return end_times

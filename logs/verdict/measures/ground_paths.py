@@ -43,7 +43,7 @@ class GroundPath(NamedTuple):
 
 
 def track_path(track: Track) -> GroundPath:
-    """Return the positions of a flown track with their horizontal distance from its start."""
+    """Return the positions of a flown track with their horizontal distances along the track."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
     return GroundPath(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
@@ -57,7 +57,7 @@ def straight_path(start: Sequence[float] | Floats, course: float, profile: Profi
 
 
 def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float]:
-    """Return a path's minimum height above ground, m, and where it occurs as a distance along the path, m.
+    """Return a path's minimum height above ground, and where it occurs as a distance along the path, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
     """
@@ -111,8 +111,8 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
     return setup.scenario.terrain is not None and has_ground_phases and setup.source is None
 
 
-def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """Return the index of the first waypoint of a mission item, and that item if it is a take-off."""
+def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
+    """Return the first waypoint of a mission item, and this item if it is a take-off, otherwise None."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]

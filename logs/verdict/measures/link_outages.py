@@ -83,7 +83,7 @@ def station_antenna(setup: FlightSetup, link: RadioLink, terrain: Terrain) -> Fl
 def link_along_path(
     link: RadioLink, terrain: Terrain, antenna: Floats, time: Floats, positions: Floats
 ) -> LinkAlongPath:
-    """Compute the link about once a second along a path.
+    """Compute the quality of the radio link about once a second along a path, and its outages.
 
     antenna: position of the station's antenna, m, (3,).
     time: increasing times of the path's points, s, (t,).

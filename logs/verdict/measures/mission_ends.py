@@ -8,7 +8,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.tolerances import FINAL_WAYPOINT_TOLERANCE_M
 
 
-def returns_after_last_item(setup: FlightSetup) -> bool:
+def judges_return_after_last_item(setup: FlightSetup) -> bool:
     """Return True if the return to launch that ArduPlane begins by itself after the last item is judged.
 
     A mission that ends at its scenario's destination is judged only up to the destination.

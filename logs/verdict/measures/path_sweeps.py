@@ -24,9 +24,9 @@ _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground, m, and its position as a fraction of the segment, (n - 1,).
+    """Return each segment's minimum height above ground (m), and where it occurs, (n - 1,) each.
 
-    Both are NaN if a segment leaves the raster or its data.
+    The place is a fraction of the segment.  Both are NaN if a segment leaves the raster or its data.
 
     points: ends of the segments, m, (n, 3).
     """
@@ -36,7 +36,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
 @compiled
 def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's minimum height above ground, m, and its fraction of the segment; see `path_clearance`."""
+    """Return each segment's minimum height above ground, and where it occurs; see `path_clearance`."""
     count = max(0, points.shape[0] - 1)
     clearance, fraction = np.empty(count), np.empty(count)
     for k in range(count):
@@ -194,7 +194,7 @@ def _add_stay(
 ) -> None:
     """Add one block's time and exposure inside sphere `m` to `visits`.
 
-    step: number of segments that are joined to one.
+    step: number of consecutive segments that are treated as one straight segment.
     """
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
     k = block * _BLOCK_SEGMENTS
@@ -233,9 +233,10 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum height above ground, m, and its fraction of the segment, (t - 1,) each.
+    """Return each track segment's minimum height above ground (m), and where it occurs, (t - 1,) each.
 
-    The height is NaN if the segment leaves the terrain data or has an implausible end.
+    The place is a fraction of the segment.  The height is NaN if the segment leaves the terrain data or has an
+    implausible end.
 
     position: m, (t, 3).
     """
@@ -297,9 +298,10 @@ def _plausible_clearances(
 def _sphere_windows(
     position: Floats, centre: Floats, radius: float
 ) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
-    """Return each segment's minimum distance from a center, m, and the fractions where it enters and leaves a sphere.
+    """Return each segment's minimum distance (m) from a center, and where it enters and leaves a sphere.
 
-    For a segment with an implausible end, the distance is inf and the fractions are 0.
+    The places are fractions of the segment.  For a segment with an implausible end, the distance is inf and both
+    fractions are 0.
     """
     count = position.shape[0] - 1
     closest = np.full(count, math.inf)

@@ -40,7 +40,7 @@ class LineMeasure:
     photos, missed_photos: number of planned photos, and of those not taken; 0 if no distance between photos is stated.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
-    lost_spans: start and end of each unusable stretch, m from the line's start.
+    lost_spans: start and end of each unusable part, m from the line's start.
     """
 
     length: float
@@ -110,7 +110,7 @@ def _line_rows(
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
-    """Measure a photo line on a flown track; return None if no row lies between the neighbouring waypoints."""
+    """Measure a photo line on a flown track; return None if not reached, or with fewer than two rows."""
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
@@ -144,7 +144,7 @@ def measure_line(
 
 
 def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, float], ...]:
-    """Return the start and end of each run of steps with `is_set`, m."""
+    """Return the start and end (m) of each run of consecutive steps for which `is_set` is True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], is_set.astype(int), [0]]))) * step_length
     return tuple((float(start), float(end)) for start, end in zip(edges[::2], edges[1::2], strict=True))
 
@@ -178,12 +178,12 @@ def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> F
 def _camera_on_rows(
     requirements: RouteRequirements, line: PhotoLine, axis: LineAxis, position: Floats, is_ahead: Flags
 ) -> Flags:
-    """Return True for each row at which the camera is on.
+    """Return a mask (n,): True for each row at which the camera is on.
 
     is_ahead: True for each row that flies along the line.
 
-    The camera is on from reaching the waypoint that switches it on to reaching the waypoint that switches it off.  Both
-    may be beyond the line's ends, and each is optional.
+    The camera is on from the row that reaches the waypoint where it is switched on, to the row that reaches the
+    waypoint where it is switched off.  Both waypoints may be beyond the line's ends, and each is optional.
     """
     follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(position))
     along = axis.project(position)[0]
@@ -211,7 +211,11 @@ def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
 
 
 def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
-    """Return True for each step of a line between two consecutive rows with `is_set`."""
+    """Return a mask of a line's steps: True for each step that the track between two set rows touches.
+
+    along: distance of each row along the line, m.
+    is_set: mask of the rows; only consecutive set rows count.
+    """
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
@@ -355,8 +359,8 @@ def _with_side_overlap(
 ) -> OverlapMeasure:
     """Return the measure with the minimum overlap between neighbouring lines.
 
-    Lines are neighbours where they run side by side with no line between them, lost or not, and are not much further
-    apart than the survey's spacing: beyond a notch of the area is another part of it.
+    Two lines are neighbours where they run side by side, no other line (lost or not) lies between them, and their
+    distance is not much more than the survey's spacing.  A larger distance spans a notch in the survey's area.
     """
     ranks, offsets = _lateral_ranks(survey), np.array(survey.offsets)
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
@@ -407,7 +411,7 @@ def _with_side_overlap(
 
 
 def _lateral_ranks(survey: Survey) -> NDArray[np.int64]:
-    """Return for each line the number of lateral positions to its left that have a line, (n,)."""
+    """Return each line's rank by lateral offset, (n,); lines at the same offset share a rank."""
     order, ranks = np.argsort(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
     gaps = np.diff(np.array(survey.offsets)[order])
     ranks[order[1:]] = np.cumsum(gaps > _SAME_POSITION_SPACINGS * survey.spacing)

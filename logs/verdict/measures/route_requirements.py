@@ -64,7 +64,7 @@ class Airspace:
         return Place(zone.kind, index, name=zone.name)
 
     def zones_near(self, points: Floats) -> NDArray[np.int64]:
-        """Return the numbers of all inclusions, and of exclusions near any segment of a path (n, 3) m.
+        """Return the numbers of all inclusion zones, and of the exclusion zones near a path (n, 3), m.
 
         >>> from world.airspace.zones import Cylinder
         >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
@@ -85,7 +85,8 @@ class Airspace:
 def judged_airspace(setup: FlightSetup) -> Airspace:
     """Return the exclusion and inclusion zones that apply to a setup's flight.
 
-    A fence that gives no zones, as in logs from before fences were judged, is omitted and reported.
+    A fence that cannot be converted to zones, as in logs from before fences were judged, is omitted; `fence_fault`
+    then states the reason.
 
     >>> from logs.recording.example_log import example_log
     >>> judged_airspace(example_log().setup).zones
@@ -402,7 +403,7 @@ class RouteRequirements:
         return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last)}
 
     def leg_unit(self, leg: int) -> Floats:
-        """Return the east and north components of a leg's course, (2,)."""
+        """Return the unit vector (east, north) of a leg's course, (2,)."""
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def apexes(self) -> Floats:
@@ -423,7 +424,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
     envelope: False to omit the aircraft's limits and judge by only the flown evidence.
     """
-    route, limits = true_route(setup), setup.limits
+    route, limits = true_airspeed_route(setup), setup.limits
     points = route.positions
     tables = performance_tables(route, limits)
     turns = turn_requirements(route, tables)
@@ -498,7 +499,7 @@ def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     return tuple(survey for survey in surveys if mode == "lines" or survey.takes_photos())
 
 
-def true_route(setup: FlightSetup) -> Route:
+def true_airspeed_route(setup: FlightSetup) -> Route:
     """Return a setup's route with the true airspeeds that are demanded in flight.
 
     ArduPlane's airspeeds are equivalent: they are converted at each leg's mean altitude.
@@ -507,9 +508,9 @@ def true_route(setup: FlightSetup) -> Route:
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
-    >>> true_route(setup) is setup.route
+    >>> true_airspeed_route(setup) is setup.route
     True
-    >>> faster = true_route(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
+    >>> faster = true_airspeed_route(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
     >>> bool((faster.leg_airspeeds > setup.route.leg_airspeeds).all())
     True
     """
@@ -533,7 +534,10 @@ def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> Planne
 def _leg_limits(
     route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the climb and dive over the ground, rad, and the ground speed, m/s, that are available along each leg."""
+    """Return each leg's climb and dive limits over the ground (rad) and ground speed (m/s), (legs,) each.
+
+    Each is the minimum at the start, the middle and the end of the leg; the ground speed is NaN if any is unknown.
+    """
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
@@ -592,12 +596,12 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
-    """Return the tighter of the scenario's and the aircraft's turn limits at a waypoint, rad, and its source."""
-    return tighter_turn(requirements, i, float(requirements.turn_limit[i]))
+    """Return the tighter turn limit (rad) of scenario and aircraft at a waypoint, and its source."""
+    return tighter_turn_limit(requirements, i, float(requirements.turn_limit[i]))
 
 
-def tighter_turn(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
-    """Return the tighter of the scenario's limit and an aircraft limit, rad, and its source."""
+def tighter_turn_limit(requirements: RouteRequirements, i: int, aircraft_limit: float) -> tuple[float, str]:
+    """Return the tighter of the scenario's turn limit and an aircraft limit, rad, and its source."""
     scenario_limit = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.
     if scenario_limit is not None and scenario_limit <= aircraft_limit and requirements.setup.route.arc_radii[i] == 0.0:

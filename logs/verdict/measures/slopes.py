@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY, ground_slope
 from flight.simulation.track import THROTTLE
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack, along_across
+from logs.verdict.measures.track_alignment import AlignedTrack, project_onto_leg
 from logs.verdict.tolerances import (
     ABILITY_SAMPLE_INTERVAL_S,
     ABILITY_SETTLING_S,
@@ -67,7 +67,7 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clearance: float, *, excludes_blends: bool = False
 ) -> tuple[float, float]:
-    """Return the start and end of the part of a leg between the turns at its ends, m from the leg's start.
+    """Return the start and end (m from the leg's start) of the part of a leg between its turns.
 
     clearance: distance kept from the turns, m.
     excludes_blends: True to exclude the slope blends as well.
@@ -91,7 +91,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
     if not aligned.has_flown(leg):
         return None
     rows = aligned.leg_rows(leg)
-    distance_along, lateral_offset = along_across(requirements, leg, aligned.track.position[rows])
+    distance_along, lateral_offset = project_onto_leg(requirements, leg, aligned.track.position[rows])
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_COURSE_STRETCH_M:
@@ -132,7 +132,7 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
         return None
     rows = aligned.leg_rows(leg)
     position = aligned.track.position[rows]
-    distance_along, _ = along_across(requirements, leg, position)
+    distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
     if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_SLOPE_STRETCH_M:
@@ -157,9 +157,10 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 
 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
-    """Return the tolerance of an angle fitted over a distance (m) with an RMS residual (m), rad.
+    """Return the tolerance (rad) of an angle fitted over a distance (m) with an RMS residual (m).
 
-    Residuals of twice the RMS at the ends would rotate the line by the second term.
+    The tolerance is ``floor`` (rad) plus the angle by which residuals of twice the RMS at the ends would rotate the
+    line.
     """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 
@@ -229,12 +230,12 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest signed altitude error from the leg's line, m, and True if the leg is too short for blends.
+    """Return the largest signed altitude error from the leg's line, m, and True for a leg of only blends.
 
     On a leg without any part clear of the slope blends, the error is taken between the turns; it is None if no row lies
     between the turns.
     """
-    distance_along, _ = along_across(requirements, leg, position)
+    distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
     is_short = not is_inside.any()
@@ -260,7 +261,7 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 def _saturation_times(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float, float]:
-    """Return the times at full and at idle throttle, s, and the speed loss and gain, m/s, as in `SlopeMeasure`."""
+    """Return times at full and idle throttle (s), and speed loss and gain (m/s), as in `SlopeMeasure`."""
     rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:
@@ -277,13 +278,13 @@ def _saturation_times(
     speed_excess = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
     # A log may lack the airspeed at some rows.
     is_known = np.isfinite(speed_deficit) & np.isfinite(speed_excess)
-    speed_loss = _max_mean_within(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
-    speed_gain = _max_mean_within(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
+    speed_loss = _max_mean_in_mask(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
+    speed_gain = _max_mean_in_mask(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
     return float(is_at_full.sum() * tick), float(is_at_idle.sum() * tick), speed_loss, speed_gain
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
-    """Return masks of the rows with full throttle and of the rows with idle throttle."""
+    """Return two masks (n,): True for rows with full throttle, and True for rows with idle throttle."""
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
     is_full = throttle >= FULL_THROTTLE_FRACTION
@@ -308,7 +309,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
     is_at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
-    distance_along, _ = along_across(requirements, leg, track.position[rows])
+    distance_along, _ = project_onto_leg(requirements, leg, track.position[rows])
     span_start, span_end = straight_span(requirements, leg, 0.0)
     is_measured = _rows_after_run(is_at_full if sign > 0.0 else is_at_idle, round(ABILITY_SETTLING_S / aligned.tick))
     is_measured &= (distance_along >= span_start) & (distance_along <= span_end)
@@ -324,7 +325,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     commanded_speed, altitude = float(requirements.route.leg_airspeeds[leg]), track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
-    fit = _plane_at_origin(
+    fit = _fit_plane_at_origin(
         climb_rate, excess_speed, 0.01 * (altitude - top_altitude), duration / ABILITY_SAMPLE_INTERVAL_S
     )
     if fit is None:
@@ -342,12 +343,12 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
 
 
 def _rows_after_run(mask: Flags, count: int) -> Flags:
-    """Return a mask of the rows in ``mask`` whose ``count`` previous rows are in ``mask``, too."""
+    """Return a mask: True for each row in ``mask`` whose ``count`` previous rows are in ``mask``, too."""
     rows = np.arange(mask.size)
     return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
-def _plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:
+def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:
     """Fit a plane value(x, y) by least squares, and return its value at x = y = 0 and the standard error of this value.
 
     Return None if the plane is not determined.  If y hardly varies, the fit does not depend on it.
@@ -366,14 +367,14 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -
 
 
 def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the airspeed that the aircraft would have without gusts, m/s."""
+    """Return the airspeed that the aircraft would have in the mean wind, without gusts, m/s."""
     wind, track = requirements.setup.scenario.wind, aligned.track
     mean_wind = wind.velocities_at(np.ascontiguousarray(track.position[rows, 2]))
     east, north = track.velocity[rows, 0] - mean_wind[:, 0], track.velocity[rows, 1] - mean_wind[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 
-def _max_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
+def _max_mean_in_mask(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
     """Return the largest mean of ``value`` over ``width`` consecutive rows of which most are in ``mask``.
 
     Return 0 if there are no such rows, or if the mean is negative.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
@@ -152,7 +152,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
         clearance=clearance,
         clearance_fraction=clearance_fraction,
-        lift_gain=lifted_speed(usable_track.time, usable_track.airspeed, usable_track.wind[:, 2]),
+        lift_gain=airspeed_gain_in_rising_air(usable_track.time, usable_track.airspeed, usable_track.wind[:, 2]),
         tick=float(np.median(np.diff(usable_track.time))),
         draws_current=bool(usable_track.current.any()),
     )
@@ -170,7 +170,7 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
     if first_return is not None:
         # A return may end anywhere on its loiter, and the flown loiter may differ from the drawn one.
         end_return, loiter = route.rtl_end, route.rtl_loiter
-        loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
+        loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
         return_radius = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
         radii[first_return + 1 : end_return] = [
             max(return_radius, radius) for radius in radii[first_return + 1 : end_return]
@@ -227,23 +227,23 @@ def _advance_last_leg(
     )
 
 
-def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
-    """Return the distances of positions along a leg from its start, and to the right of the leg's line, m, (n,) each.
+def project_onto_leg(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
+    """Return along-track and cross-track distances (right positive) from a leg's start, m, (n,) each.
 
-    position: m, (n, 3).
+    position: positions, m, (n, 3).
     """
     east, north = position[:, 0] - requirements.points[leg, 0], position[:, 1] - requirements.points[leg, 1]
     ux, uy = math.sin(requirements.courses[leg]), math.cos(requirements.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
-def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's minimum horizontal distance from a target, m, and its fraction of the segment.
+def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Return each track segment's minimum horizontal distance (m) from a target, and where it occurs.
 
-    Both have shape (n - 1,).
+    Both have shape (n - 1,).  The place is a fraction of the segment.
 
-    position: m, (n, 3).
-    target: m, (2,) or (3,).
+    position: positions of the track, m, (n, 3).
+    target: position, m, (2,) or (3,).
     """
     start = position[:-1, :2]
     step = position[1:, :2] - start
@@ -255,7 +255,7 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
 
 
 def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
-    """Return a mask of the rows with finite, plausible numbers and a time later than all usable rows before.
+    """Return a mask (t,): True for rows with finite, plausible numbers and an increasing time.
 
     is_own: True for planfly's own flights, which have all numbers in every row.  Of an imported log only positions and
         velocities are checked here, because each rule checks the other data that it needs.
@@ -321,7 +321,7 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
 
 
 @compiled
-def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Floats:
+def airspeed_gain_in_rising_air(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Floats:
     """Return the airspeed that an aircraft on a fixed path gains from rising air, m/s, (t,).
 
     The gain decays with the time constant `SPEED_MEMORY_S`.
@@ -345,7 +345,7 @@ def _match_chords(
     The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming; of equally good assignments the
     earliest is taken.  Only chords from `first` to `last` can capture a mark.
 
-    Returns the chord of each mark, and a mask of the marks that no row of their chord captures.
+    Returns the chord of each mark, and a mask: True for each mark that no row of its chord captures.
     """
     last_row = position.shape[0] - 1
     chords = -(-last_row // step)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from flight.simulation.track import ROLL
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import leg_course
-from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
+from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
 from logs.verdict.tolerances import SETTLING_WATCH_TIME_S
 from world.arrays import Floats
 
@@ -77,7 +77,7 @@ def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> l
         times, positions = _track_between(
             aligned, start_time, float(time[later_rows[0]] if later_rows.size else time[-1])
         )
-        distances, fraction = approaches(positions, requirements.points[k])
+        distances, fraction = closest_approaches(positions, requirements.points[k])
         closest_row = int(np.argmin(distances))
         start_time = float(times[closest_row] + fraction[closest_row] * (times[closest_row + 1] - times[closest_row]))
         passes.append((start_time, float(distances[closest_row])))
@@ -94,12 +94,12 @@ def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Flo
 def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot at waypoint `k`, m, and the overrun, m, as in `CornerPass`.
+    """Return the overshoot at waypoint `k` (m) and the overrun (m), as in `CornerPass`.
 
     start, end: times of the closest approach to this waypoint and to the next waypoint, s.
     """
     leg_length = float(requirements.runs[k])
-    distance_along, lateral_offset = along_across(requirements, k, _track_between(aligned, start, end)[1])
+    distance_along, lateral_offset = project_onto_leg(requirements, k, _track_between(aligned, start, end)[1])
     if distance_along[0] > leg_length:
         return None, float(distance_along[0]) - leg_length
     outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
@@ -166,8 +166,8 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))
     position = track.position[first : last + 1]
-    distance_along_before, _ = along_across(requirements, i - 1, position)
-    distance_along, lateral_offset = along_across(requirements, i, position)
+    distance_along_before, _ = project_onto_leg(requirements, i - 1, position)
+    distance_along, lateral_offset = project_onto_leg(requirements, i, position)
     entry_row = _first_row(
         distance_along_before >= requirements.runs[i - 1] - requirements.length_before[i], middle - first
     )
@@ -201,7 +201,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
             lateral_offset[is_watched],
         ),
         settled_distance=_settled_distance(requirements, aligned, i, first, end_row, distance_along, lateral_offset),
-        min_distance=float(approaches(position, requirements.points[i])[0].min()),
+        min_distance=float(closest_approaches(position, requirements.points[i])[0].min()),
         full_circles=max(0, round((course_change - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
         is_complete=bool(aligned.passed[i + 1] or end_row < last - first or exit_row < last - first),
     )
@@ -216,7 +216,7 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
 def _course_change(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int
 ) -> tuple[float | None, float | None, bool]:
-    """Return the flown course change at waypoint `i` and its tolerance, rad, and True if both courses are fitted.
+    """Return waypoint `i`'s flown course change (rad), its tolerance, and True if both courses are fitted.
 
     Return None, None, False if either leg was flown too little.
     """
@@ -228,7 +228,7 @@ def _course_change(
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the maximum one-second mean of the bank, rad, and the minimum radius over one second, m.
+    """Return the maximum one-second mean of the bank (rad) and the minimum radius over one second (m).
 
     The radius is inf without a turn, or if the rows span less than a second.
     """

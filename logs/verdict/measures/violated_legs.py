@@ -34,7 +34,7 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
 
 
 def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missile: bool) -> NDArray[np.bool_]:
-    """Return a mask of the path segments that enter the sphere of a threat, (n - 1,).
+    """Return a mask (n - 1,): True for each path segment that enters the sphere of a threat.
 
     points: points of the path, m, (n, 3).
     number: index of the threat.

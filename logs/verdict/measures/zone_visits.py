@@ -47,7 +47,7 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside the outline and the altitude band of zone `z`, m, and the nearest edge.
+    """Return a position's distances (m) outside zone `z`'s outline and altitude band, and the closest edge.
 
     A distance is negative inside; the distance from a band above ground is NaN if the terrain there is unknown.
     """
@@ -60,7 +60,7 @@ def distances_outside_zone(
 
 
 @inlined
-def beyond_limit(exclusion: bool, outline_distance: float, band_distance: float) -> float:
+def violation_depth(exclusion: bool, outline_distance: float, band_distance: float) -> float:
     """Return the depth of a violation at a position, m; negative if the position complies.
 
     The depth is the shortest horizontal or vertical distance to the zone's limit, or NaN if it depends on unknown
@@ -98,7 +98,7 @@ def copy_move_part(source: Record, target: Record) -> None:
 def depth_bounds(
     exclusion: bool, part: Record, length: float, height_change: float, max_distance: float
 ) -> tuple[float, float]:
-    """Return lower and upper bounds of the depth of a violation along one part of a move, m.
+    """Return lower and upper bounds of the violation's depth along one part of a move, m.
 
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
 
@@ -123,7 +123,7 @@ def depth_bounds(
 
 @inner
 def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record, length: float) -> float:
-    """Return an upper bound on the depth of a part of a move in a violation of zone `z`'s outline, m.
+    """Return an upper bound on how deep a part of a move violates the outline of zone `z`, m.
 
     The bound is inf if the part turns by more than a radian.  It uses the edges nearest to the part's ends: on a
     straight line, the distance from an edge, or from the centre of a circle, is largest at an end.  An arc of less than
@@ -280,7 +280,7 @@ def _fill_visit(
                 block.south + half_length,
                 block.low + half_height,
             )
-            max_depth = beyond_limit(zone.exclusion, outline_distance, band_distance) + max(
+            max_depth = violation_depth(zone.exclusion, outline_distance, band_distance) + max(
                 half_diagonal, half_height + ground_slope * half_diagonal
             )
             # The ground may be unknown near a center point with known ground, so such a block is not skipped.
@@ -388,9 +388,9 @@ def _bisect_move(
         part.band_distance, part.edge = band_distance, edge
         earlier.end_east, earlier.end_north, earlier.end_outline_distance = east, north, outline_distance
         earlier.end_band_distance, earlier.end_edge = band_distance, edge
-        if not in_order and beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance) > beyond_limit(
-            exclusion, earlier.outline_distance, earlier.band_distance
-        ):
+        if not in_order and violation_depth(
+            exclusion, part.end_outline_distance, part.end_band_distance
+        ) > violation_depth(exclusion, earlier.outline_distance, earlier.band_distance):
             # Put the half that may be deeper on top: its depth may make the other half irrelevant.
             copy_move_part(part, parts[_MAX_PARTS - 1])
             copy_move_part(earlier, part)
@@ -402,8 +402,8 @@ def _bisect_move(
 def _is_unknown(exclusion: bool, part: Record) -> bool:
     """Return True if the depths at both ends depend on unknown ground, so that the whole part is unknown."""
     start_depth, end_depth = (
-        beyond_limit(exclusion, part.outline_distance, part.band_distance),
-        beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance),
+        violation_depth(exclusion, part.outline_distance, part.band_distance),
+        violation_depth(exclusion, part.end_outline_distance, part.end_band_distance),
     )
     return start_depth != start_depth and end_depth != end_depth
 
@@ -412,9 +412,9 @@ def _is_unknown(exclusion: bool, part: Record) -> bool:
 def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Update the deepest point of a visit, and its flag for unknown ground, with the ends of a part."""
     for end in range(2):
-        depth = beyond_limit(exclusion, part.outline_distance, part.band_distance)
+        depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
         if end:
-            depth = beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance)
+            depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
         if depth > visit.depth:
             fraction = part.last if end else part.first
             visit.depth, visit.at_time, visit.at_leg = depth, move.time + fraction * move.lasts, move.leg
@@ -426,8 +426,8 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Add the violation in a part of a move to a visit.  The part crosses the zone's limit at most once."""
     start_depth, end_depth = (
-        beyond_limit(exclusion, part.outline_distance, part.band_distance),
-        beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance),
+        violation_depth(exclusion, part.outline_distance, part.band_distance),
+        violation_depth(exclusion, part.end_outline_distance, part.end_band_distance),
     )
     if not (start_depth > 0.0 or end_depth > 0.0):
         return

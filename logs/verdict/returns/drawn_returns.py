@@ -18,9 +18,9 @@ from logs.verdict.returns.judge_returns import (
     Returns,
     ReturnWorld,
     SimulatedReturn,
-    badness,
     heights_above_ground,
     simulate_returns,
+    worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.suggest_returns import meets_return_limits
@@ -92,7 +92,7 @@ class DrawnReturns:
         If a start has several returns, the worst of them applies.
         """
         by_time = sorted(self.returns.each, key=lambda ret: ret.time)
-        worst_by_time = [min(group, key=badness) for _, group in groupby(by_time, lambda ret: ret.time)]
+        worst_by_time = [min(group, key=worst_first_key) for _, group in groupby(by_time, lambda ret: ret.time)]
         return group_segments(worst_by_time, lambda ret: ret.kind)
 
     @property
@@ -208,7 +208,7 @@ def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltit
 
 
 def _are_safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_simulated: Flags) -> Flags:
-    """Return a mask of the starts from which a return is safe at an offset from the start's altitude, (n,).
+    """Return a mask (n,): True for each start from which a return is safe at an altitude offset.
 
     offsets: altitude offsets, m, (n,).
     is_simulated: mask of the starts to simulate; the result is False for all others.

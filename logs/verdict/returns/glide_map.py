@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import ground_speed
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
 from world.arrays import Codes, Flags, Floats
 from world.highest_ground import highest_in_cells
@@ -82,7 +82,7 @@ class GlideMap:
 def glide_map(
     terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = MAP_MARGIN_M
 ) -> GlideMap | None:
-    """Make the map around positions; return None if the map is so large that its cells would be too coarse.
+    """Make the map of cells around positions; return None if the cells of such a large map are too coarse.
 
     positions: east and north, m, (p, 2).
     margin: height above ground that a glide keeps, m.
@@ -143,7 +143,7 @@ MAX_LANDING_ROUGHNESS_M = 1.5
 
 
 def landable_cells(grid: GlideMap) -> Flags:
-    """Return a mask of the cells outside kill spheres that have flat ground around them, (n, e).
+    """Return a mask (n, e): True for each cell outside kill spheres that has flat ground around it.
 
     The ground comes from the elevation file, which has no trees, houses or water.
     """
@@ -222,10 +222,10 @@ STEP = record_dtype(
 _CROSSED_CELL = record_dtype(("east", np.int64), ("north", np.int64), "fraction")
 
 
-def steps() -> tuple[Records, Records]:
-    """Return the 32 steps, (32,) of dtype `STEP`, and the cells that they cross, of dtype `_CROSSED_CELL`.
+def glide_steps() -> tuple[Records, Records]:
+    """Return the 32 steps to nearby cells, of dtype `STEP`, and the cells crossed, of `_CROSSED_CELL`.
 
-    >>> made, between = steps()
+    >>> made, between = glide_steps()
     >>> len(made), len({round(float(one.course), 6) for one in made})
     (32, 32)
     """
@@ -258,7 +258,7 @@ class GlideSlopes(NamedTuple):
     """Height lost per meter over the ground, by course and altitude.
 
     first_altitude, altitude_step: first altitude and altitude step of the table, m.
-    table: slopes for the courses of `steps` and for h altitudes, m per m, (c, h); inf if no progress is made.
+    table: slopes for the courses of `glide_steps` and for h altitudes, m per m, (c, h); inf if no progress is made.
     """
 
     first_altitude: float
@@ -274,7 +274,7 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_altitude: float) -> GlideSlopes:
     """Return the glide slopes between two altitudes (m AMSL) at an equivalent airspeed (m/s)."""
-    courses = np.array(steps()[0]["course"])
+    courses = np.array(glide_steps()[0]["course"])
     slopes = np.empty((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
     _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, slopes)
     return GlideSlopes(min_altitude, _ALTITUDE_STEP_M, slopes)
@@ -287,7 +287,7 @@ def _fill_slopes(
     """Fill the table `slopes`, (c, h), with glide slopes by course and altitude."""
     for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
-        true_airspeed = airspeed * true_by_equivalent(altitude)
+        true_airspeed = airspeed * eas_to_tas_ratio(altitude)
         sink = max(0.0, -excess_power(excess, 0.0, true_airspeed, altitude, aircraft))
         horizontal_speed = math.sqrt(max(0.0, true_airspeed * true_airspeed - sink * sink))
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, altitude)
@@ -310,7 +310,7 @@ class GlideAltitudes:
     grid: the map.
     min_altitude: minimum altitude from which a glide reaches a destination, m AMSL, (n, e); inf if none is reached.
     destination: cell of the destination that is reached, numbered through all rows, (n, e); -1 if none is reached.
-    next_step: index in `steps` of the next step of the glide, (n, e); -1 at the destination itself.
+    next_step: index in `glide_steps` of the next step of the glide, (n, e); -1 at the destination itself.
     """
 
     grid: GlideMap
@@ -320,9 +320,10 @@ class GlideAltitudes:
 
 
 def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, max_altitude: float) -> GlideAltitudes:
-    """Search backwards from the cells of destinations, up to ``max_altitude`` (m AMSL).
+    """Compute, for each cell, the lowest altitude from which a glide reaches a destination.
 
-    Cells off the map and cells with unknown ground are no destinations.
+    The search runs backwards from the destinations, up to ``max_altitude`` (m AMSL).  Destinations off the map and on
+    unknown ground are ignored.
 
     cells: rows and columns of the destinations, (c, 2).
     """
@@ -341,7 +342,7 @@ def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, ma
     min_altitude[~(min_altitude <= max_altitude)] = math.inf
     destination[row, column] = row * columns + column
     destination[np.isinf(min_altitude)] = -1
-    step_records, crossed_cells = steps()
+    step_records, crossed_cells = glide_steps()
     finite_slopes = slopes.table[np.isfinite(slopes.table) & (slopes.table > 0.0)]
     if np.isfinite(min_altitude).any() and finite_slopes.size:
         band = float(finite_slopes.min()) * grid.cell
@@ -477,7 +478,7 @@ def _step_start_altitude(
 
 @inner
 def _raise_above_spheres(altitude: float, bottom: float, top: float) -> float:
-    """Return an altitude, m, or the top of the kill spheres if the altitude lies inside them."""
+    """Return an altitude (m), or the top of the kill spheres if the altitude lies inside them."""
     return top if bottom < altitude < top else altitude
 
 

@@ -18,8 +18,8 @@ from flight.autopilots.arduplane.tecs import (
     MIN_ROLL_LIMIT_RAD,
     load_factor_roll_limit,
 )
-from flight.guidance.equivalent_airspeed import true_by_equivalent
-from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, steps
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
+from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, glide_steps
 from world.arrays import Codes, Floats
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
@@ -45,7 +45,7 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left on arrival at the best destination of each start, m, (n,), and the destination's cell.
+    """Return, for each of n starts, the altitude (m) left on arrival at the best destination, and its cell.
 
     starts: (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
@@ -68,7 +68,7 @@ def remaining_glide_altitudes(
         glide_altitudes.min_altitude,
         glide_altitudes.destination,
         glide_altitudes.next_step,
-        steps()[0],
+        glide_steps()[0],
         glider,
         aircraft.record,
         aircraft.excess,
@@ -109,7 +109,7 @@ def _fill_altitudes_left(
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
         wind_east, wind_north = wind * aircraft.wind_east, wind * aircraft.wind_north
         air_east, air_north = start.velocity_east - wind_east, start.velocity_north - wind_north
-        min_speed = glider.airspeed * true_by_equivalent(start.up)
+        min_speed = glider.airspeed * eas_to_tas_ratio(start.up)
         speed = max(min_speed, math.hypot(air_east, air_north))
         bank = min(glider.bank, load_factor_roll_limit(speed, min_speed, MIN_ROLL_LIMIT_RAD))
         tan_bank = math.tan(bank)

@@ -95,9 +95,9 @@ class Glide:
     start: position of the start, m, (3,).
     own_return: outcome of ArduPlane's return.
     home_altitude_left: altitude left on arrival at home, m; negative if the altitude is too low, -inf without a path.
-    site_altitude_left: the same for the best rally point or landing place; -inf if there is none.
+    site_altitude_left: altitude left on arrival at the best rally point or landing place, m; -inf if there is none.
     site: index of that place in `Glides.sites`; -1 if no path leads to one.
-    flat_altitude_left: the same for flat ground.
+    flat_altitude_left: altitude left on arrival over flat ground, m; -inf if no path leads to any.
     flat_position: east, north and altitude of that ground, m; NaN if there is none.
     reach: the best destination.
     """
@@ -168,7 +168,7 @@ class Glides:
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, glide: Glide) -> int:
-        """Return the index of the best site in reach: home, or else the one with the most altitude left; -1 if none."""
+        """Return the index of the best site in reach: home, or the site with the most altitude left; or -1."""
         if glide.reach == "home":
             return 0
         return glide.site if glide.reach == "site" else -1
@@ -289,7 +289,7 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 
 
 def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
-    """Return a mask of the cells on which a landing is possible, (n, e).
+    """Return a mask (n, e): True for each cell on which a landing is possible.
 
     They are flat, and in no exclusion zone that reaches down to `MARGIN` above the ground.
     """

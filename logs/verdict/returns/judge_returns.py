@@ -263,8 +263,12 @@ class Returns:
         ranges = []
         for _, group in groupby(self.each, _report_key):
             returns = list(group)
-            ranges.append(ReturnRange(returns[0].time, returns[-1].time, len(returns), min(returns, key=badness)))
-        return tuple(sorted(ranges, key=lambda return_range: (*badness(return_range.worst), return_range.first)))
+            ranges.append(
+                ReturnRange(returns[0].time, returns[-1].time, len(returns), min(returns, key=worst_first_key))
+            )
+        return tuple(
+            sorted(ranges, key=lambda return_range: (*worst_first_key(return_range.worst), return_range.first))
+        )
 
 
 def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
@@ -273,8 +277,8 @@ def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
     return (*key, ret.threat, ret.zone) if ret.kind in ("threat", "zone") else key
 
 
-def badness(ret: SimulatedReturn) -> tuple[int, float]:
-    """Return the sort key of a return, with which the worst return comes first."""
+def worst_first_key(ret: SimulatedReturn) -> tuple[int, float]:
+    """Return a sort key that puts the worst return first: by outcome, then by margin."""
     margin = ret.sphere_distance if ret.kind == "threat" else ret.energy_left if ret.kind == "energy" else ret.clearance
     return KINDS.index(ret.kind), math.inf if math.isnan(margin) else margin
 
@@ -339,7 +343,7 @@ class ReturnWorld:
 
     @property
     def endings(self) -> tuple[Ending, ...]:
-        """All ways in which returns end, RTL's first."""
+        """All endings of the returns from the possible causes, the ending of RTL first."""
         has_landing = any(cause.action == "land" for cause in self.causes) and self.ending != "straight to land"
         return (self.ending, "straight to land") if has_landing else (self.ending,)
 
@@ -378,7 +382,7 @@ class ReturnWorld:
         return target._replace(name=name, reason=", ".join(reasons), landing=landing)
 
     def _choice_reason(self, landing: LandingStart) -> str:
-        """Return a text on why a landing sequence was chosen; "" if the mission has only one."""
+        """Explain why a landing sequence was chosen; return "" if the mission has only one."""
         return f"item {landing.item} is of the nearest of {len(self.landings)}" if len(self.landings) > 1 else ""
 
     def with_parameters(self, **values: float) -> "ReturnWorld":
@@ -428,7 +432,10 @@ def make_return_world(setup: FlightSetup) -> ReturnWorld:
 
 
 def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None) -> ArduPilotParameters:
-    """Return ArduPlane's parameters of an aircraft with the airspeeds that the user's file of PX4 states."""
+    """Return ArduPlane's parameters with the airspeeds that the user's PX4 parameter file states.
+
+    own: the user's parameters; the result is unchanged if they are not PX4's.
+    """
     if not isinstance(own, Px4Parameters):
         return parameters
     stated = own.by_origin("file")
@@ -568,10 +575,11 @@ def simulate_judged_returns(
     min_heights: Floats,
     min_sphere_distances: Floats | None = None,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns, with the clearance up to the first item of a landing sequence if it is too low beyond it.
+    """Simulate returns for judging: the required height does not apply to a landing sequence's approach.
 
-    Beyond this item a return flies the approach of the mission itself, which descends to the landing; there only the
-    ground, the spheres, the zones and the energy limit it.
+    Beyond the first item of a landing sequence, a return flies the mission's own approach, which descends to the
+    landing; there only the ground, the spheres, the zones and the energy limit it.  If such a return becomes too low,
+    its clearance is measured only up to this item.
 
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
@@ -716,14 +724,15 @@ def _recheck_in_jsbsim(
     fly_again: FlyAgain,
     max_flights: int,
 ) -> tuple[list[SimulatedReturn], list[float]]:
-    """Fly doubtful returns in JSBSim, the most doubtful first, and correct them.
+    """Fly doubtful returns in JSBSim, the most doubtful first, and correct the point-mass results.
 
-    A doubtful return that is not flown (it begins in a turn, or `max_flights` are flown) is corrected by the nearest
-    flown one in its group of successive doubtful returns, if that one is worse in JSBSim.  Returns the corrected
-    returns, and the differences in clearance of the flown ones (JSBSim minus point mass, m).
+    A doubtful return that is not flown (it begins in a turn, or `max_flights` are flown) is corrected like the nearest
+    flown return in its group of successive doubtful returns, if the flown return is worse in JSBSim.
+
+    Returns the corrected returns, and for each flown return the difference in clearance (JSBSim minus point mass, m).
     """
     limit_ratios = [limit_ratio(ret) for ret in returns]
-    reachable = [k for k, row in enumerate(starts.rows) if limit_ratios[k] < 1.0 and is_reachable_start(world, row)]
+    reachable = [k for k, row in enumerate(starts.rows) if limit_ratios[k] < 1.0 and can_start_in_jsbsim(world, row)]
     offsets: dict[int, tuple[float, float]] = {}
     differences = []
     for k in sorted(reachable, key=lambda k: limit_ratios[k])[:max_flights]:
@@ -764,9 +773,11 @@ def _corrected_return(
     *,
     is_flown: bool,
 ) -> SimulatedReturn:
-    """Return a doubtful return with the differences of JSBSim from the point mass, found on a flown return.
+    """Correct a doubtful return by the differences between JSBSim and the point mass on a flown return.
 
-    offsets: differences in clearance and in distance outside kill spheres, m.
+    If these differences are large and decisive, the outcome becomes "unsure", unless a failure is certain.
+
+    offsets: differences (JSBSim minus point mass) in clearance and in distance outside kill spheres, m.
     flown: result of the point mass for the flown return.
     is_flown: True if the flown return is the doubtful return itself.
     """
@@ -807,7 +818,7 @@ def _with_offsets(
     )
 
 
-def is_reachable_start(world: ReturnWorld, row: Record) -> bool:
+def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
     """Return True if a JSBSim flight can begin at a start: the bank is small, and the airspeed is high enough."""
     wind = world.scenario.wind
     wind_speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))

@@ -90,7 +90,7 @@ def _empty_starts(*, is_flown: bool) -> ReturnStarts:
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return masks of the rows that are low in a flown take-off or landing, and of those too slow to fly, (n,) each."""
+    """Return two masks (n,): True for rows low in take-off or landing, and for rows too slow to fly."""
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
@@ -103,7 +103,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return the ground velocities at some rows, m/s, (n, 3); missing ones are computed from the positions."""
+    """Return the ground velocities at some rows, m/s, (n, 3); compute missing velocities from positions."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)

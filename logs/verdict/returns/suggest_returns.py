@@ -107,17 +107,17 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
-    """Return a mask of the starts whose RTL keeps the limits, without margin, in the point-mass simulation, (n,)."""
-    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all)
+    """Return a mask (n,): True for each start whose simulated RTL keeps the limits, without margin."""
+    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all_limits)
 
 
 def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
-    """Return a mask of the returns that arrive and keep the required height above ground, (n,)."""
+    """Return a mask (n,): True for each return that arrives and keeps the required height above ground."""
     return np.asarray((results["outcome"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
 
 
-def _meets_all(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
-    """Return a mask of the returns that arrive, keep the required height, and stay outside spheres, (n,).
+def _meets_all_limits(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
+    """Return a mask (n,): True for each return that arrives, keeps the required height and avoids spheres.
 
     `_meets_criterion` checks zones and energy.
     """
@@ -130,7 +130,7 @@ Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 def _rtls_meet_criterion(
     world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, criterion: Criterion
 ) -> Flags:
-    """Return a mask of the starts whose RTL meets a criterion, (n,); `_meets_all` includes zones and energy."""
+    """Return a mask (n,): True for each start whose RTL meets a criterion, as `_meets_criterion` does."""
     return _meets_criterion(world, starts, [world.target(row) for row in starts.rows], limits, criterion)
 
 
@@ -141,14 +141,14 @@ def _meets_criterion(
     limits: _ReturnLimits,
     criterion: Criterion,
 ) -> Flags:
-    """Return a mask of the returns to the given targets that meet a criterion, (n,).
+    """Return a mask (n,): True for each return to its target that meets a criterion.
 
-    With `_meets_all`, zones and energy are checked too.
+    With `_meets_all_limits`, zones and energy are checked too.
     """
-    sphere_distances = limits.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
+    sphere_distances = limits.sphere_distance if criterion is _meets_all_limits else np.full(len(starts), -math.inf)
     results, paths = simulate_judged_returns(world, starts, targets, limits.clearance, sphere_distances)
     is_met = criterion(world, results, limits)
-    if criterion is not _meets_all:
+    if criterion is not _meets_all_limits:
         return is_met
     if world.setup.envelope.power_level.size and world.is_battery_known:
         energy_left = world.setup.battery - np.nan_to_num(starts.energy_used) - results["energy"]
@@ -179,13 +179,13 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest the lowest RTL_ALTITUDE that clears the ground, the lowest safe one, or a climb before the turn.
+    """Suggest the lowest RTL_ALTITUDE that clears the ground or is safe, or a climb before the turn.
 
     Altitudes are tried one by one, because a higher altitude may lead through a sphere and so be less safe.
     """
     limits = _return_limits(world, starts)
     trial = _ReturnTrial(starts, limits)
-    if trial.passes(world, _meets_all):
+    if trial.passes(world, _meets_all_limits):
         return []
     remedies = []
     current_altitude = max(0.0, world.parameters.rtl_altitude)
@@ -212,7 +212,7 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     ground_altitude = min_passing_altitude(0.0, _clears_ground)
     if ground_altitude is not None and ground_altitude > current_altitude:
         remedies.append(Remedy({"RTL_ALTITUDE": ground_altitude}))
-    safe_altitude = min_passing_altitude(ground_altitude or 0.0, _meets_all)
+    safe_altitude = min_passing_altitude(ground_altitude or 0.0, _meets_all_limits)
     if safe_altitude is not None and safe_altitude not in (ground_altitude, current_altitude):
         remedies.append(Remedy({"RTL_ALTITUDE": safe_altitude}))
     if safe_altitude is None:
@@ -230,7 +230,7 @@ def _suggest_climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | N
     if altitude is not None:
         candidates += [candidate | {"RTL_ALTITUDE": altitude} for candidate in candidates]
     passing_candidate = first_that_passes(
-        candidates, lambda candidate: trial.passes(world.with_parameters(**candidate), _meets_all)
+        candidates, lambda candidate: trial.passes(world.with_parameters(**candidate), _meets_all_limits)
     )
     return [] if passing_candidate is None else [Remedy(passing_candidate)]
 
@@ -269,7 +269,7 @@ def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | N
     """
     limits, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
-    is_good_from_home = _rtls_meet_criterion(world.with_rally(()), starts, limits, _meets_all)
+    is_good_from_home = _rtls_meet_criterion(world.with_rally(()), starts, limits, _meets_all_limits)
     if is_good_from_home.all() or not start_count or world.ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
@@ -313,7 +313,7 @@ def _search_in_rounds(
         points = tuple(
             search.candidates[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
         )
-        is_good = _rtls_meet_criterion(world.with_rally(points), starts, limits, _meets_all)
+        is_good = _rtls_meet_criterion(world.with_rally(points), starts, limits, _meets_all_limits)
         unsafe_starts = np.flatnonzero(~is_good)
         if int(is_good.sum()) > best_result[0]:
             best_result = int(is_good.sum()), points, unsafe_starts
@@ -452,7 +452,7 @@ class _RallySearch:
         ]
         starts, limits = self._starts.subset(start_indices), self._limits.subset(start_indices)
         self._is_good[start_indices, candidate_indices] = _meets_criterion(
-            self._world, starts, targets, limits, _meets_all
+            self._world, starts, targets, limits, _meets_all_limits
         )
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:

@@ -157,7 +157,7 @@ class _Requirement(NamedTuple):
 
 
 def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return the positions near which a leg needs less height above ground, by leg number: east and north, m.
+    """Return, by leg number, positions (east, north, m) near which the leg needs less height above ground.
 
     The leg after a flown take-off has the position of home, and the legs before a flown landing have the landing point.
     The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no such item.  Only

@@ -23,11 +23,11 @@ from logs.verdict.measures.ground_paths import (
     GroundPath,
     Profile,
     first_hazard_on_path,
-    first_item,
     has_ground_paths,
     landing_item,
     min_path_clearance,
     straight_path,
+    takeoff_item,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -74,7 +74,11 @@ class _Obstacles(NamedTuple):
         return self.clearance >= 0.0 and not self.entered_hazard
 
     def obstacle_message(self, subject: str, origin: str) -> Message:
-        """Describe the obstacle.  origin: text that names the origin of `distance`."""
+        """Describe the obstacle.
+
+        subject: name of the path.
+        origin: text on the place from which `distance` is measured, such as "from home".
+        """
         if self.entered_hazard:
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
@@ -112,7 +116,7 @@ def climbout_findings(
         return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
     start = (float(east), float(north))
-    first_waypoint, takeoff = first_item(requirements)
+    first_waypoint, takeoff = takeoff_item(requirements)
     first_point, ground_altitude = requirements.points[first_waypoint], float(terrain.height(*start))
     place = requirements.waypoint(first_waypoint)
     if takeoff is not None:

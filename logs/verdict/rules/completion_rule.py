@@ -162,7 +162,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
 def _unflown_legs(
     setup: FlightSetup, flown_stretches: Sequence[FlownLegs], flown_legs: set[int]
 ) -> tuple[list[int], list[str]]:
-    """Return the unflown legs, and a text for each group of legs that the log may show only in part."""
+    """Return the legs that were certainly not flown, and texts on legs that the log may lack."""
     unflown_legs = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
     begins_in_flight = setup.source is not None and setup.source.begins_in_flight
     unseen_legs = [leg for leg in unflown_legs if begins_in_flight and leg < flown_stretches[0].first]
@@ -193,7 +193,7 @@ def _gap_notes(flown_stretches: Sequence[FlownLegs]) -> list[str]:
 
 
 def _leg_numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
-    """Return the distinct numbers of some legs, sorted; all legs around a loiter share one number."""
+    """Return the distinct numbers of legs in messages, sorted; all legs of a loiter share one number."""
     return sorted({int(setup.route.leg_numbers[leg]) for leg in legs})
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from logs.verdict.findings import Finding, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack, along_across
+from logs.verdict.measures.track_alignment import AlignedTrack, project_onto_leg
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
 
@@ -80,7 +80,7 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
     if ground is None or ground.procedures.take_off is None or ground.procedures.take_off.waypoint != leg:
         return rows
     course_error = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
-    lateral_offset = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
+    lateral_offset = project_onto_leg(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
     has_joined = (course_error < math.sin(0.5 * RUNWAY_COURSE_TOLERANCE_RAD)) & (np.abs(lateral_offset) <= limit)
     return slice(rows.start + int(np.argmax(has_joined)), rows.stop) if has_joined.any() else rows
 

@@ -26,9 +26,9 @@ from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, mess
 from logs.verdict.measures.ground_paths import (
     GroundPath,
     first_hazard_on_path,
-    first_item,
     has_ground_paths,
     landing_item,
+    takeoff_item,
 )
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -133,7 +133,10 @@ class _GoAround(NamedTuple):
 
     @property
     def is_clear(self) -> bool:
-        """True if the go-around hits nothing, gets back, and keeps the required height, as far as its path is known."""
+        """True if the go-around hits nothing, returns to the approach, and keeps the required height.
+
+        The unknown part of its path is ignored.
+        """
         return (
             math.isnan(self.impact_time)
             and not self.entered_hazard
@@ -142,7 +145,7 @@ class _GoAround(NamedTuple):
         )
 
     @property
-    def badness(self) -> tuple[bool, bool, bool, float]:
+    def severity(self) -> tuple[bool, bool, bool, float]:
         """Sort key that puts the worst go-around last."""
         return (
             not math.isnan(self.impact_time),
@@ -190,7 +193,7 @@ def _find_landing(
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
     home_position = home_point(setup.mission, setup.scenario.origin, terrain)
     home_altitude = math.nan if home_position is None else home_position.up
-    first, takeoff = first_item(requirements)
+    first, takeoff = takeoff_item(requirements)
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
     climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
     destinations = _go_around_destinations(requirements, waypoint)
@@ -270,7 +273,7 @@ def _go_around_finding(
         if landing.unknown_path_text
         else _simulate_go_arounds(requirements, terrain, world, landing, height, _abort_distances(landing))
     )
-    worst = max(go_arounds, key=lambda go_around: go_around.badness, default=None)
+    worst = max(go_arounds, key=lambda go_around: go_around.severity, default=None)
     unknown_text = landing.unknown_path_text or next(
         (go_around.unknown_part_text for go_around in go_arounds if go_around.unknown_part_text), ""
     )

@@ -59,12 +59,12 @@ def height_findings(
 
 
 def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's maximum height above ground, m, and its position as a fraction of the segment, (n - 1,).
+    """Return each segment's maximum height above ground (m), and where it occurs, (n - 1,) each.
 
     points: ends of the segments as east, north and up, m, (n, 3).
 
-    The maximum is exact for bilinear ground, because it is the minimum height in the inverted world.  It is NaN if a
-    segment leaves the raster or its data.
+    The place is a fraction of the segment.  The maximum is exact for bilinear ground, because it is the minimum height
+    in the inverted world.  It is NaN if a segment leaves the raster or its data.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     inverted_heights, fraction = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import stated_loiter
-from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, badness, finding_reason, make_finding, message
+from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, finding_reason, make_finding, message, worst_first_key
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack, approaches
+from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import (
@@ -120,7 +120,7 @@ def merge_loiter_findings(
                     merged[k] = finding if finding.ok is not None else None
                 rule_findings = [entry for entry in rule_findings if entry[1].ok is not None]
             if len(rule_findings) > 1:
-                worst_index, worst = min(rule_findings, key=lambda entry: badness(entry[1]))
+                worst_index, worst = min(rule_findings, key=lambda entry: worst_first_key(entry[1]))
                 for k, _ in rule_findings:
                     merged[k] = None
                 reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
@@ -133,10 +133,10 @@ def end_loiter_findings(
 ) -> list[Finding]:
     """Judge the loiter without end after the last waypoint.
 
-    It fails if the wind is too strong for a circle, since the aircraft then drifts downwind without end.  Before a
-    flight, the hazards around the circle are judged, too; a flight flies it once.
+    The finding fails if the wind is too strong for a circle, since the aircraft then drifts downwind without end.
+    Before a flight, a finding on the hazards around the loiter is returned otherwise.
 
-    Return [] if the mission does not end in this way.
+    Return [] if the mission does not end in such a loiter, or if a flight is judged and the wind permits a circle.
     """
     reach_and_hazards = end_loiter_hazards(requirements)
     if reach_and_hazards is None:
@@ -177,7 +177,7 @@ def _loiter_finding(
     corners = slice(circle.first, circle.last + 1)
     is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
     min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
-    corner_findings = [_without_early_end(aligned, finding) for finding in corner_findings]
+    corner_findings = [_unjudge_if_unreached_corner(aligned, finding) for finding in corner_findings]
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     uses_parameter = _uses_parameter_radius(requirements, circle)
@@ -286,8 +286,11 @@ def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_rad
     return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where the aircraft circles"
 
 
-def _without_early_end(aligned: AlignedTrack | None, corner_finding: Finding) -> Finding:
-    """Return a finding as not judged if the flight ended before its corner; the completion rule judges such an end."""
+def _unjudge_if_unreached_corner(aligned: AlignedTrack | None, corner_finding: Finding) -> Finding:
+    """Return a finding as not judged if it fails only because the flight ended before its corner.
+
+    The completion rule judges such an end.
+    """
     index = corner_finding.place.index
     is_reached = aligned is None or index is None or bool(aligned.passed[index])
     return corner_finding if is_reached or corner_finding.ok is not False else replace(corner_finding, ok=None)
@@ -298,7 +301,7 @@ def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle:
 
     The corners do not show this, because a flight that leaves the loiter when its time is over may miss all of them.
     """
-    distances, _ = approaches(aligned.track.position, circle.center)
+    distances, _ = closest_approaches(aligned.track.position, circle.center)
     turn_distance = requirements.setup.autopilot.turns.distance(math.pi, float(requirements.points[circle.first, 2]))
     return bool(distances.min() <= circle.radius + turn_distance + WAYPOINT_PASS_MARGIN_M)
 
@@ -322,7 +325,7 @@ def _failed_corner_message(requirements: RouteRequirements, circle: LoiterCircle
 
 def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding]) -> Message:
     """Return a message with the number of corners that were not held, and the worst of them."""
-    worst_corner = min(failed_corners, key=badness)
+    worst_corner = min(failed_corners, key=worst_first_key)
     corner_count = len({finding.place for finding in failed_corners})
     count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held; the worst is "
     return Message(

@@ -39,7 +39,7 @@ from flight.mission.itinerary import make_itinerary
 from flight.mission.preflight_notes import landing_slopes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
-from logs.verdict.measures.mission_ends import missing_ends_text, returns_after_last_item
+from logs.verdict.measures.mission_ends import judges_return_after_last_item, missing_ends_text
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -272,13 +272,13 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     with suppress(FlightError):
         aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return MissionParts(
-        returns=C.NAV_RETURN_TO_LAUNCH in commands or returns_after_last_item(setup),
+        returns=C.NAV_RETURN_TO_LAUNCH in commands or judges_return_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
         takes_off=procedures.take_off is not None,
         lands=procedures.approach is not None,
         loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
         has_fence=bool(setup.mission.fences),
-        fence_at_home=_fence_at_home(setup),
+        fence_at_home=_home_fence_violation(setup),
         smallest_inclusion=min(
             (item.params[0] for item in setup.mission.fences if item.command == C.NAV_FENCE_CIRCLE_INCLUSION),
             default=math.inf,
@@ -310,7 +310,7 @@ def _rally_distance(mission: Mission) -> float:
     )
 
 
-def _fence_at_home(setup: FlightSetup) -> str:
+def _home_fence_violation(setup: FlightSetup) -> str:
     """Return how home violates the mission's fence, such as "inside an exclusion polygon"; "" if it does not."""
     mission, checks = setup.mission, setup.autopilot.checks
     if mission.home is None or not mission.fences:
@@ -321,7 +321,7 @@ def _fence_at_home(setup: FlightSetup) -> str:
 
 
 def _full_voltage(setup: FlightSetup) -> float:
-    """Return the voltage of the full battery, V; infinite without a battery, and for a guessed one."""
+    """Return the voltage of the full battery, V; infinite without a battery, and for a guessed battery."""
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 
@@ -343,7 +343,7 @@ _PX4_LOCATED_COMMANDS = frozenset(
 
 
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
-    """Yield the items that PX4 refuses at upload.
+    """Yield a remark on each item that PX4 refuses at upload.
 
     refuses: True if PX4 is to fly; a command without coordinates in a frame with coordinates is only then reported,
         because every file of Mission Planner has such commands.
@@ -379,7 +379,7 @@ def _height_above_home(mission: Mission, item: MissionItem) -> float:
 
 
 def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
-    """Yield take-off items that are not above home, or that come after another navigation item."""
+    """Yield a remark on each take-off item that is not above home or comes after another navigation item."""
     has_earlier_place = False
     for item in mission.items:
         if item.command in TAKEOFFS:
@@ -392,7 +392,7 @@ def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_landing(mission: Mission) -> Iterator[_Remark]:
-    """Yield items at fault in the order of DO_LAND_START, landings and return to launch."""
+    """Yield a remark on each item that breaks the order of DO_LAND_START, landings and return to launch."""
     commands = [item.command for item in mission.items]
     land_starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
     landings = [k for k, command in enumerate(commands) if command in LANDINGS]
@@ -463,7 +463,7 @@ def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin
 
 
 def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield the first flown item if it is too far from home; without a home, yield a remark that says so."""
+    """Yield a remark if the first flown item is too far from home, or if the mission has no home."""
     flown_items = _flown_items(mission)
     if mission.home is None or not flown_items:
         yield True, None, "no home, so no distance to the first waypoint"
@@ -493,7 +493,7 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
-    """Yield gates that are too close to a waypoint, and the longest leg if older PX4 releases refuse it."""
+    """Yield remarks on gates too close to a waypoint, and on the longest leg if older PX4 releases refuse it."""
     yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
@@ -511,7 +511,10 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
-    """Yield flown items below home; stop at the first item above home if the file has no home."""
+    """Yield a remark on each flown item below home.
+
+    If the file has no home, the check ends with a remark on the first item whose height is above home.
+    """
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
             reason = "the file has heights above home but no home: PX4 refuses them until the vehicle has a home"
@@ -522,7 +525,7 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
-    """Yield route points that violate the mission's own fence by PX4's test."""
+    """Yield a remark on each route point that violates the mission's own fence by PX4's test."""
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return

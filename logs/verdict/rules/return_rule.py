@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Command
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
-from logs.verdict.measures.mission_ends import judged_return_text, returns_after_last_item
+from logs.verdict.measures.mission_ends import judged_return_text, judges_return_after_last_item
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -98,7 +98,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     end: start of this return, at the end of the mission; None if the flight did not reach the end of the mission.
     """
     setup = requirements.setup
-    if not returns_after_last_item(setup):
+    if not judges_return_after_last_item(setup):
         return []
     ok: bool | None = None
     check, brief, text = "", "the flight did not reach the end of the mission", ""
@@ -146,7 +146,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
         answers = [judge(world, return_starts, interval) for judge in judges]
     except MissionError as error:
         # Without a home no RTL is safe, and the places that a glide reaches are unknown.
-        answers = [_Answer(False if "rtl" in requirement.require else None, str(error), _METHOD)]
+        answers = [_RequirementResult(False if "rtl" in requirement.require else None, str(error), _METHOD)]
     results = {answer.ok for answer in answers}
     ok = False if False in results else None if None in results else True
     # Failures come first, then unknown answers.
@@ -166,7 +166,7 @@ _METHOD = "by the simulated ArduPlane flying a point-mass model"
 _NOT_KNOWN = "it is not fully known whether the aircraft gets home as the scenario requires"
 
 
-class _Answer(NamedTuple):
+class _RequirementResult(NamedTuple):
     """Answer to a requirement: True if it is met or None if unknown, the reason, and the method of judging."""
 
     ok: bool | None
@@ -174,13 +174,15 @@ class _Answer(NamedTuple):
     method: str
 
 
-def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _Answer:
+def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _RequirementResult:
     """Judge whether every RTL is safe."""
     judged_returns = judge_returns(world, starts, interval)
-    return _Answer(None if judged_returns.undecided else judged_returns.safe, headline(judged_returns), _METHOD)
+    return _RequirementResult(
+        None if judged_returns.undecided else judged_returns.safe, headline(judged_returns), _METHOD
+    )
 
 
-def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
+def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _RequirementResult:
     """Judge whether a glide from every start reaches home, a rally point, a landing site or flat ground.
 
     Starts below the minimum height above ground are omitted: there the aircraft takes off or lands, and would descend
@@ -192,11 +194,11 @@ def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer
         f"; {is_low.sum()} starts lower than {world.limit:.0f} m above ground are omitted" if is_low.any() else ""
     )
     reason = f"without the engine: {glides_headline(glides)}{omitted_text}"
-    return _Answer(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
+    return _RequirementResult(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
 
 # The go-around has its own rule.
-_JUDGES: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {
+_JUDGES: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _RequirementResult]] = {
     "rtl": _judge_rtl,
     "glide": _judge_glides,
 }
@@ -214,7 +216,7 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
     track = aligned.track
     east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
     # True radii grow with altitude as the square of true airspeed.
-    radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
+    radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
     is_at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, radius)) & (
         np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     )
@@ -269,7 +271,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
 def without_path_following_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Remove the findings on how well the RTL follows its drawn path.
+    """Return the findings without those on how well the RTL follows its drawn path.
 
     findings: all findings, including the finding on the RTL itself.
     """

@@ -90,7 +90,7 @@ def _speed_finding(
             error = mean_speed - commanded
             notes.append(f"flown {mean_speed:.2f} m/s on average, {min_mean:.1f} m/s at the slowest second")
             is_off = abs(error) > MEAN_SPEED_TOLERANCE_MPS + tolerance
-            if is_off and not _is_caused_by_air(requirements, aligned, leg, error):
+            if is_off and not _is_caused_by_vertical_wind(requirements, aligned, leg, error):
                 text = (
                     f"flown {mean_speed:.1f} m/s on average, {abs(error):.1f} m/s off the commanded {commanded:.1f} m/s"
                 )
@@ -173,7 +173,7 @@ def _find_held_speed(
     speed = float(aligned.track.airspeed[middle_row : rows.stop].astype(np.float64).mean())
     error, allowed_error = speed - commanded, max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
     tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[middle_row]))
-    if abs(error) <= allowed_error + tolerance or _is_caused_by_air(requirements, aligned, leg, error):
+    if abs(error) <= allowed_error + tolerance or _is_caused_by_vertical_wind(requirements, aligned, leg, error):
         return None
     if error > 0.0 and float(requirements.ground_speed[leg]) < MIN_GROUND_SPEED_MPS:
         return None
@@ -247,7 +247,7 @@ def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _is_caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, error: float) -> bool:
+def _is_caused_by_vertical_wind(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, error: float) -> bool:
     """Return True if vertical air motion caused a speed error (m/s), instead of a lack of performance.
 
     This is assumed if the aircraft was too slow in a climb or too fast in a descent, although it showed the ability to
@@ -262,7 +262,7 @@ def _is_caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, le
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the minimum and maximum airspeed of level flight along the whole leg, m/s, and faults of the command.
+    """Return minimum and maximum airspeed (m/s) of level flight on the whole leg, and the command's faults.
 
     The airspeeds are NaN if level flight is impossible at one end of the leg.
     """

@@ -65,7 +65,7 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
         for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():
             bank, stall_speed = (
                 planned_bank(requirements, corner, speed),
-                level_stall(requirements, float(requirements.points[corner, 2])),
+                min_level_airspeed(requirements, float(requirements.points[corner, 2])),
             )
             margin = _Margin(speed, stall_speed / math.sqrt(math.cos(bank)), stall_speed, bank)
             if (
@@ -98,7 +98,7 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
     return min(bank, reachable_bank, limit)
 
 
-def level_stall(requirements: RouteRequirements, altitude: float) -> float:
+def min_level_airspeed(requirements: RouteRequirements, altitude: float) -> float:
     """Return the minimum true airspeed of level flight at an altitude (m AMSL), m/s.
 
     At this airspeed the elevator is at its stop.

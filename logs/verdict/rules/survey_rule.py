@@ -214,7 +214,7 @@ def _flown_finding(
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
 
 
-def lost_text(measure: LineMeasure) -> str:
+def unusable_parts_text(measure: LineMeasure) -> str:
     """List the causes that make parts of a photo line unusable, the largest first, each with its fraction of the line.
 
     Causes below 0.5 % are left out; return "" if none remains.
@@ -232,9 +232,11 @@ def lost_text(measure: LineMeasure) -> str:
 def _coverage_fault(measure: LineMeasure, name: str) -> Message:
     """Describe the usable fraction of a photo line, the causes of the loss, and the lengths lost at the line's ends."""
     ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
+    if max(measure.lost_at_start, measure.lost_at_end) < 1.0:
+        ends_text = ""
     return message(
         f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
-        f": {lost_text(measure)}{ends_text if max(measure.lost_at_start, measure.lost_at_end) >= 1.0 else ''}",
+        f": {unusable_parts_text(measure)}{ends_text}",
     )
 
 

@@ -188,7 +188,7 @@ def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
 def _slope_limit(
     requirements: RouteRequirements, leg: int, first_altitude: float, last_altitude: float, slope: float
 ) -> tuple[float, str]:
-    """Return the limit on the slope of a climb or descent on a leg's course, rad, and the name of the limit's source.
+    """Return the slope limit (rad) of a climb or descent on a leg's course, and the name of its source.
 
     slope: rad; its sign selects the limit for a climb or for a descent.
     """

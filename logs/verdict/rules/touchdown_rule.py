@@ -101,7 +101,7 @@ def touchdown_findings(
 
 
 def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
-    """Before a flight, return a finding if the strip is too short to judge the touch-down."""
+    """Return an undecided finding if the strip is too short to judge the touch-down, otherwise []."""
     messages = _short_strip_messages(approach)
     reason = finding_reason(messages)
     return (
@@ -298,7 +298,7 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
 
 
 def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
-    """Describe the landing in a list of phrases."""
+    """Return phrases on a landing: touch-down, remaining strip, sink rate, final approach, tailwind."""
     direction = "before" if landing.distance_beyond_point < 0.0 else "beyond"
     notes = [
         f"touches down {abs(landing.distance_beyond_point):.0f} m {direction} the landing point, "

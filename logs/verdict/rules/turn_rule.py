@@ -7,7 +7,7 @@ import numpy as np
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink
+from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink_distance
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -66,7 +66,7 @@ def _turn_finding(
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
-        lateral = negligible_kink(requirements, i)
+        lateral = negligible_kink_distance(requirements, i)
         if lateral is None:
             # The message already states the turn and its limit.
             faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []
@@ -108,9 +108,9 @@ def _turn_finding(
 def _unflown_turn_text(
     requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None
 ) -> str:
-    """Return the text why a turn was not flown.
+    """Explain why a turn was not flown: the flight ended before it, or the autopilot skipped a leg.
 
-    Either the flight ended before the turn, or the autopilot skipped a neighbouring leg.
+    For an imported flight, return only that its legs were not flown one after the other.
     """
     if measure.corner is not None:
         return "its legs were not flown one after the other"
@@ -148,9 +148,9 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 def _sharp_turn_message(
     requirements: RouteRequirements, i: int, planned_turn: float, limit: float, source: str
 ) -> Message:
-    """Return the message why the planned turn (rad) at waypoint i does not fit.
+    """Explain why the planned turn (rad) at waypoint i is too sharp.
 
-    The message states the limit (rad), or the leg length that the turn takes.
+    The message states the scenario's limit (rad), or the leg length that the turn takes.
     """
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":

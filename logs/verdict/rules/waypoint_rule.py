@@ -12,7 +12,7 @@ import numpy as np
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import AcceptanceCondition, acceptance_condition
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
+from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text, place_text_within
@@ -144,7 +144,7 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
     if i == 0:
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
-    distances_along, lateral_offsets = along_across(
+    distances_along, lateral_offsets = project_onto_leg(
         requirements, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1]
     )
     rows_past = np.flatnonzero(distances_along >= requirements.runs[i - 1])
@@ -163,14 +163,15 @@ def _acceptance_text(condition: AcceptanceCondition) -> str:
 def _closest_approach(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int, reference_altitude: float
 ) -> tuple[float, float]:
-    """Return the minimum horizontal distance of the track from waypoint `i`, and the altitude error at this point, m.
+    """Return the track's minimum horizontal distance from waypoint `i`, and the altitude error there, m.
 
-    The altitude error is relative to `reference_altitude` (m AMSL).
+    The altitude error is relative to `reference_altitude` (m AMSL); of several equally close places, the smallest
+    error is taken.
     """
     first = int(aligned.rows[i - 1]) if i else 0
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]
-    distance, fraction = approaches(position, requirements.points[i])
+    distance, fraction = closest_approaches(position, requirements.points[i])
     if not distance.size:
         offset = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(offset[0], offset[1]), float(offset[2])

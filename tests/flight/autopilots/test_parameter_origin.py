@@ -7,7 +7,12 @@ import pytest
 import flight.autopilots.arduplane.parameters as arduplane
 import flight.autopilots.px4.parameters as px4
 from flight.autopilots.parameter_files import parse_parameters
-from flight.autopilots.parameter_origin import ParameterOrigin, parameter_origin, read_parameters_for, refuse_unknown
+from flight.autopilots.parameter_origin import (
+    ParameterOrigin,
+    parameter_origin,
+    read_parameters_for,
+    refuse_unknown_parameters,
+)
 from world.errors import ParameterError
 
 COPTER = "a multicopter or helicopter"
@@ -96,9 +101,9 @@ def test_a_file_without_a_known_name_is_refused_unless_it_is_the_autopilots_own(
         entries = parse_parameters(text, "a.param")
         if refused:
             with pytest.raises(ParameterError, match=r"a\.param: FOO, BAR: not known to the simulated ArduPlane"):
-                refuse_unknown(Path("a.param"), "ardupilot", entries, {})
+                refuse_unknown_parameters(Path("a.param"), "ardupilot", entries, {})
         else:
-            refuse_unknown(Path("a.param"), "ardupilot", entries, {})
+            refuse_unknown_parameters(Path("a.param"), "ardupilot", entries, {})
 
 
 def test_every_parameter_of_a_law_is_recognised_as_its_own() -> None:

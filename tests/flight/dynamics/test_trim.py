@@ -23,13 +23,13 @@ from flight.dynamics.trim import (
     body_axes,
     euler,
     first_guess,
-    from_vector,
     full_throttle_climb,
     idle_descent,
     linearise,
     slowest_level_flight,
     solve_trim,
     steady_flight,
+    trim_from_vector,
 )
 from tests.kernels.processors import NUMPY_ON_BASELINE_CPU
 from tests.soak import SOAK
@@ -252,14 +252,14 @@ def test_the_slowest_flight_has_the_elevator_at_its_stop() -> None:
 
 def test_vector_and_back_is_the_same_trim() -> None:
     trim = Trim(25.0, 700.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
-    assert from_vector(trim.vector(), 700.0) == trim
+    assert trim_from_vector(trim.vector(), 700.0) == trim
     assert trim.commands() == (0.4, 0.5, 0.6, 0.7)
     assert dict(zip(QUANTITIES, trim.vector(), strict=True))["bank"] == 0.3
 
 
 def test_linearising_a_linear_aircraft_gives_its_matrices() -> None:
     aircraft = LinearAircraft()
-    a, b = linearise(aircraft, from_vector(LinearAircraft.balanced, 300.0))
+    a, b = linearise(aircraft, trim_from_vector(LinearAircraft.balanced, 300.0))
     np.testing.assert_allclose(a, aircraft.a, atol=1e-7)
     np.testing.assert_allclose(b, aircraft.b, atol=1e-7)
     assert aircraft.amsl == 300.0

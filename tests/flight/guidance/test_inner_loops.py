@@ -9,7 +9,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.envelope import GRAVITY
-from flight.autopilots.planfly.law import CROSS_TRACK, L1, LAWS, VECTOR_FIELD, steer_bank, steer_height
+from flight.autopilots.planfly.law import CROSS_TRACK, L1, LAWS, VECTOR_FIELD, follow_altitude_profile, steer_bank
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.gains import Gains, load_gains
 from flight.guidance.inner_loops import GUIDANCE_MEMORY, step_roll_model
@@ -68,7 +68,7 @@ class Channel:
     ) -> Record:
         state = record(STATE, airspeed=self.speed if airspeed is None else airspeed, roll=roll)
         estimated = record(MOTION, up=up, velocity_north=self.speed, velocity_up=climb)
-        steer_height(state, estimated, self.nodes, self.gains, self.memory, self.commands, 0.0, DT)
+        follow_altitude_profile(state, estimated, self.nodes, self.gains, self.memory, self.commands, 0.0, DT)
         return self.commands
 
     def bank(self, wanted: float, **state: float) -> Record:

@@ -75,7 +75,7 @@ class OneSetup:
     def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         return PreparedFlight(self.setup, LocalMap.around(self.setup)), MissionJudged(order.number, True, True, ())
 
-    def divert(self, request: DivertFlight, here: object) -> PreparedFlight:
+    def prepare_diversion(self, request: DivertFlight, here: object) -> PreparedFlight:
         raise FlightError("no way there")
 
     def open_log(self, setup: FlightSetup, mode: int) -> MemoryLog:

@@ -53,9 +53,9 @@ def test_what_ends_a_flight_is_named_first_and_of_a_rule_the_worst() -> None:
 
 
 def test_the_list_has_what_failed_or_is_open_and_then_the_closest_of_each_other_rule() -> None:
-    assert [number for number, _ in VERDICT.present().worth_listing(60)] == [0, 1, 2, 3, 7, 6]
+    assert [number for number, _ in VERDICT.present().findings_to_list(60)] == [0, 1, 2, 3, 7, 6]
     # Of many failures as many as are asked for; a rule whose worst failure is left out has no other finding.
-    assert [number for number, _ in VERDICT.present().worth_listing(2)] == [0, 1, 6]
+    assert [number for number, _ in VERDICT.present().findings_to_list(2)] == [0, 1, 6]
 
 
 def test_the_state_is_open_where_nothing_failed_and_a_part_was_not_judged() -> None:

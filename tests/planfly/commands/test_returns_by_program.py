@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planfly
-from logs.verdict.returns.judge_returns import badness, judge_returns, make_return_world
+from logs.verdict.returns.judge_returns import judge_returns, make_return_world, worst_first_key
 from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
 from planfly.rtl import jsbsim_returns as return_flights
@@ -104,7 +104,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     returns = judge_returns(world, starts, 2.0)
     chosen = worst_separated_returns(world, starts, returns, 4)
     assert len(chosen) == 4
-    assert chosen[0][0] == min(returns.each, key=badness)
+    assert chosen[0][0] == min(returns.each, key=worst_first_key)
     east = [one.start[0] for one, _ in chosen]
     # Half of a fourth of 6.5 km.
     assert min(abs(a - b) for k, a in enumerate(east) for b in east[:k]) > 0.95 * 6500.0 / 8.0

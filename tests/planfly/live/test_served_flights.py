@@ -135,7 +135,7 @@ def test_a_diverted_flight_lands_nowhere_whatever_strip_there_is(options: ServeO
     prepared, _ = flights.prepare(JudgeMission(whole, 1))
     assert prepared is not None
     assert prepared.setup.ground_phases.approach is not None
-    diverted = flights.divert(DivertFlight(AUTO, whole), np.array([0.0, -300.0, 100.0])).setup
+    diverted = flights.prepare_diversion(DivertFlight(AUTO, whole), np.array([0.0, -300.0, 100.0])).setup
     assert not diverted.ground_phases
     assert any("not flown to the ground" in note for note in diverted.notes)
 

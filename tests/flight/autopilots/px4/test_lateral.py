@@ -6,7 +6,7 @@ import pytest
 
 from flight.autopilots.px4.lateral import (
     adapted_period,
-    feasibility,
+    bearing_feasibility,
     follow_leg,
     follow_loiter,
     reference_air_velocity,
@@ -104,7 +104,7 @@ def test_the_heading_holds_the_course_in_wind() -> None:
     [(0.0, 20.0, 1.0), (23.5, 1.0, 1.0), (25.0, 1.0, 0.0), (24.25, 1.0, 0.5), (0.0, -24.25, 0.5), (18.0, -24.0, 0.0)],
 )
 def test_a_course_can_be_flown_with_airspeed_to_spare(across: float, along: float, expected: float) -> None:
-    assert feasibility(25.0, across, along) == pytest.approx(expected)
+    assert bearing_feasibility(25.0, across, along) == pytest.approx(expected)
 
 
 def test_a_slow_ground_speed_raises_the_airspeed() -> None:

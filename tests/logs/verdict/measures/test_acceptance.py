@@ -12,7 +12,7 @@ from logs.verdict.measures.acceptance import (
     corner_depths,
     corridor_limit,
     farthest_from_legs,
-    negligible_kink,
+    negligible_kink_distance,
     position_error,
     step_height,
 )
@@ -71,10 +71,12 @@ def demands_of(points: list[list[float]], **how: Any) -> RouteRequirements:
 def test_a_sidestep_is_passed_at_half_its_width() -> None:
     requirements = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
     # Without the first corner alone the way passes it at 6 m, and hardly turns at the second.
-    assert negligible_kink(requirements, 1) == pytest.approx(6.0, abs=0.01)
+    assert negligible_kink_distance(requirements, 1) == pytest.approx(6.0, abs=0.01)
     wide = demands_of([[0, 0, 300], [0, 1000, 300], [12, 1000, 300], [12, 2000, 300]])
-    assert negligible_kink(wide, 1) == pytest.approx(6.0, abs=0.01)
-    assert negligible_kink(demands_of([[0, 0, 300], [0, 1000, 300], [16, 1000, 300], [16, 2000, 300]]), 1) is None
+    assert negligible_kink_distance(wide, 1) == pytest.approx(6.0, abs=0.01)
+    assert (
+        negligible_kink_distance(demands_of([[0, 0, 300], [0, 1000, 300], [16, 1000, 300], [16, 2000, 300]]), 1) is None
+    )
 
 
 def test_the_way_without_a_corner_has_to_have_room_for_its_own_turns() -> None:
@@ -83,7 +85,7 @@ def test_the_way_without_a_corner_has_to_have_room_for_its_own_turns() -> None:
         requirements = demands_of(
             [[0, 0, 300], [0, 1000, 300], [5, 1005, 300], [5 + run, 1005, 300], [5 + run, 3000, 300]]
         )
-        assert (negligible_kink(requirements, 1) is not None) is room
+        assert (negligible_kink_distance(requirements, 1) is not None) is room
 
 
 def test_the_corners_of_a_circle_are_no_jog() -> None:
@@ -91,7 +93,7 @@ def test_the_corners_of_a_circle_are_no_jog() -> None:
     arcs = requirements.setup.route.arc_radii.copy()
     arcs[1:3] = 3.0
     object.__setattr__(requirements.setup, "route", requirements.setup.route.with_fields(arc_radius=arcs))
-    assert negligible_kink(requirements, 1) is None
+    assert negligible_kink_distance(requirements, 1) is None
 
 
 @pytest.mark.parametrize(("rise", "height"), [(9.9, 9.9), (-9.9, 9.9), (10.1, None), (-10.1, None)])
@@ -119,4 +121,4 @@ def test_a_way_past_one_corner_of_a_circle_is_no_jog(circle: int) -> None:
     arcs = requirements.setup.route.arc_radii.copy()
     arcs[circle] = 3.0
     object.__setattr__(requirements.setup, "route", requirements.setup.route.with_fields(arc_radius=arcs))
-    assert negligible_kink(requirements, 1) is None
+    assert negligible_kink_distance(requirements, 1) is None

@@ -18,7 +18,7 @@ from logs.verdict.measures.slopes import (
     measure_slope,
     straight_span,
 )
-from logs.verdict.measures.track_alignment import AlignedTrack, align_track, lifted_speed
+from logs.verdict.measures.track_alignment import AlignedTrack, airspeed_gain_in_rising_air, align_track
 from logs.verdict.tolerances import ROUGH_COURSE_ERROR_RAD, SLOPE_ERROR_FLOOR_RAD
 from tests.synthetic import Profile, edited, fly_path, make_setup
 
@@ -123,7 +123,7 @@ def test_rising_air_lends_speed_that_fades() -> None:
     time = np.arange(0.0, 60.0, 0.1)
     rising = np.where(time < 5.0, 1.0, 0.0).astype(np.float32)
     speed = np.full(time.size, 25.0, dtype=np.float32)
-    gained = lifted_speed(time, speed, rising)
+    gained = airspeed_gain_in_rising_air(time, speed, rising)
     assert gained.max() == pytest.approx(9.81 / 25.0 * 5.0, rel=0.25)
     assert gained[-1] < 0.05 * gained.max()
 
@@ -162,6 +162,6 @@ def test_speed_that_a_gust_along_the_track_took_is_not_lost(throttle: float, off
 def test_heights_within_a_decimetre_are_one(span: float, value: float) -> None:
     """A rate of 2 at the top that falls below it; heights are in hundreds of metres."""
     x, y = np.tile([-1.0, 1.0], 500), np.linspace(-span, 0.0, 1000)
-    found = slopes._plane_at_origin(2.0 + 100.0 * y, x, y, 10.0)
+    found = slopes._fit_plane_at_origin(2.0 + 100.0 * y, x, y, 10.0)
     assert found is not None
     assert found[0] == pytest.approx(value, abs=1e-3)

@@ -10,7 +10,7 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures import track_alignment
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.measures.track_alignment import align_track, along_across, approaches
+from logs.verdict.measures.track_alignment import align_track, closest_approaches, project_onto_leg
 from tests.synthetic import fly_path, make_setup, waypoint_stations
 
 CAPTURE = 500.0
@@ -106,13 +106,13 @@ def test_along_and_to_the_right_of_a_leg(course_deg: float) -> None:
     setup = make_setup([[*start, 300], [*(start + 900.0 * ahead), 300], [*(start + 1800.0 * ahead), 300]])
     wanted = np.array([[0.0, 0.0], [500.0, 30.0], [-20.0, -70.0]])
     position = np.column_stack([start + wanted[:, :1] * ahead + wanted[:, 1:] * right, np.full(3, 300.0)])
-    along, across = along_across(route_requirements(setup), 0, position)
+    along, across = project_onto_leg(route_requirements(setup), 0, position)
     np.testing.assert_allclose(np.column_stack([along, across]), wanted, atol=1e-9)
 
 
 def test_the_approach_of_each_segment() -> None:
     position = np.array([[0.0, 0.0, 5.0], [10.0, 0.0, 9.0], [10.0, 0.0, 9.0], [10.0, 30.0, 0.0]])
-    away, fraction = approaches(position, np.array([4.0, 3.0]))
+    away, fraction = closest_approaches(position, np.array([4.0, 3.0]))
     assert away == pytest.approx([3.0, math.sqrt(45.0), 6.0])
     assert fraction == pytest.approx([0.4, 0.0, 0.1])
 

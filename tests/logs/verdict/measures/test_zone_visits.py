@@ -8,12 +8,12 @@ import pytest
 from logs.verdict.measures.path_moves import MOVE, move_point
 from logs.verdict.measures.zone_visits import (
     PART,
-    beyond_limit,
     copy_move_part,
     depth_bounds,
     distances_outside_zone,
     max_violation_bound,
     path_zones,
+    violation_depth,
 )
 from tests.soak import scaled
 from tests.world.airspace.test_zone_kernels import star
@@ -286,7 +286,7 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
         depths = []
         for share in np.linspace(0.0, 1.0, 101):
             away, off, _ = looked(records, move_point(one, share))
-            depths.append(beyond_limit(kind == "exclusion", away, off))
+            depths.append(violation_depth(kind == "exclusion", away, off))
             outside = -away if kind == "exclusion" else away
             assert outside <= farthest + 1e-9
         assert low - 1e-9 <= min(depths)
@@ -303,8 +303,8 @@ def test_along_an_edge_the_bound_is_exact() -> None:
 
 def test_unknown_ground_tells_nothing_but_beside_the_shape() -> None:
     for exclusion in (True, False):
-        assert math.isnan(beyond_limit(exclusion, -3.0, math.nan))
-        assert beyond_limit(exclusion, 3.0, math.nan) == (-3.0 if exclusion else 3.0)
+        assert math.isnan(violation_depth(exclusion, -3.0, math.nan))
+        assert violation_depth(exclusion, 3.0, math.nan) == (-3.0 if exclusion else 3.0)
 
 
 def test_a_copy_is_the_same() -> None:

@@ -10,9 +10,9 @@ from logs.verdict.returns.glide_map import (
     GlideMap,
     glide_map,
     glide_slopes,
+    glide_steps,
     landable_cells,
     search_glide_altitudes,
-    steps,
 )
 from tests.logs.verdict.returns.gliders import (
     AIRSPEED,
@@ -65,7 +65,7 @@ def test_on_a_plane_it_is_the_straight_way(wind: float, blows_to: float) -> None
 
 
 def test_there_are_32_steps_and_each_knows_what_it_crosses() -> None:
-    made, between = steps()
+    made, between = glide_steps()
     assert len(made) == 32
     assert {(-int(one.east), -int(one.north)) for one in made} == {(int(one.east), int(one.north)) for one in made}
     gaps = np.diff(np.sort(made["course"]), append=np.sort(made["course"])[0] + 2.0 * math.pi)
@@ -233,7 +233,7 @@ def test_a_fine_elevation_file_gives_a_map_that_knows_each_pixel() -> None:
 
 def flown(found: GlideAltitudes, row: int, column: int) -> np.ndarray:
     """The way (k, 3) of a glide from a cell's least height, m: straight from step to step, and looked at every 5 m."""
-    moves, made, places = steps()[0], found.grid, []
+    moves, made, places = glide_steps()[0], found.grid, []
     while (m := found.next_step[row, column]) >= 0:
         i, j = row + int(moves[m].north), column + int(moves[m].east)
         begin, end = ((*made.cell_center(*at), float(found.min_altitude[at])) for at in ((row, column), (i, j)))
@@ -277,7 +277,7 @@ def test_no_step_flies_lower_than_what_it_crosses_or_than_what_comes_next() -> N
     made = glide_map(hills, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 2800.0)
     assert made is not None
     found = searched(hills, made)
-    moves = steps()[0]
+    moves = glide_steps()[0]
     for row, column in np.random.default_rng(5).integers(60, 160, (scaled(3000, 600), 2)):
         move = moves[found.next_step[row, column]]
         begin, end = found.min_altitude[row, column], found.min_altitude[row + move.north, column + move.east]

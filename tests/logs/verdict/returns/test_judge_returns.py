@@ -19,10 +19,10 @@ from logs.verdict.returns.judge_returns import (
     Returns,
     ReturnWorld,
     SimulatedReturn,
-    badness,
     judge_returns,
     limit_ratio,
     make_return_world,
+    worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
@@ -49,7 +49,7 @@ def test_it_hits_the_hill_from_where_the_slope_meets_it(tmp_path: Path) -> None:
     assert first_of(found, "ground") == pytest.approx((500.0 * 3000.0 + 39_000.0) / 266.0, abs=150.0)
     assert first_of(found, "low") == pytest.approx((500.0 * 3000.0 + 39_000.0) / 289.0, abs=200.0)
     assert {one.kind for one in found.each if one.start[0] < 2000.0} == {"safe"}
-    hit = min(found.each, key=badness)
+    hit = min(found.each, key=worst_first_key)
     assert hit.kind == "ground"
     assert hit.lowest_position[0] == pytest.approx(3300.0, abs=350.0)
     assert hit.target.name == "home"

@@ -19,7 +19,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.energy import air_angle, predicted_energy
+from logs.verdict.measures.energy import air_climb_angle, predicted_energy
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.suggestions import suggest_using_less_energy
@@ -155,7 +155,7 @@ def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() 
     against, _ = predicted_energy(route_requirements(real_setup(scenario=scenario)))
     assert against > 1.2 * calm
     requirements = route_requirements(real_setup())
-    assert air_angle(requirements, 1, 25.0, 650.0) == pytest.approx(float(requirements.slopes[1]), abs=1e-3)
+    assert air_climb_angle(requirements, 1, 25.0, 650.0) == pytest.approx(float(requirements.slopes[1]), abs=1e-3)
 
 
 def test_what_is_not_known_is_not_judged() -> None:

@@ -14,7 +14,7 @@ from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
-from logs.verdict.rules.stall_rule import level_stall, planned_bank, stall_findings
+from logs.verdict.rules.stall_rule import min_level_airspeed, planned_bank, stall_findings
 from logs.verdict.tolerances import STALL_TOLERANCE_MPS
 from tests.logs.verdict.judging import failing, of, suggested
 from tests.synthetic import copied, envelope, fly_path, make_scenario, make_setup
@@ -50,7 +50,7 @@ def test_a_stall_speed_at_height_is_a_true_airspeed() -> None:
     for amsl, least in ((0.0, 16.0), (1500.0, 17.5), (3000.0, 19.0)):
         way = [[east, north, amsl] for east, north, _ in CORNER]
         setup = make_setup(way, airspeed=25.0, table=table, terrain={"kind": "none"})
-        assert level_stall(route_requirements(setup), amsl) == pytest.approx(least)
+        assert min_level_airspeed(route_requirements(setup), amsl) == pytest.approx(least)
         assert of(judge_geometry(setup), "stall").limit == pytest.approx(least * math.sqrt(1.0 / math.cos(math.pi / 6)))
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from logs.verdict.measures import acceptance
-from logs.verdict.measures.acceptance import negligible_kink, step_height
+from logs.verdict.measures.acceptance import negligible_kink_distance, step_height
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules import turn_rule
 from tests.synthetic import make_setup
@@ -20,7 +20,7 @@ def zigzag(count: int, aside: float = 3.0) -> list[list[float]]:
 @pytest.mark.parametrize(("count", "found"), [(8, True), (9, True), (10, False)])
 def test_eight_waypoints_in_a_row_are_left_out_at_most(count: int, found: bool) -> None:
     """One of nine that stays turns by less than a degree; two of ten that stay turn by 17 between 20 m of leg."""
-    assert (negligible_kink(route_requirements(make_setup(zigzag(count))), 1) is not None) is found
+    assert (negligible_kink_distance(route_requirements(make_setup(zigzag(count))), 1) is not None) is found
 
 
 def test_each_gap_of_a_long_zigzag_is_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,7 +38,7 @@ def test_a_jog_is_within_a_quarter_of_the_corridor(share: float, found: bool) ->
     """A sidestep by twice that has the straight way past both its corners at that distance."""
     aside = 2.0 * share * 30.0
     setup = make_setup([[0, 0, 300], [0, 1000, 300], [aside, 1000, 300], [aside, 2000, 300]])
-    assert (negligible_kink(route_requirements(setup), 1) is not None) is found
+    assert (negligible_kink_distance(route_requirements(setup), 1) is not None) is found
 
 
 @pytest.mark.parametrize(("rise", "found"), [(9.9, True), (-9.9, True), (10.1, False), (-10.1, False)])

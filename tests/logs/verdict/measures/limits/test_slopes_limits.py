@@ -19,7 +19,7 @@ from logs.verdict.measures.slopes import (
     measure_slope,
     steady_rows,
 )
-from logs.verdict.measures.track_alignment import AlignedTrack, align_track, lifted_speed
+from logs.verdict.measures.track_alignment import AlignedTrack, airspeed_gain_in_rising_air, align_track
 from tests.synthetic import Profile, edited, fly_path, make_setup
 
 # Metres between two rows at 25 m/s.
@@ -254,7 +254,7 @@ def test_the_window_is_five_seconds_long(seconds: float, counts: bool) -> None:
 def test_speed_from_rising_air_fades_within_twelve_seconds() -> None:
     time = np.arange(0.0, 60.0, 0.01)
     rising = np.where(time < 5.0, 1.0, 0.0).astype(np.float32)
-    gained = lifted_speed(time, np.full(time.size, 25.0, dtype=np.float32), rising)
+    gained = airspeed_gain_in_rising_air(time, np.full(time.size, 25.0, dtype=np.float32), rising)
     ended = int(np.argmax(gained))
     assert gained[ended + 1200] / gained[ended] == pytest.approx(math.exp(-1.0), rel=0.01)
 
@@ -263,7 +263,7 @@ def test_speed_from_rising_air_fades_within_twelve_seconds() -> None:
 def test_an_aircraft_that_has_nearly_stopped_gains_as_one_at_ten_metres_a_second(speed: float) -> None:
     time = np.arange(0.0, 0.2, 0.01)
     airspeed = np.full(time.size, speed, dtype=np.float32)
-    gained = lifted_speed(time, airspeed, np.ones(time.size, dtype=np.float32))
+    gained = airspeed_gain_in_rising_air(time, airspeed, np.ones(time.size, dtype=np.float32))
     assert gained[-1] == pytest.approx(GRAVITY * 0.19 / 10.0, rel=0.02)
 
 

@@ -9,7 +9,7 @@ import pytest
 from flight.mission.items import Home
 from logs.verdict.measures.photo_lines import LineMeasure, _line_steps, heights_over_ground
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.rules.survey_rule import _is_too_tight, lost_text
+from logs.verdict.rules.survey_rule import _is_too_tight, unusable_parts_text
 from tests.logs.verdict.judging import judge
 from tests.synthetic import bank_radius, fly_path, make_setup
 
@@ -35,7 +35,7 @@ def test_a_line_is_looked_at_metre_by_metre() -> None:
 @pytest.mark.parametrize(("share", "told"), [(0.0049, ""), (0.0051, "1 % with the camera off")])
 def test_half_a_percent_of_a_line_is_told(share: float, told: str) -> None:
     measure = LineMeasure(1000.0, 1.0 - share, 0.0, 0.0, 0.0, share, 0.0, 0.0, 0.0, 0.0, 0, 0, 50.0, 10.0)
-    assert lost_text(measure) == told
+    assert unusable_parts_text(measure) == told
 
 
 @pytest.mark.parametrize(("over", "tight"), [(0.009, False), (0.011, True)])
