@@ -55,7 +55,7 @@ def profile_chart(
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
     >>> chart = profile_chart(
-    ...     setup.scenario, plan_waypoints=None, route_waypoints=setup.route.waypoints, track=None, verdict=None
+    ...     setup.scenario, plan_waypoints=None, route_waypoints=setup.route.positions, track=None, verdict=None
     ... )
     >>> chart.unit, [layer.name for layer in chart.panels[0].layers][-2:]
     ('km', ['planned', 'waypoint, numbered'])

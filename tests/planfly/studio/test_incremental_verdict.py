@@ -143,7 +143,7 @@ def test_a_dragged_mission_is_flown_with_the_parameters_of_its_landing(tmp_path:
     mission = edits.raise_items(context.opened_setup.mission, [0], 50.0)
     released = context.setup(mission)
     route, (window, *_) = judge_windows(context, mission, 0, context.opened_setup)
-    assert released.route.waypoints[:, 0].max() > 5900.0
+    assert released.route.positions[:, 0].max() > 5900.0
     assert np.array_equal(route.waypoints, released.route.waypoints)
     assert window.requirements.setup.autopilot == released.autopilot
 

@@ -101,7 +101,7 @@ def test_a_suggestion_that_would_change_nothing_is_refused(what: str, wanted: fl
     """Leg 1 is 80 m long and level; items are rounded to a centimetre."""
     context, judged = judged_mission()
     place = Place("leg", 1)
-    wanted = float(judged.setup.route.airspeed[1]) if wanted is None else wanted
+    wanted = float(judged.setup.route.leg_airspeeds[1]) if wanted is None else wanted
     finding = make_finding("slope", place, ok=False, reason="")
     with pytest.raises(MissionError, match="no item at the place of this suggestion"):
         apply_suggestion(context, judged, finding, (Change(what, place, None, wanted, "m"),))
