@@ -144,7 +144,7 @@ def test_a_dragged_mission_is_flown_with_the_parameters_of_its_landing(tmp_path:
     released = context.setup(mission)
     route, (window, *_) = judge_windows(context, mission, 0, context.opened_setup)
     assert released.route.positions[:, 0].max() > 5900.0
-    assert np.array_equal(route.waypoints, released.route.waypoints)
+    assert np.array_equal(route.positions, released.route.positions)
     assert window.requirements.setup.autopilot == released.autopilot
 
 
