@@ -21,7 +21,7 @@ from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
-from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
+from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, with_tightened_limits
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
@@ -32,7 +32,7 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import autopilot_log, fly_and_judge
+from planfly.workflow.pipeline import autopilot_log_path, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
 from planner.plan import Plan, plan_json
@@ -211,7 +211,7 @@ def _fly_rounds(
 
     def fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
         planning_airframe = (
-            airframe if planning_scenario is scenario else tightened_airframe(airframe, planning_scenario)
+            airframe if planning_scenario is scenario else with_tightened_limits(airframe, planning_scenario)
         )
         with stage(f"planning {scenario.name}", "planning") as advance:
             plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
@@ -219,7 +219,7 @@ def _fly_rounds(
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(lock_path(folder))
             if task.program is not None:
-                report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
+                report_replaced(folder / "flight.mcap", autopilot_log_path(folder / "flight.mcap", task.program))
             prepare_folder(folder)
         flown_rounds.append(_fly_round(task, plan, len(flown_rounds)))
         if on_round is not None:

@@ -112,13 +112,13 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     flights = call_api(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
-    write_json_if_requested(args, lambda: _verdicts_answer(verdicts, args.what, code))
+    write_json_if_requested(args, lambda: _answer_for_each_autopilot(verdicts, args.what, code))
     write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
     print("\n".join(autopilot_lines(verdicts)))
     return code
 
 
-def _verdicts_answer(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
+def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
     from planfly.terminal.verdict_answers import VerdictsDocument
 
     documents = {name: verdict.document() for name, verdict in verdicts.items()}

@@ -76,7 +76,7 @@ def import_log(args: argparse.Namespace) -> int:
 
 
 def _guess_columns(args: argparse.Namespace) -> int:
-    """Write a starting table of columns, and print how many of its lines are to be checked."""
+    """Write a table of columns guessed from data files, and print how many guesses are to be checked."""
     for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
         if value is not None:
             raise PlanflyError(f"--columns-from writes a table and no flight log: without {name}", field=name)

@@ -152,7 +152,7 @@ def answer_schema(name: str) -> dict[str, Any]:
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the object schemas of an answer; there are several if options choose between several objects.
+    """Return the schemas of the objects that an answer may be; several if options choose between the objects.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']

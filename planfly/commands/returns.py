@@ -122,8 +122,8 @@ def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
         CauseEntry,
         ReturnsAnswer,
         glides_entry,
-        program_entry,
-        return_entry,
+        program_returns_entry,
+        return_range_entry,
         suggestion_entry,
     )
 
@@ -142,8 +142,8 @@ def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
         ],
         rtl_autoland=judged_returns.autoland,
         not_judged=list(judged_returns.unjudged_parts),
-        ranges=[return_entry(result, return_range) for return_range in judged_returns.ranges],
-        by_program=program_entry(result),
+        ranges=[return_range_entry(result, return_range) for return_range in judged_returns.ranges],
+        by_program=program_returns_entry(result),
         left_out=judged_returns.omitted_count,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),

@@ -19,7 +19,7 @@ from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.rtl.return_summary import return_summary, returns_line
-from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.problem import make_problem
@@ -86,7 +86,7 @@ def _make_world() -> tuple[Scenario, Airframe]:
 def _make_problem() -> None:
     """Compile the kernels that prepare a planning problem."""
     scenario = _make_scenario()
-    aircraft, _ = find_airframe(scenario)
+    aircraft, _ = find_aircraft_and_energy(scenario)
     limits = make_limits(
         scenario, load_envelope(aircraft), aircraft.airspeed, math.radians(scenario.flight.max_bank_deg)
     )

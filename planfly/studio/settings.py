@@ -13,7 +13,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
@@ -138,7 +138,7 @@ def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
 
 def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
     """Return the autopilot parameters of a scenario. Raises PlanflyError if its autopilot has none."""
-    autopilot = load_autopilot(scenario, find_airframe(scenario)[0])
+    autopilot = load_autopilot(scenario, find_aircraft_and_energy(scenario)[0])
     if autopilot.parameters is None:
         raise PlanflyError(f"{autopilot.title} has no parameters: choose another autopilot", field="parameter")
     return autopilot.parameters

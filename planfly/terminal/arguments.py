@@ -37,7 +37,7 @@ def number_parser(keyword: str) -> Callable[[str], Any]:
 
 
 def parse_wind(text: str) -> tuple[float, float]:
-    """Parse SPEED,FROM, the speed of a steady wind, m/s, and the direction it blows from, degrees."""
+    """Parse SPEED,FROM: speed (m/s) of a steady wind, and direction (degrees) from which the wind blows."""
     try:
         speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
@@ -50,7 +50,7 @@ def parse_wind(text: str) -> tuple[float, float]:
 
 
 def parse_camera(text: str) -> tuple[float, ...]:
-    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE, with sensor size and focal length in mm, and overlaps in percent.
+    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: sensor size and focal length (mm), and photo overlaps (percent).
 
     >>> parse_camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
@@ -66,7 +66,7 @@ def parse_camera(text: str) -> tuple[float, ...]:
 
 
 def parse_position(text: str) -> tuple[float, float]:
-    """Parse LAT,LON of a position, degrees."""
+    """Parse LAT,LON: latitude and longitude of a position, degrees."""
     try:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
@@ -79,7 +79,7 @@ def parse_position(text: str) -> tuple[float, float]:
 
 
 def parse_area(text: str) -> tuple[float, ...]:
-    """Parse S,W,N,E, the edges of an area, degrees; the API checks the order of the edges."""
+    """Parse S,W,N,E: edges of an area, degrees; the API checks the order of the edges."""
     try:
         edges = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -90,7 +90,7 @@ def parse_area(text: str) -> tuple[float, ...]:
 
 
 def parse_autopilots(text: str) -> list[str]:
-    """Parse names of autopilots separated by commas."""
+    """Parse the names of autopilots, separated by commas."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:
@@ -99,7 +99,7 @@ def parse_autopilots(text: str) -> list[str]:
 
 
 def parse_time_or_stations(text: str) -> float | str:
-    """Parse a time of the flight, s; a text with a colon is returned unchanged, as addresses of ground stations."""
+    """Parse a time of the flight, s, or return a text with a colon unchanged: the addresses of ground stations."""
     if ":" in text:
         return text
     return number_parser("end")(text)
@@ -118,14 +118,14 @@ def parse_budget(text: str) -> tuple[int | None, float | None]:
 
 
 def parse_threat(text: str) -> tuple[float, float, float, float]:
-    """Parse EAST,NORTH,KILL,DETECTION, position and radii of a pop-up threat, m."""
+    """Parse EAST,NORTH,KILL,DETECTION: position, kill radius and detection radius of a pop-up threat, m."""
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
         east = math.nan
     if not (math.isfinite(east) and math.isfinite(north) and kill >= 0.0 and detection >= 0.0):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: expected EAST,NORTH,KILL,DETECTION: four numbers in m, a radius of 0 for none"
+            f"{text!r}: expected EAST,NORTH,KILL,DETECTION: four numbers in m; a radius of 0 means no such range"
         )
     return east, north, kill, detection
 
@@ -175,7 +175,7 @@ def file_completer(*suffixes: str) -> Completer:
 
 
 def complete_scenario(prefix: str, **_context: object) -> list[str]:
-    """Return the names of built-in scenarios, and the scenario files, that start with `prefix`.
+    """Return the names of the built-in scenarios and the scenario files that start with `prefix`.
 
     >>> complete_scenario("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
@@ -185,7 +185,7 @@ def complete_scenario(prefix: str, **_context: object) -> list[str]:
 
 
 def complete_aircraft(prefix: str, **_context: object) -> list[str]:
-    """Return the names of built-in aircraft, and the folders, that start with `prefix`.
+    """Return the names of the built-in aircraft and the folders that start with `prefix`.
 
     >>> complete_aircraft("aero")
     ['aerosonde']

@@ -50,14 +50,14 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
 
 
 def _answer_text(verdict: Verdict) -> str:
-    """Return a verdict in one or two words, for a cell of the table."""
+    """Return the result of a verdict as a short text for a cell of the table, such as "not flyable"."""
     if verdict.undecided:
         return verdict.answer
     return "flyable" if verdict.flyable else "not flyable"
 
 
 def _rule_summary(rule: RuleFindings | None) -> str:
-    """Return the number of failed findings of a rule, or the number of judged findings if none failed."""
+    """Return how many findings of a rule failed or passed, as text for a cell; "" if the rule has no findings."""
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

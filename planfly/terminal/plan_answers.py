@@ -116,7 +116,7 @@ def fewer_plans_line(front: "Front") -> str:
     return (
         f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other plan that was "
         f"found gains more than {min_fraction} in length or {front.fourth}, {min_exposure} in "
-        f"exposure or {min_height} in height"
+        f"exposure or {min_height} in height above ground"
     )
 
 

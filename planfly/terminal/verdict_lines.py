@@ -38,7 +38,7 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Return lines on the worst failed finding of a rule, its suggestion, and the places of the other failures."""
+    """Return the lines for a failed rule: worst finding, its suggestion, and the places of other failed findings."""
     worst_finding, *other_findings = rule.failed
     rule_name = rule.words.word
     places_text = (
@@ -61,7 +61,7 @@ def _place_and_value(finding: Finding) -> str:
 
 
 def _rule_summary(rule: RuleFindings) -> str:
-    """Count the findings of a rule, and describe the finding closest to its limit."""
+    """Return the counts of a rule's findings and the finding closest to its limit, or why the rule is not judged."""
     if not rule.judged:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin

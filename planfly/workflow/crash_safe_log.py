@@ -48,9 +48,9 @@ class FlightLimits:
 
 
 def predicted_seconds(setup: FlightSetup) -> float:
-    """Return the predicted duration of a flight in still air, s.
+    """Return the predicted duration of a flight in still air, s: path length divided by the mean demanded airspeed.
 
-    The speed is the mean of the legs' airspeeds, weighted by time.
+    The mean of the legs' airspeeds is weighted by time.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -63,7 +63,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
 
 
 def flight_text(setup: FlightSetup) -> str:
-    """Describe the length and the predicted duration of a flight."""
+    """Return the length and the predicted duration of a flight as text, such as "12.3 km, about 500 s in the air"."""
     seconds = predicted_seconds(setup)
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:
@@ -72,7 +72,7 @@ def flight_text(setup: FlightSetup) -> str:
 
 
 def flight_kind(setup: FlightSetup) -> str:
-    """Return the key under which durations of flights are stored; flights of one key take similar times per km."""
+    """Return the key for stored computing times; simulating flights with one key takes similar times per km."""
     return f"flying by {setup.autopilot.name}"
 
 

@@ -286,7 +286,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
 
 
 def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
-    """Draw all factors; the factor on thrust compensates the effect of the other factors on the climb.
+    """Draw the factors of `DRAW_COUNT` aircraft; their thrust compensates the effect of other factors on the climb.
 
     balance: change of the logarithm of the thrust per logarithm of each other factor.
     thrust_sd: standard deviation of the logarithm of the thrust that varies the climb.
@@ -317,10 +317,10 @@ def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float)
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Return climb and descent, rad, top speed, m/s, and the logarithm of the power, W, of an aircraft, (4,).
+    """Return (4,): climb angle (rad), descent angle (rad), top speed (m/s) and log of the cruise power (W).
 
-    Climb and descent are the steepest path angles at cruise speed, and the power is that of level flight at cruise; a
-    value is NaN if the aircraft cannot be trimmed.
+    The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
+    in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.
 
     properties: values of the model's properties by name.
     """
@@ -340,7 +340,7 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
 
 
 def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> Floats:
-    """Return the effect on `_performance_vector`, (4,), of a factor larger by one standard deviation.
+    """Return the change (4,) of `_performance_vector` if a factor of the model grows by one standard deviation.
 
     estimated: values for the estimated aircraft, (4,).
     sd: standard deviation of the factor's logarithm.
@@ -352,13 +352,13 @@ def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: floa
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the signed effect of a factor on path angles and speeds, (n,): half the difference of two values.
+    """Return the signed effect (n,) of a factor on path angles and speeds: half of increased - decreased.
 
-    A value is NaN if the aircraft cannot be trimmed.  If one of the two is NaN, the difference between the other and
-    the estimated value is returned; if both are NaN, the magnitude of the estimated value.
+    A value is NaN if the aircraft cannot be trimmed.  If either `increased` or `decreased` is NaN, the effect is the
+    difference between the other value and the estimated value; if both are NaN, the magnitude of the estimated value.
 
-    increased, decreased: values with the factor increased and decreased, (n,).
-    estimated: estimated values, (n,).
+    increased, decreased: values (n,) with the factor increased and decreased.
+    estimated: values (n,) with the estimated factor.
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
     >>> factor_effect(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
@@ -400,7 +400,7 @@ def make_data_sheet_folder(
     *,
     overwrite: bool = False,
 ) -> Aircraft:
-    """Make the folder of an aircraft from its data sheet, completely or not at all.
+    """Write the folder of an aircraft made from its data sheet, completely or not at all; return the aircraft.
 
     parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
     sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
@@ -432,7 +432,7 @@ def _check_required_numbers(sheet: DataSheet) -> None:
 def _make_files(
     sized: SizedAircraft, name: str, draft_folder: Path, file_parameters: Mapping[str, float]
 ) -> dict[str, str]:
-    """Return the text of each file of the folder, by file name.
+    """Return the text of each file of the aircraft's folder, by file name.
 
     draft_folder: temporary folder for a draft of the aircraft, which trims and gains are computed from.
     """
@@ -486,7 +486,7 @@ def _check_endurance(aircraft: Aircraft, power: float) -> None:
 def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
     """Trim an aircraft in all flight conditions of `Performance`.
 
-    Raises FlightError, with the value of the data sheet to change, if a condition has no trim point.
+    Raises FlightError if a condition has no trim point; the message names the value of the data sheet to change.
     """
     cruise = aircraft.airspeed
     level = steady_flight(fdm, cruise, AMSL)
@@ -552,7 +552,10 @@ motor_lag_s = {numbers.lag[1]:.6g}
 def arduplane_parameters(
     aircraft: Aircraft, performance: Performance, fdm: Fdm, file_parameters: Mapping[str, float]
 ) -> str:
-    """Return the text of ``ardupilot.parm``; the values of `file_parameters` replace computed values."""
+    """Return the text of ``ardupilot.parm``: ArduPlane parameters computed from the model's trim points.
+
+    file_parameters: values of a parameter file, which replace the computed values.
+    """
     a, b = linearise(fdm, performance.level)
     cruise, bank = aircraft.airspeed, aircraft.max_bank
     p, q, elevator, aileron = 3, 4, 0, 1

@@ -24,7 +24,7 @@ Advance = Callable[[float, float, str], None]
 
 
 def planning_conditions(scenario: Scenario, airframe: Airframe) -> Conditions:
-    """Return the conditions for which a scenario is planned."""
+    """Return the conditions for which a path is planned: scenario, aircraft, airspeed and autopilot."""
     return plan_conditions(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
@@ -104,7 +104,7 @@ def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keep
 
 
 def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Add departure and approach to a plan, and the hazards near its final loiter to its certificate.
+    """Return a plan with departure and approach; its certificate also names the hazards near the final loiter.
 
     old_plan: the plan being flown, or None.
     """

@@ -29,7 +29,7 @@ PLAN_FILE = "plan.json"
 
 
 def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
-    """Return a setup with another flight model; a setup with this model is returned as it is, without a copy."""
+    """Return the setup with the chosen flight model, the same object if the setup already has this model."""
     return setup if setup.engine == engine else replace(setup, engine=engine)
 
 
@@ -142,7 +142,7 @@ _STORED_ITEMS = {"ardupilot": (724, "a Pixhawk with ArduPlane"), "px4": (500, "a
 
 
 def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, ...]:
-    """Note a mission of more items than a common board of the autopilot stores; such a board refuses the upload."""
+    """Note a mission with more items than a common flight controller of the autopilot stores; empty otherwise."""
     limit, board = _STORED_ITEMS.get(dialect, (len(mission.items), ""))
     if len(mission.items) <= limit:
         return ()
@@ -204,7 +204,10 @@ def make_setup(
 
 
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
-    """Return an autopilot that arms with a mission's landing sequence, unless a file or the scenario says otherwise."""
+    """Return the autopilot with an RTL that uses the mission's landing sequence, if the mission has a sequence.
+
+    The parameters for this are assumed: values from a parameter file or the scenario stay.
+    """
     if all(item.command != Command.DO_LAND_START for item in mission.items):
         return autopilot
     values = autopilot.returns.parameters_of(RtlSettings(lands=True))

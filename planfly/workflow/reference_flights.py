@@ -38,7 +38,7 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Find the first parameter with which the flight passes at another value, and its nearest passing value, or None.
+    """Find the first parameter of which another value makes the flight pass, with its nearest such value, or None.
 
     findings: findings of the flight that failed.
     passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
@@ -112,7 +112,7 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 def judge_airframe_flight(
     setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
 ) -> AirframeAnswer:
-    """Fly a setup with planfly's guidance and the exact position, and judge that flight.
+    """Fly a setup with planfly's guidance and no navigation error, to judge the airframe without its autopilot.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -135,7 +135,7 @@ def judge_airframe_flight(
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find a parameter with which a failed flight passes at another value, or return None.
+    """Find an autopilot parameter of which another value makes a failed flight pass, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
     should_abort: see `judge_with_reference_flights`.
