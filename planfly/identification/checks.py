@@ -36,7 +36,7 @@ _BLOCK_SECONDS = 30.0
 
 
 def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
-    """Raise LogError if the median voltage in flight is impossible for a battery of this nominal voltage.
+    """Raise LogError if the median voltage of a record is impossible for a battery of the nominal voltage.
 
     volts: nominal voltage of the battery, V.
     """
@@ -67,7 +67,10 @@ def check_commands(records: Sequence[FlightRecord]) -> None:
 
 
 def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
-    """Raise LogError if the logged battery power is not the power of the identified aircraft in these flights."""
+    """Raise LogError if the mean battery power of a log differs too much from that of the identified aircraft.
+
+    Without a logged current nothing is checked.
+    """
     if not estimate.with_current:
         return
     factors = (float(estimate.values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
@@ -128,7 +131,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
 
 
 def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
-    """Return the change of mass over all logs, as a fraction of the mass, and its standard deviation.
+    """Return the change of mass within the logs, as a fraction of the mass, and its standard deviation.
 
     An aircraft that burns fuel or drops a load needs an ever smaller angle of attack than its assumed mass requires.
     The change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above

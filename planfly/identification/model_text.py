@@ -102,7 +102,10 @@ def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementT
 
 
 def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) -> None:
-    """Write the wing's dimensions, the moments of inertia and the mass into a model."""
+    """Set wing area, span, chord, moments of inertia and mass of a model.
+
+    base: aircraft of the model, for error messages.
+    """
     ixx, iyy, izz, ixz = numbers.inertia
     sizes = {
         "metrics/wingarea": (numbers.area, "M2"),
@@ -125,17 +128,20 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
 
 
 def _factor_minus_one(name: str) -> str:
-    """Return the XML sum of a factor and -1."""
+    """Return the XML of the factor ``ident/NAME`` minus 1."""
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
 def _product_term(coefficient: float, *factors: str) -> str:
-    """Return the XML product of a coefficient and factors, which are XML themselves."""
+    """Return the XML product of a coefficient and of factors given as XML."""
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return JSBSim functions for the lift coefficient of the base and of the estimate, up to `_MAX_ALPHA_RAD`."""
+    """Return the JSBSim functions for the lift coefficients of the base and the estimate.
+
+    The angle of attack is clipped to plus or minus `_MAX_ALPHA_RAD`.
+    """
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
@@ -148,7 +154,7 @@ def _lift_functions(numbers: BaseModel) -> str:
 
 
 def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the JSBSim function that adds the estimated terms to an axis, or "" for an axis without such terms.
+    """Return the JSBSim function that adds the estimated terms to an axis, or "" for an axis without estimated terms.
 
     drag, control: XML factors that the base applies to drag and to control deflections, or "".
     """
