@@ -18,7 +18,7 @@ class HiddenPackage(NamedTuple):
 
 
 def find_hidden_package(home: Path) -> HiddenPackage | None:
-    """Find a module that Python would import in place of a package of planfly; return None without one.
+    """Find a module that Python would import in place of a package of planfly, or return None.
 
     Nothing is imported.
 
@@ -37,7 +37,7 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
 
 
 def _module_file(name: str) -> str | None:
-    """Return the file that Python imports or would import for a name, or None without one."""
+    """Return the file of the module that Python imported, or would import, by a name; None if there is no such file."""
     if name in sys.modules:
         return getattr(sys.modules[name], "__file__", None)
     spec = find_spec(name)

@@ -23,7 +23,7 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FlownMission, check_keywords_not_given
-from planfly.arguments import CAMERA_FORMAT, check_arguments, is_camera
+from planfly.arguments import CAMERA_FORMAT, check_arguments, is_valid_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
@@ -178,7 +178,7 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
         camera_numbers = tuple(float(number) for number in numbers)
     except (TypeError, ValueError):
         camera_numbers = ()
-    if isinstance(numbers, str | bytes) or not is_camera(camera_numbers):
+    if isinstance(numbers, str | bytes) or not is_valid_camera(camera_numbers):
         raise ArgumentError.of_argument(
             "camera", numbers, f"expected {CAMERA_FORMAT}, such as (23.5, 15.6, 16)", shown=repr(numbers)
         )

@@ -42,7 +42,7 @@ def _queue_requests(requested: queue.Queue[str]) -> None:
 
 
 def _report(line: str) -> None:
-    """Print a line for the process that started this one."""
+    """Print a line for the parent process."""
     print(line, flush=True)
 
 

@@ -107,12 +107,12 @@ def problem_name(threats: int) -> str:
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return the probability of a kill or detection on a path, from independent chances at points of its legs.
+    """Return the probability of a kill or detection on a path, as if its six points per leg were independent.
 
-    The chance at distance d from a unit in reach is (scale / d)^4, at most 1, at each of six points of a leg.  The
-    paper's sums (eq. 9, 10) over the same points have no upper bound.
+    The probability at a point is min(1, (scale / d)^4) for a threat at distance d within its radius.  The paper's sums
+    (eq. 9, 10) over the same points have no upper bound.
 
-    waypoints: (w, 3), m.
+    waypoints: (w, 3) m.
     kind: "kill" or "detection".
     """
     fractions = np.arange(6)[:, None] / 6.0
@@ -129,7 +129,7 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
-    """Plan a problem of the paper once, and return the values for tables and figures.
+    """Plan a problem of the paper with one seed, and return the values for tables and figures.
 
     threats: number of threats, which names the problem.
     algorithm: name of a planner, or `STRIP_ALGORITHM`.
@@ -198,7 +198,10 @@ def usable_cores() -> int:
 
 
 def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
-    """Yield the results in the order of the tasks; the first task runs in this process, to compile the kernels."""
+    """Yield the plan of each task (threats, algorithm, seed), in order, made in `count` processes.
+
+    The first task runs in this process, to compile the kernels.
+    """
     yield plan_once(*tasks[0])
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
@@ -225,8 +228,8 @@ def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
     return plan_once(*task)
 
 
-def make_table(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """Make the table of the paper, with one row for each problem and algorithm, in the order of planning."""
+def summarise_plans(plans: Sequence[SeededPlan]) -> list[TableRow]:
+    """Return the rows of the paper's table, one for each problem and algorithm, in the order of planning."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for seeded_plan in plans:
         groups.setdefault((seeded_plan.threats, seeded_plan.algorithm), []).append(seeded_plan)
@@ -256,11 +259,10 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
 
 
 def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
-    """Return a value of each plan, (n,).  value: function that computes it."""
+    """Return a value of each plan, (n,).  value: function that computes the value of a plan."""
     return np.array([value(seeded_plan) for seeded_plan in group])
 
 
-# ----------------------------------------------------------------------
 # ----------------------------------------------------------------------
 # Print the table on the terminal, and write JSON, CSV and figures into a folder.
 
@@ -269,8 +271,8 @@ PAPER_SCHEMA = "planfly.planning.paper/1"
 TABLE_FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
 
 
-def file_names(problems: Sequence[int]) -> list[str]:
-    """Return the names of all files that a run writes for some problems.  problems: numbers of threats."""
+def paper_file_names(problems: Sequence[int]) -> list[str]:
+    """Return the names of all files that are written for the given problems.  problems: numbers of threats."""
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
     return [*TABLE_FILES, *pictures]
 
@@ -362,7 +364,7 @@ _PLAN_COLUMNS = [
 
 
 def _csv_text(columns: Sequence[str], rows: Any) -> str:
-    """Return CSV text with a header."""
+    """Return CSV text with a header of column names.  rows: lists of values in the order of the columns."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
@@ -442,11 +444,11 @@ def paper_tables(
         check_output_folder(folder, overwrite)
     with stage("planning", "planning the paper's problems") as advance:
         plans = plan_section(problems, runs, algorithm, jobs, advance)
-    rows = make_table(plans)
+    rows = summarise_plans(plans)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         with lock_path(folder):
-            prepare_folder(folder, tuple(file_names(PROBLEMS)))
+            prepare_folder(folder, tuple(paper_file_names(PROBLEMS)))
             write_tables(folder, rows, plans)
             with stage("drawing", "drawing the paper's figures"):
                 write_figures(folder, plans)

@@ -72,7 +72,7 @@ def play_to_stations(
 
 
 class _Player:
-    """Telemetry of a log, without a vehicle behind it."""
+    """Sender of a log's telemetry to ground stations, in place of a vehicle."""
 
     def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
         self._link, self._status, self._on_message = link, status, on_message

@@ -40,13 +40,16 @@ class ReturnSummary:
     returns: Returns | None = None
 
     def data_for_pictures(self) -> DrawnReturns | None:
-        """Return the data for pictures of returns and glides, in a few seconds, or None without judged returns."""
+        """Return the data for pictures of returns and glides, or None without judged returns.
+
+        The computation of the glides takes a few seconds.
+        """
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
     def drawn_returns_without_glides(self) -> DrawnReturns | None:
-        """Return the data for pictures of returns only, in well under a second, or None without judged returns."""
+        """Return the data for pictures of returns without glides, or None without judged returns."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns_without_glides(self.world, self.starts, self.returns)

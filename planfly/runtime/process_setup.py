@@ -66,7 +66,7 @@ def address_space_limit() -> int | None:
 
 
 def with_large_stack(function: Callable[[], _Result]) -> _Result:
-    """Call a function with all frames in one large piece of memory, and return its result.
+    """Call a function with the frames of all inner calls in one large piece of memory, and return its result.
 
     CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty. Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating

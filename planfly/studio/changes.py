@@ -86,7 +86,7 @@ def _severity_key(result: PlaceResult) -> tuple[int, float]:
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return a key for a place that does not depend on item numbers, and a description with item numbers.
+    """Return a key for a place, by positions in the mission, and a description with item numbers.
 
     route_items: item number of each waypoint.
     order: position of each item number in the mission.
@@ -163,7 +163,7 @@ _REMOVED_POSITION = -1
 
 
 def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
-    """Return the previous results, keyed by the current positions of the items.
+    """Return the previous results, keyed by the positions of their items in the current mission.
 
     Results at a removed item get a key that no current result has.
     """
@@ -178,7 +178,7 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe each place that fails now, or that failed before and no longer fails; new failures come first."""
+    """Return a line for each new failure, and then for each earlier failure that is gone."""
     worse, better = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
@@ -209,7 +209,10 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe the failures whose values changed, and then the rules whose smallest margins changed."""
+    """Return lines for continued failures with another value, then for rules with another smallest margin.
+
+    Of both kinds at most `_MAX_VALUE_CHANGES` are returned, the largest changes of margin first.
+    """
     failures = [
         (rule, old_results[rule, key], result)
         for (rule, key), result in new_results.items()

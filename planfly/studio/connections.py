@@ -31,7 +31,7 @@ class _UnknownConnection:
     number: int | None = None
 
     def _register(self) -> None:
-        """Count this connection as unknown; if there are too many unknown connections, close the oldest."""
+        """Register this connection as unknown; if there are too many unknown connections, close the oldest."""
         self.number = next(_numbers)
         unknown = [connection for connection in self.connections if getattr(connection, "number", None) is not None]
         if len(unknown) > MAX_UNKNOWN_CONNECTIONS:

@@ -168,7 +168,7 @@ def _aircraft_folder(aircraft: Any) -> str | None:
 
 
 def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
-    """Return the flight setup for a plan, a mission, or the mission in a log."""
+    """Return the flight setup of a plan file, a mission file, or the mission in a log."""
     if path.is_file() and is_imported_log(path):
         setup = _read_imported_log(path, options).setup
         return _log_mission_setup(setup.scenario, setup.mission, setup.seed)
@@ -199,7 +199,7 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
-    """Return the setup to fly the mission of a log again."""
+    """Return the flight setup of the mission in a log, with the airframe of `scenario`."""
     return make_setup(scenario, load_airframe(scenario), mission, seed)
 
 
@@ -270,7 +270,10 @@ def _to_bytes(text: str | bytes) -> bytes:
 
 
 def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """Describe the contents of a mission and its scenario that a ground station's file cannot store."""
+    """Return a line for each content of a mission or its scenario that a ground station's file cannot store.
+
+    text: the mission as text of this file.
+    """
     parsed, losses = parse_mission(text, name), []
     lost_counts: Mapping[str, tuple[int, str]] = {
         "fence items": (len(mission.fences) - len(parsed.fences), "a .plan contains them"),
@@ -293,7 +296,7 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
 
 
 def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str, ...]:
-    """Describe the settings changed in the studio, which a ground station's file cannot store."""
+    """Return lines on settings and parameters changed in the studio, which a ground station's file cannot store."""
     scenario = context.scenario
     differences = {
         "wind": opened_scenario.spec.wind != scenario.spec.wind,
@@ -306,7 +309,7 @@ def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
-    """Describe the autopilot parameters set in the studio, which only a parameter file can store."""
+    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store."""
     count = len(context.parameters.values)
     return (f"{count} parameter{('s' if count != 1 else '')} set here: a .parm contains them",) if count else ()
 
@@ -381,12 +384,12 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
 
 
 def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
-    """Return a certified plan with the given waypoints, (w, 3) m, in the scenario of the page."""
+    """Return a plan with the given waypoints (w, 3), m, certified in the scenario of the editing context."""
     return certify_waypoints(context.scenario, context.airframe.limits.with_margin(), waypoints, seed=context.seed)
 
 
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
-    """Return the edited plan with its unchanged departure and approach, or None if the opened plan has neither.
+    """Return a plan of the edited waypoints with the opened plan's departure and approach, or None if it has neither.
 
     Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
     MissionError if these legs were changed.
@@ -423,7 +426,7 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
 
 
 def _have_same_items(mission_a: Mission, mission_b: Mission) -> bool:
-    """Return True if two missions have the same commands at the same positions."""
+    """Return True if two missions have the same commands, at positions that differ only by rounding."""
     commands = [
         [(item.command, item.has_position or item.params) for item in mission.items]
         for mission in (mission_a, mission_b)

@@ -68,7 +68,7 @@ def open_studio(
     listener = _open_listener(port)
     with contextlib.closing(listener):
         target = str(what)
-        autosave_file = Path(keep) / f"{_stem(target)}.json"
+        autosave_file = Path(keep) / f"{_autosave_stem(target)}.json"
         session, restored = open_session(target, options, autosave_file)
         if restored:
             undo_hint = "; undo reverts this" if session.undo_text else ""
@@ -89,10 +89,10 @@ def open_studio(
             asyncio.run(_serve(server, listener, stop))
 
 
-def _stem(target: str) -> str:
-    """Return a file name stem for an opened target; files with equal names in different folders get different stems.
+def _autosave_stem(target: str) -> str:
+    """Return the stem of the autosave file for a target; equal file names in different folders get different stems.
 
-    >>> _stem("jacksboro")
+    >>> _autosave_stem("jacksboro")
     'jacksboro'
     """
     path = Path(target)
@@ -102,7 +102,10 @@ def _stem(target: str) -> str:
 
 
 def _open_listener(port: int | None) -> socket.socket:
-    """Return the socket to which pages connect. Raises PlanflyError if the port is taken."""
+    """Return a listening socket for the pages.  Raises PlanflyError if the requested port is taken.
+
+    port: requested port; None for the default port, or any free port if the default port is taken.
+    """
     for candidate in (DEFAULT_PORT, 0) if port is None else (port,):
         try:
             return socket.create_server((HOST, candidate))

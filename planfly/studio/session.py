@@ -21,9 +21,9 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
-from planfly.studio.pilot import INTERNAL
 from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, settings_json
-from planfly.studio.view_model import Json, sheet_json, window_json, world_json
+from planfly.studio.view_model import Json, mission_json, windows_json, world_json
+from planfly.studio.worker_process import INTERNAL
 from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.suggestion_trials import SuggestionTrials
@@ -110,7 +110,7 @@ class Session:
         return self.document, self.context, self.history
 
     def _restore_state(self, opened_state: _OpenedState) -> None:
-        """Show a document with its earlier context and history; if it cannot be judged, nothing is changed."""
+        """Make a document current, with its context and history; if it cannot be judged, raise and change nothing."""
         _, context, history = opened_state
         judged_mission = context.judge(history.mission)
         self.document, self.context, self.history = opened_state
@@ -119,7 +119,7 @@ class Session:
         self.document_rev += 1
 
     def _add_to_history(self, mission: Mission, text: str) -> None:
-        """Record an edit, and forget undone documents.  text: description of the edit."""
+        """Record an edit, and discard undone documents.  text: description of the edit."""
         self.history.add(mission, text)
         self.undone_states = []
 
@@ -152,7 +152,7 @@ class Session:
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Apply an edit.
+        """Apply an edit to the mission, judge the mission, and record the edit for undo.
 
         Raises StaleEdit for an edit of an older revision, and MissionError if the edited mission would be invalid; in
         both cases nothing is changed.
@@ -164,7 +164,10 @@ class Session:
         self._add_to_history(mission, text)
 
     def step_history(self, kind: str) -> None:
-        """Undo, redo, or revert to the opened mission, if there is anything to undo, redo or revert."""
+        """Undo, redo, or revert to the opened mission; do nothing if there is nothing to undo, redo or revert.
+
+        kind: "undo", "redo" or "revert".
+        """
         if kind == "revert":
             if self.is_changed:
                 self._set_mission(self.history.first)
@@ -189,7 +192,7 @@ class Session:
             self.history.position = previous_position
             raise
 
-    def preview(self, message: Drag) -> Json:
+    def judge_drag(self, message: Drag) -> Json:
         """Judge the mission with an item dragged to another position, without changing the mission.
 
         Returns page data of the route near the item, or of the whole mission on request.  Raises StaleEdit if the
@@ -199,9 +202,9 @@ class Session:
             raise StaleEdit
         mission = self._move_item(message.k, message.east, message.north, message.up)
         if not message.whole:
-            return window_json(mission, *judge_windows(self.context, mission, message.k, self.judged.setup))
+            return windows_json(mission, *judge_windows(self.context, mission, message.k, self.judged.setup))
         judged_mission = self.context.judge(mission)
-        return {"sheet": sheet_json(self.context, judged_mission)}
+        return {"sheet": mission_json(self.context, judged_mission)}
 
     def replace_plan(self, message: Choose) -> None:
         """Replace the mission, or its items between two items, by a planned path.
@@ -217,16 +220,16 @@ class Session:
         if item_range is None:
             self._show_plan(plan)
             return
-        mission = self._replace_part(plan, *item_range)
+        mission = self._replace_items_between(plan, *item_range)
         self._set_mission(mission)
         self._add_to_history(mission, "plan a part")
 
     def _set_mission(self, mission: Mission, context: EditContext | None = None) -> None:
-        """Judge a mission, make it the current mission, and drop planned paths; change nothing if it is invalid.
+        """Judge a mission, make it the current mission, and discard planned paths; change nothing if it is invalid.
 
         context: the editing context to judge the mission with; None for the current context.
         """
-        context = (self.context if context is None else context).around_mission(mission)
+        context = (self.context if context is None else context).with_area_around_mission(mission)
         judged_mission = context.judge(mission)
         if context is not self.context:
             self.world_rev += 1
@@ -235,7 +238,7 @@ class Session:
         self.rev += 1
 
     def _show_plan(self, plan: Plan) -> None:
-        """Replace the mission by the mission of a new plan, whose certificate applies until the mission is edited."""
+        """Replace the current mission by the mission of a plan, whose certificate applies until the next edit."""
         mission = planned_mission(plan, self.context.airframe)
         self._set_mission(mission, self.context.with_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
@@ -353,8 +356,11 @@ class Session:
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
         return replace(flown_mission, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
 
-    def _replace_part(self, plan: Plan, first: int, last: int) -> Mission:
-        """Return the mission with the items between two items replaced by the waypoints of a planned path."""
+    def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
+        """Return the mission with the items between two items replaced by the inner waypoints of a planned path.
+
+        first, last: indices of the two items.
+        """
         mission = self.mission
         for index in [index for index in edits.movable_indices(mission) if first < index < last][::-1]:
             mission = edits.delete_item(mission, index)
@@ -403,7 +409,7 @@ class Session:
     # ------------------------------------------------------------------
     # Page data, and files.
 
-    def sheet(self) -> Json:
+    def mission_message(self) -> Json:
         """Return the message with the current mission and its verdict."""
         return {
             "kind": "sheet",
@@ -417,7 +423,7 @@ class Session:
             "over": self.document.kind if self.document.path is not None else "",
             "planned": self.judged.setup.plan is not None,
             "notes": [*self.mission.warnings, *self.judged.setup.notes],
-            **sheet_json(self.context, self.judged),
+            **mission_json(self.context, self.judged),
         }
 
     def world_message(self) -> Json:
@@ -498,7 +504,7 @@ class Session:
             if autosave is None:
                 return False
             self._set_mission(*autosave)
-            json.dumps(self.sheet(), allow_nan=False)
+            json.dumps(self.mission_message(), allow_nan=False)
         except (*INTERNAL, PlanflyError):
             self.context, self.judged, self.plans = previous_state
             self.unreadable.append(file)

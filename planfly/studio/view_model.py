@@ -48,7 +48,7 @@ _MIN_HEIGHT_RATIO = 0.9
 
 
 def round_to_json(values: Any, digits: int = 1) -> Any:
-    """Return an array as lists of rounded numbers; numbers that are not finite become None."""
+    """Return an array as (nested) lists of rounded numbers; numbers that are not finite become None."""
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
         return array.tolist()
@@ -80,7 +80,7 @@ def world_json(context: EditContext, setup: FlightSetup) -> Json:
 
 
 def _widen_extent(extent: Floats) -> Floats:
-    """Return a larger map extent, so that the terrain also fills windows of other shapes.
+    """Return a larger map extent, so that the terrain also fills browser windows of other shapes.
 
     extent: minimum and maximum of east, then of north, (2, 2), m.
     """
@@ -129,7 +129,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # Data of the mission.
 
 
-def sheet_json(context: EditContext, judged_mission: JudgedMission) -> Json:
+def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
     """Return page data of a mission and its geometric verdict: items, route, path, states, findings and profile."""
     verdict, setup = judged_mission.verdict, judged_mission.setup
     states = place_states(judged_mission.requirements, verdict.findings)
@@ -150,7 +150,7 @@ def sheet_json(context: EditContext, judged_mission: JudgedMission) -> Json:
     }
 
 
-def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
+def windows_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
     """Return page data of the legs and corners that were judged near a moved item."""
     return {"total_legs": route.legs, "windows": [_window_json(mission, route, window) for window in windows]}
 
@@ -192,7 +192,10 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Return page data of the waypoints `first` to `last`, each with the index of its item, or -1 without an item."""
+    """Return page data of the waypoints `first` to `last`: their positions and the indices of their items.
+
+    The index is -1 for a waypoint without an item.
+    """
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
     return {"route": round_to_json(route.waypoints[first : last + 1]), "of": items}

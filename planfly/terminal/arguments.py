@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_valid_position, is_wind
+from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_valid_camera, is_valid_position, is_valid_wind
 
 # ----------------------------------------------------------------------
 # Convert command line texts to values within the ranges of the API's keywords.
@@ -42,7 +42,7 @@ def parse_wind(text: str) -> tuple[float, float]:
         speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
         speed, from_deg = math.nan, 0.0
-    if not is_wind(speed, from_deg):
+    if not is_valid_wind(speed, from_deg):
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected SPEED,FROM: 0 to 40 m/s, and the degrees that the wind blows from (-360..360)"
         )
@@ -60,7 +60,7 @@ def parse_camera(text: str) -> tuple[float, ...]:
         numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *other_parts))
     except ValueError:
         numbers = ()
-    if not is_camera(numbers) or sensor.lower().count("x") != 1:
+    if not is_valid_camera(numbers) or sensor.lower().count("x") != 1:
         raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA_FORMAT}")
     return numbers
 
