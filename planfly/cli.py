@@ -53,7 +53,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command, report errors of the machine and interruptions in one line, and return the exit code."""
+    """Run one command, report errors of the machine and interruptions in one line.
+
+    Returns the exit code.
+    """
     try:
         with safe_streams():
             return _run_command(argv)

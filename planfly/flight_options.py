@@ -281,7 +281,9 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
-    """Return the entries of a scenario's [flight] table for the options; None for an option that is not given.
+    """Return the entries of a scenario's [flight] table for the options.
+
+    The entry of an option that is not given is None.
 
     program: file of a real autopilot (SITL) that flies instead of a simulated autopilot, or None.
     Raises ArgumentError for an unknown autopilot, and if both an autopilot and a program are given.
@@ -313,7 +315,10 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
 
 
 def _parse_wind(wind: Wind) -> Wind:
-    """Return speed (m/s) and direction (degrees) of a wind as numbers.  Raises ArgumentError for other values."""
+    """Return speed (m/s) and direction (degrees) of a wind as numbers.
+
+    Raises ArgumentError for other values.
+    """
     try:
         speed, from_deg = wind
         if isinstance(wind, str | bytes):

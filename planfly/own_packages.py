@@ -11,7 +11,10 @@ _BAD_USAGE_CODE = 2
 
 
 class HiddenPackage(NamedTuple):
-    """Package of planfly that another module hides.  found: file of the other module.  own: file of the package."""
+    """Package of planfly that another module hides.
+
+    found: file of the other module.  own: file of the package.
+    """
 
     found: str
     own: str
@@ -37,7 +40,10 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
 
 
 def _module_file(name: str) -> str | None:
-    """Return the file of the module that Python imported, or would import, by a name; None if there is no such file."""
+    """Return the file of the module that Python imported, or would import, by a name.
+
+    Returns None if there is no such file.
+    """
     if name in sys.modules:
         return getattr(sys.modules[name], "__file__", None)
     spec = find_spec(name)

@@ -31,7 +31,10 @@ def add_compare_parser(command_line: LineParser) -> None:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences, and draw them if a folder is named; return 3 if one of the logs is incomplete."""
+    """Print the differences, and draw them if a folder is named.
+
+    The exit code is 3 if one of the logs is incomplete.
+    """
     from logs.views.report.compare import difference_lines
 
     logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]

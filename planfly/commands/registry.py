@@ -135,7 +135,9 @@ def commands_with_json() -> list[str]:
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of a command's answer. Raises KeyError for a command without an answer.
+    """Return the JSON schema (draft 2020-12) of a command's answer.
+
+    Raises KeyError for a command without an answer.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']

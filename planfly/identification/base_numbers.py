@@ -61,7 +61,9 @@ def base_model(aircraft: Aircraft) -> BaseModel:
 
 
 def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
-    """Return the values of `base_model` for an aircraft with varied properties; its motor is always tabulated.
+    """Return the values of `base_model` for an aircraft with varied properties.
+
+    The motor of the result is always tabulated.
 
     Raises FlightError for an aircraft without steady flight at cruise.
     """
@@ -244,7 +246,10 @@ def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor | None:
-    """Return the motor or propeller disc with the constants of a model, or None for a motor model of another form."""
+    """Return the motor or propeller disc with the constants of a model.
+
+    Returns None for a motor model of another form.
+    """
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {function.get("name", ""): function for function in root.iter("function")}

@@ -154,7 +154,9 @@ def _lift_functions(numbers: BaseModel) -> str:
 
 
 def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the JSBSim function that adds the estimated terms to an axis, or "" for an axis without estimated terms.
+    """Return the JSBSim function that adds the estimated terms to an axis.
+
+    Returns "" for an axis without estimated terms.
 
     drag, control: XML factors that the base applies to drag and to control deflections, or "".
     """

@@ -303,7 +303,10 @@ def _servo_functions(log: MotionLog) -> dict[int, int]:
 
 
 def _first_output(log: MotionLog, function: int) -> int:
-    """Return the number of the first output whose SERVOn_FUNCTION is `function`, or 0 if there is no such output."""
+    """Return the number of the first output whose SERVOn_FUNCTION is `function`.
+
+    Returns 0 if there is no such output.
+    """
     return next((number for number, output_function in _servo_functions(log).items() if output_function == function), 0)
 
 

@@ -156,7 +156,9 @@ def run_unit(unit: str, report: Callable[[str], None]) -> None:
 
 
 def is_ready(kernel: str) -> bool:
-    """Return True if a kernel has been compiled, or loaded from the cache, in this process.  kernel: "module.name".
+    """Return True if a kernel has been compiled, or loaded from the cache, in this process.
+
+    kernel: "module.name".
 
     >>> is_ready("world.terrain.steepest_slopes") in (True, False)
     True

@@ -139,7 +139,9 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
 
 
 def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
-    """Return the problem of an aircraft that climbs too slowly for any margin against downdrafts, otherwise "".
+    """Return the problem of an aircraft that climbs too slowly for any margin against downdrafts.
+
+    Returns "" otherwise.
 
     With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, more downdrafts arrive before the aircraft has climbed back.
     Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none
@@ -160,7 +162,9 @@ def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
 
 
 def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
-    """Search for a plan without shortfalls, within limits that leave climb and sink rate unused; None if not found.
+    """Search for a plan without shortfalls, within limits that leave climb and sink rate unused.
+
+    Returns None if no such plan is found.
 
     shortfalls: shortfalls of the given plan.
     """
@@ -338,7 +342,10 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Return (name, height above ground in m, index of the point) for both ends of a path; empty without terrain."""
+    """Return (name, height above ground in m, index of the point) for both ends of a path.
+
+    The result is empty without terrain.
+    """
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
@@ -347,7 +354,10 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 
 
 def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a downdraft into the required clearance; its depth is 0 m without one."""
+    """Return the deepest displacement by a downdraft into the required clearance.
+
+    The depth is 0 m if no displacement reaches into the clearance.
+    """
     data = problem.certified
     hazard_text = f"into the clearance of {data.clearance:g} m"
     for name, height, index in _heights_at_ends(problem, parts):
@@ -369,7 +379,9 @@ def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the place where an updraft lifts the aircraft highest above ground; None without a maximum height.
+    """Return the place where an updraft lifts the aircraft highest above ground.
+
+    Returns None without a maximum height.
 
     The depth is the height above the maximum height, negative if the aircraft stays below.
     """

@@ -102,7 +102,10 @@ def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
 
 
 def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
-    """Return the largest distance from the legs at each corner in gusts, m; empty without a tracking error."""
+    """Return the largest distance from the legs at each corner in gusts, m.
+
+    The result is empty without a tracking error.
+    """
     limits = airframe.limits
     if (tracking := limits.tracking) is None:
         return []

@@ -35,7 +35,9 @@ SUFFIXES = (".gif", ".mp4")
 def write_movie(
     log: FlightLog, target: Path, start: float, end: float, *, speed: float | None, overwrite: bool
 ) -> list[Path]:
-    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on; return the files.
+    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on.
+
+    Returns the files.
 
     start, end: start and end in flight time, s.
     speed: multiple of real time; None for a film of 20 s.
@@ -108,7 +110,10 @@ def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
 
 
 def _encode_gif(film: MovieFrames) -> bytes:
-    """Encode a film as GIF with one palette; each frame contains only the pixels that differ from the frame before."""
+    """Encode a film as GIF with one palette.
+
+    Each frame contains only the pixels that differ from the frame before.
+    """
     images = _yield_frames(film)
     first_frame = next(images)
     palette = _make_palette(first_frame)
@@ -137,7 +142,10 @@ def _encode_gif(film: MovieFrames) -> bytes:
 
 
 def _find_ffmpeg(target: Path) -> str:
-    """Return the path of ffmpeg, installed or from the extra `films`.  Raises MissingExtraError without either."""
+    """Return the path of ffmpeg, installed or from the extra `films`.
+
+    Raises MissingExtraError without either.
+    """
     program = shutil.which("ffmpeg")
     if program is not None:
         return program
@@ -148,7 +156,9 @@ def _find_ffmpeg(target: Path) -> str:
 
 
 def _encode_mp4(film: MovieFrames, program: str) -> bytes:
-    """Encode a film as MP4 with ffmpeg.  Raises OSError with the last line of ffmpeg's output if ffmpeg fails.
+    """Encode a film as MP4 with ffmpeg.
+
+    Raises OSError with the last line of ffmpeg's output if ffmpeg fails.
 
     program: path of ffmpeg.
     """

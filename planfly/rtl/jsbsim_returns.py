@@ -95,7 +95,10 @@ def positions_from_start(track: Track, start: Record) -> Floats | None:
 
 
 def find_nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproaches:
-    """Find the points of a path that are closest to the ground and to missiles.  positions: path points, (t, 3) m."""
+    """Find the points of a path that are closest to the ground and to missiles.
+
+    positions: path points, (t, 3) m.
+    """
     clearance, lowest_position = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
         heights = positions[:, 2] - world.scenario.terrain.height(positions[:, 0], positions[:, 1])

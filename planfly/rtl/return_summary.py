@@ -56,7 +56,10 @@ class ReturnSummary:
 
 
 def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
-    """Judge returns from a few points of a flight or planned path; the summary is empty without home or terrain."""
+    """Judge returns from a few points of a flight or planned path.
+
+    The summary is empty without home or terrain.
+    """
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnSummary()
     try:

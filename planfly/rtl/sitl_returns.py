@@ -160,7 +160,9 @@ def check_is_arduplane(program: Path) -> None:
 def choose_worst_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[SimulatedReturn, int]]:
-    """Choose at most `points` returns for the program to fly; return each with the index of its start, worst first.
+    """Choose at most `points` returns for the program to fly.
+
+    Returns each with the index of its start, worst first.
 
     Skipped are starts closer to a chosen start than half the path length divided by `points`, because returns from
     neighbouring starts are alike, and starts that the program cannot reach safely.
@@ -295,7 +297,9 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """Cut a path to a landing sequence after its last waypoint before the landing; return other paths unchanged.
+    """Cut a path to a landing sequence after its last waypoint before the landing.
+
+    Returns other paths unchanged.
 
     position: path points, (t, 3) m.
     """

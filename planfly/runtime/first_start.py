@@ -30,7 +30,9 @@ _END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Compile the kernels of `planfly.kernel_units` in several processes; return when each unit is ready or has failed.
+    """Compile the kernels of `planfly.kernel_units` in several processes.
+
+    Returns when each unit is ready or has failed.
 
     units: names of units, the unit that takes longest first.
     folder: cache folder of the kernels.
@@ -65,7 +67,10 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
 
 
 def _start_process(folder: Path) -> "subprocess.Popen[str]":
-    """Start a process that compiles units named on its standard input.  folder: cache folder of the kernels."""
+    """Start a process that compiles units named on its standard input.
+
+    folder: cache folder of the kernels.
+    """
     home = str(Path(__file__).parents[2])
     path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
     return subprocess.Popen(

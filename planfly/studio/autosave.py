@@ -147,7 +147,9 @@ def mission_data(mission: Mission) -> Json:
 
 
 def mission_from_data(data: Json, first: Mission) -> Mission:
-    """Make a mission from the data of `mission_data`; fields that are not in the data are taken from `first`.
+    """Make a mission from the data of `mission_data`.
+
+    Fields that are not in the data are taken from `first`.
 
     Raises ValueError, LookupError or TypeError for other data.
     """

@@ -64,7 +64,10 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect the worst result of each rule at each place of a flight.  seconds: duration of the flight, s."""
+    """Collect the worst result of each rule at each place of a flight.
+
+    seconds: duration of the flight, s.
+    """
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
     results: _Results = {}
@@ -108,7 +111,9 @@ def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) 
 
 
 def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tuple[float, ...]]) -> dict[int, int]:
-    """Map the position of each item in an old mission to its position in a new mission; removed items are omitted.
+    """Map the position of each item in an old mission to its position in a new mission.
+
+    Removed items are omitted.
 
     >>> a, b, c, d = [(16.0, 46.0, 8.0 + k, 100.0) for k in range(4)]
     >>> match_items([a, b, c], [a, d, b, c]), match_items([a, b, c], [a, c]), match_items([a, b, c], [a, d, c])

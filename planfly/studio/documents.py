@@ -238,7 +238,9 @@ class SavedFile:
 
 
 def save_document(document: Document, context: EditContext, judged_mission: JudgedMission, kind: str) -> SavedFile:
-    """Return the edited mission as a file; an unchanged mission in its original format is saved as the original bytes.
+    """Return the edited mission as a file.
+
+    An unchanged mission in its original format is saved as the original bytes.
 
     kind: one of `SAVED_SUFFIXES`.
 
@@ -315,7 +317,10 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:
-    """Return a parameter file with the parameters set in the studio. Raises PlanflyError if no parameter was set."""
+    """Return a parameter file with the parameters set in the studio.
+
+    Raises PlanflyError if no parameter was set.
+    """
     if not context.parameters.values:
         raise PlanflyError("no parameter was set in the studio: set one under Settings", field="form")
     return SavedFile(
@@ -389,7 +394,9 @@ def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
 
 
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
-    """Return a plan of the edited waypoints with the opened plan's departure and approach, or None if it has neither.
+    """Return a plan of the edited waypoints with the opened plan's departure and approach.
+
+    Returns None if the opened plan has neither.
 
     Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
     MissionError if these legs were changed.

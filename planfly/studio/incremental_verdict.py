@@ -50,7 +50,9 @@ class Window:
 def judge_windows(
     context: EditContext, mission: Mission, index: int, previous_setup: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge the parts of a mission's route near a moved item; return the route and the judged parts (windows).
+    """Judge the parts of a mission's route near a moved item.
+
+    Returns the route and the judged parts (windows).
 
     The whole route is judged as one part if it may contain surveys, or if the parts together would be as long.
 
@@ -172,7 +174,9 @@ def _is_in_window(finding: Finding, first: int, last: int) -> bool:
 
 
 def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
-    """Return the first and last waypoint of each span that a move of an item may change; None for the whole route.
+    """Return the first and last waypoint of each span that a move of an item may change.
+
+    Returns None if the move may change the whole route.
 
     seq: number of the moved item.
     Overlapping spans are merged. Landing sequences and returns depend on the whole route.
@@ -197,7 +201,10 @@ def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
-    """Return a span extended on both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`; loiters are not cut."""
+    """Return a span extended on both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
+
+    Loiters are not cut.
+    """
     distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.waypoints))])
     start = min(
         first - MOVE_REACH_LEGS, int(np.searchsorted(distance, distance[first] - MOVE_REACH_M, side="right")) - 1

@@ -47,7 +47,10 @@ class _ActiveTask:
 
     @property
     def message(self) -> Json:
-        """Progress message to the pages; its number distinguishes the task from earlier tasks of the same name."""
+        """Progress message to the pages.
+
+        Its number distinguishes the task from earlier tasks of the same name.
+        """
         return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.fraction}
 
 
@@ -236,7 +239,10 @@ class Jobs:
         return [self._result_message(task, answer.value, session)]
 
     def _stopped_message(self, name: str) -> Json:
-        """Return the message that a task has ended without a result.  name: kind of the task, as in `_ActiveTask`."""
+        """Return the message that a task has ended without a result.
+
+        name: kind of the task, as in `_ActiveTask`.
+        """
         if name == "plan":
             self._uses_first_path = False
         return {"kind": "stopped", "job": name}

@@ -26,7 +26,9 @@ FLIGHT_COUNT = 24
 
 
 def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission, judge returns to launch from points along the flight, and return their results as page data.
+    """Fly a mission, and judge returns to launch from points along the flight.
+
+    Returns the results of the returns as page data.
 
     payload: editing context, and mission.
     """

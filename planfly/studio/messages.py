@@ -215,7 +215,9 @@ def read_message(text: str | bytes) -> Message:
 
 
 def describe_error(error: ValidationError) -> str:
-    """Return a line that describes the first invalid field of a message, or "" if the kind of message is unknown.
+    """Return a line that describes the first invalid field of a message.
+
+    Returns "" if the kind of message is unknown.
 
     >>> try:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')

@@ -90,7 +90,9 @@ def open_studio(
 
 
 def _autosave_stem(target: str) -> str:
-    """Return the stem of the autosave file for a target; equal file names in different folders get different stems.
+    """Return the stem of the autosave file for a target.
+
+    Equal file names in different folders get different stems.
 
     >>> _autosave_stem("jacksboro")
     'jacksboro'

@@ -454,7 +454,10 @@ class Server:
 
 
 async def _receive_text(socket: WebSocket) -> str:
-    """Return the next text message. Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
+    """Return the next text message.
+
+    Raises ValueError for a binary message, and WebSocketDisconnect at the end.
+    """
     event = await socket.receive()
     if event["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(event.get("code", 1000))

@@ -110,7 +110,10 @@ class Session:
         return self.document, self.context, self.history
 
     def _restore_state(self, opened_state: _OpenedState) -> None:
-        """Make a document current, with its context and history; if it cannot be judged, raise and change nothing."""
+        """Make a document current, with its context and history.
+
+        If the mission cannot be judged, an error is raised and nothing is changed.
+        """
         _, context, history = opened_state
         judged_mission = context.judge(history.mission)
         self.document, self.context, self.history = opened_state
@@ -276,7 +279,10 @@ class Session:
         return airborne or requested
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
-        """Return the mission with an item at another position, m, or altitude, m AMSL; None keeps the old value."""
+        """Return the mission with an item at another position, m, or altitude, m AMSL.
+
+        A value of None keeps the old value.
+        """
         mission = self.mission
         edits.movable_item(mission, index)
         if east is not None and north is not None:
@@ -392,7 +398,10 @@ class Session:
     # The world.
 
     def change_settings(self, settings: Settings) -> None:
-        """Change the settings of the flight. Raises PlanflyError for a value that is not allowed in a scenario."""
+        """Change the settings of the flight.
+
+        Raises PlanflyError for a value that is not allowed in a scenario.
+        """
         scenario = apply_scenario_settings(self.context.scenario, settings)
         context = self.context.with_settings(
             scenario, apply_parameter_settings(self.context.parameters, scenario, settings)

@@ -112,7 +112,9 @@ def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, set
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> ChangedParameters:
-    """Parse the text of a parameter file for the autopilot of a scenario; the scenario's own parameters are left out.
+    """Parse the text of a parameter file for the autopilot of a scenario.
+
+    The scenario's own parameters are left out.
 
     name: file name for messages.
 

@@ -84,7 +84,9 @@ def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: St
 
 
 def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
-    """Return the state of a place according to one finding, or None if the finding does not affect the state.
+    """Return the state of a place according to one finding.
+
+    Returns None if the finding does not affect the state.
 
     unjudged: True if the verdict is withheld because of this finding.
 

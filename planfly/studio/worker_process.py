@@ -211,7 +211,10 @@ class WorkerProcess:
             self._on_answer(Answer(dropped_number, "cancelled"))
 
     def _drop_unanswered(self) -> list[int]:
-        """Clear the unanswered tasks of a lost process; return their numbers, without the newest task's number."""
+        """Clear the unanswered tasks of a lost process.
+
+        Returns the numbers of these tasks, except the number of the newest task.
+        """
         dropped_numbers = [
             number for number in self._unanswered if self._newest_task is None or number != self._newest_task.number
         ]

@@ -141,7 +141,10 @@ class PlanRequest:
 
 
 def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
-    """Plan one or several paths, and return them with the shortest first; if no path is safe, return the best path."""
+    """Plan one or several paths, and return them with the shortest first.
+
+    If no path is safe, the best path is returned.
+    """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
     airframe, seed, stop = request.airframe, request.seed, partial(_stop_reason, time.monotonic() + seconds)

@@ -106,7 +106,10 @@ def parse_time_or_stations(text: str) -> float | str:
 
 
 def parse_budget(text: str) -> tuple[int | None, float | None]:
-    """Parse a number of evaluations, or a number of seconds if the text ends in s; return (evaluations, seconds)."""
+    """Parse a number of evaluations, or a number of seconds if the text ends in s.
+
+    Returns (evaluations, seconds).
+    """
     try:
         if text.endswith("s"):
             return None, number_parser("seconds")(text[:-1])
@@ -131,7 +134,10 @@ def parse_threat(text: str) -> tuple[float, float, float, float]:
 
 
 def parse_problems(text: str) -> tuple[int, ...]:
-    """Parse threat counts separated by commas, such as "7,15"; only the four counts of the paper are allowed."""
+    """Parse threat counts separated by commas, such as "7,15".
+
+    Only the four counts of the paper are allowed.
+    """
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):

@@ -57,7 +57,10 @@ def _answer_text(verdict: Verdict) -> str:
 
 
 def _rule_summary(rule: RuleFindings | None) -> str:
-    """Return how many findings of a rule failed or passed, as text for a cell; "" if the rule has no findings."""
+    """Return how many findings of a rule failed or passed, as text for a cell.
+
+    Returns "" if the rule has no findings.
+    """
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

@@ -114,7 +114,9 @@ class CommandParser(argparse.ArgumentParser):
         self._aliases[keyword] = option
 
     def take_late_arguments(self, parsed: argparse.Namespace, unknown_arguments: list[str]) -> bool:
-        """Store positional arguments that argparse left over, and return True if a positional parameter takes them.
+        """Store positional arguments that argparse left over.
+
+        Returns True if a positional parameter takes them.
 
         argparse itself accepts optional positional arguments only directly after the others, not after an option.
         """
@@ -265,7 +267,9 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
 
 
 def _similar_option_hint(option: str, options: Iterable[str]) -> str:
-    """Return the end of a message about an unknown option, which suggests the most similar option; "" without one.
+    """Return the end of a message about an unknown option, which suggests the most similar option.
+
+    Returns "" if no option is similar.
 
     The leading dashes, which all options share, are not compared.
 

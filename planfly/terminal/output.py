@@ -136,7 +136,10 @@ def printable(text: str) -> str:
 
 
 def plain_stream(stream: TextIO) -> TextIO:
-    """Return the stream under a `_SafeStream`, for text that moves the cursor; return other streams unchanged."""
+    """Return the stream under a `_SafeStream`, for text that moves the cursor.
+
+    Returns other streams unchanged.
+    """
     plain: TextIO = getattr(stream, "plain", stream)
     return plain
 
@@ -310,7 +313,10 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
 
 @contextmanager
 def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
-    """Refresh a display every second from a thread while the block runs; if no thread can start, do not refresh."""
+    """Refresh a display every second from a thread while the block runs.
+
+    If no thread can start, the display is not refreshed.
+    """
     stage_ended = threading.Event()
 
     def refresh() -> None:
@@ -529,7 +535,10 @@ def write_json_if_requested(args: argparse.Namespace, make_answer: Callable[[], 
 
 
 def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
-    """Write verdicts as JUnit XML if requested.  verdicts: verdict of each judged mission or flight, keyed by name."""
+    """Write verdicts as JUnit XML if requested.
+
+    verdicts: verdict of each judged mission or flight, keyed by name.
+    """
     if args.junit is not None:
         from logs.verdict.junit import junit_text
 

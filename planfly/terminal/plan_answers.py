@@ -77,7 +77,10 @@ PlanDocument = PlanAnswer | FrontAnswer
 
 
 def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
-    """Return the JSON answer for a Pareto front whose files are in a folder.  code: exit code of the command."""
+    """Return the JSON answer for a Pareto front whose files are in a folder.
+
+    code: exit code of the command.
+    """
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
 

@@ -229,7 +229,10 @@ def suggestion_entry(result: ReturnsResult, trial: RemedyTrial) -> ReturnSuggest
 
 
 def program_returns_entry(result: ReturnsResult) -> ByProgram | None:
-    """Return the JSON entry of the returns that the ArduPlane program flew, or None if the program was not used."""
+    """Return the JSON entry of the returns that the ArduPlane program flew.
+
+    Returns None if the program was not used.
+    """
     if result.by_program is None:
         return None
     log_path_by_name = {log.name: str(log) for log in result.files}

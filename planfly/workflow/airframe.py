@@ -72,7 +72,7 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """Return the requested seed; if it is None, the seed of the scenario, or 1 if the scenario has no seed."""
+    """Return the requested seed, or else the seed of the scenario, or else 1."""
     if seed is not None:
         return seed
     return scenario.planner.seed if scenario.planner.seed is not None else 1
@@ -103,7 +103,9 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
 
 
 def airframe_for_setup(setup: FlightSetup) -> Airframe:
-    """Return the airframe of a flight setup.  Raises FlightError if the catalog does not contain its aircraft.
+    """Return the airframe of a flight setup.
+
+    Raises FlightError if the catalog does not contain its aircraft.
 
     >>> from logs.recording.example_log import example_log
     >>> airframe_for_setup(example_log().setup).aircraft.name
@@ -128,7 +130,9 @@ def with_tracking_error(limits: Limits, autopilot: Autopilot, scenario: Scenario
 
 
 def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
-    """Return the aircraft of a scenario and the energy carried (Wh).  Raises ScenarioError for an unknown aircraft.
+    """Return the aircraft of a scenario and the energy carried (Wh).
+
+    Raises ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
     >>> find_aircraft_and_energy(load_scenario("tight"))[0].name

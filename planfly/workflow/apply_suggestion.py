@@ -202,7 +202,10 @@ class _EditedMission:
 
 
 def _changed_leg(change: Change, route: Route) -> int:
-    """Return the index of the leg that a change refers to.  Raises MissionError if it names no leg of the route."""
+    """Return the index of the leg that a change refers to.
+
+    Raises MissionError if it names no leg of the route.
+    """
     if change.place.kind != "leg" or change.place.index is None or change.place.index >= route.legs:
         raise MissionError("this suggestion names no leg of the route", field="suggestion")
     return change.place.index

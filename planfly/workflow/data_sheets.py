@@ -171,7 +171,10 @@ def parse_sheet(
 
 
 def _parse_battery(text: str) -> tuple[float, float]:
-    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".  Raises FlightError for invalid text."""
+    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".
+
+    Raises FlightError for invalid text.
+    """
     match = _BATTERY_PATTERN.fullmatch(text.strip())
     volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
@@ -188,7 +191,10 @@ def _parse_battery(text: str) -> tuple[float, float]:
 
 
 def _parse_propeller(text: str) -> tuple[float, float]:
-    """Return diameter and pitch (m) of a propeller such as "12x6", inches.  Raises FlightError for invalid text."""
+    """Return diameter and pitch (m) of a propeller such as "12x6", inches.
+
+    Raises FlightError for invalid text.
+    """
     match = _PROPELLER_PATTERN.fullmatch(text.strip())
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
@@ -400,7 +406,9 @@ def make_data_sheet_folder(
     *,
     overwrite: bool = False,
 ) -> Aircraft:
-    """Write the folder of an aircraft made from its data sheet, completely or not at all; return the aircraft.
+    """Write the folder of an aircraft made from its data sheet, completely or not at all.
+
+    Returns the aircraft.
 
     parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
     sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
@@ -472,7 +480,10 @@ def _make_files(
 
 
 def _check_endurance(aircraft: Aircraft, power: float) -> None:
-    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.  power: W."""
+    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.
+
+    power: W.
+    """
     if not aircraft.battery_voltage or aircraft.battery_energy >= _MIN_ENDURANCE_S * power:
         return
     volts, watt_hours = aircraft.battery_voltage, aircraft.battery_energy / 3600.0

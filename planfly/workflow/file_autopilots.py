@@ -55,7 +55,9 @@ _FIRMWARE_TEXTS = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
 def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Scenario:
-    """Return the scenario with the autopilot of its parameter file; unchanged if the file does not identify it.
+    """Return the scenario with the autopilot of its parameter file.
+
+    The scenario is unchanged if the file does not identify an autopilot.
 
     Raises ParameterError for a file with parameters of both autopilots.
     """

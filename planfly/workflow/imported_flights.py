@@ -302,7 +302,10 @@ def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Note the difference between the log's mission and the named plan; empty if they agree or no plan is named."""
+    """Note the difference between the log's mission and the named plan.
+
+    The result is empty if they agree or no plan is named.
+    """
     if options.get("plan") is None or flight.mission is None:
         return ()
     logged_items = flight.mission.mission.items
@@ -363,7 +366,9 @@ def fly_again(
     advance: Advance,
     max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
-    """Simulate each sequence of followed legs in the wind of the log; return the comparisons, longest first.
+    """Simulate each sequence of followed legs in the wind of the log.
+
+    Returns the comparisons, longest first.
 
     setup: setup of the imported flight, with its source.
     aircraft: aircraft of the simulated flight; None for the setup's aircraft.
@@ -399,7 +404,9 @@ class DrawnFlight:
 def fly_draws(
     setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
 ) -> tuple[Reflight, ...]:
-    """Simulate the longest sequence of followed legs once for each draw; return the comparisons with the log.
+    """Simulate the longest sequence of followed legs once for each draw.
+
+    Returns the comparisons with the log.
 
     A draw is a sampled variant of the aircraft in a sampled wind.  A draw with which the aircraft cannot start, or
     flies none of the legs, is left out.

@@ -104,7 +104,9 @@ def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keep
 
 
 def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Return a plan with departure and approach; its certificate also names the hazards near the final loiter.
+    """Return a plan with departure and approach.
+
+    The certificate of the plan also names the hazards near its final loiter.
 
     old_plan: the plan being flown, or None.
     """

@@ -137,7 +137,10 @@ class MissionContext:
         return replace(mission, items=tuple(items))
 
     def _planned_positions(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
-        """Return the positions of planned items, (n, 3) m AMSL; a landing has the altitude of the item before it."""
+        """Return the positions of planned items, (n, 3) m AMSL.
+
+        A landing has the altitude of the item before it.
+        """
         items = [mission.items[k] for k in indices]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [item.alt for item in items]

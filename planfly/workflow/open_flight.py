@@ -98,7 +98,10 @@ def _terrain_option(options: MissionOptions) -> str | None:
 
 
 def check_mission_exists(path: Path) -> Path:
-    """Return the path.  Raises MissionError if it does not exist, with the most similar name as a suggestion."""
+    """Return the path.
+
+    Raises MissionError if it does not exist, with the most similar name as a suggestion.
+    """
     if not path.is_file():
         hint = did_you_mean(path.name, _mission_file_names(path.parent))
         raise MissionError(f"{path}: no such file; expected a plan.json, .waypoints or .plan file{hint}", file=path)
@@ -132,7 +135,10 @@ def check_fixed_wing(mission: Mission) -> Mission:
 
 
 def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
-    """Make a mission without fences from the waypoints of a plan.  source: the plan's file name, for messages."""
+    """Make a mission without fences from the waypoints of a plan.
+
+    source: the plan's file name, for messages.
+    """
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
 
 
@@ -142,7 +148,10 @@ _STORED_ITEMS = {"ardupilot": (724, "a Pixhawk with ArduPlane"), "px4": (500, "a
 
 
 def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, ...]:
-    """Note a mission with more items than a common flight controller of the autopilot stores; empty otherwise."""
+    """Note a mission with more items than a common flight controller of the autopilot stores.
+
+    The result is empty otherwise.
+    """
     limit, board = _STORED_ITEMS.get(dialect, (len(mission.items), ""))
     if len(mission.items) <= limit:
         return ()

@@ -124,7 +124,10 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Check a target folder with `check_output_folder`, make it, remove old results of planfly, and return its path."""
+    """Check a folder with `check_output_folder`, make it, and remove old results of planfly from it.
+
+    Returns the path of the folder.
+    """
     folder = Path(out)
     check_output_folder(folder, overwrite)
     prepare_folder(folder, files)

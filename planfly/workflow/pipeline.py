@@ -229,7 +229,10 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
 
 
 def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
-    """Fly to the end or until the log is full, recording each block; return the track and the reason for the end."""
+    """Fly to the end or until the log is full, recording each block.
+
+    Returns the track and the reason for the end.
+    """
     builder, end_reason, length = TrackBuilder(), "", flight.path.length
     # A recorded flight is written second by second, so that a crash of the process loses no more.
     for block in simulate(flight, LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S):

@@ -86,7 +86,10 @@ def find_passing_parameter(
 def _nearest_passing_value(
     current: float, step: float, farthest: float, passes: Callable[[float], bool]
 ) -> float | None:
-    """Return the passing value nearest to the current value, in steps to `farthest`; None if `farthest` fails."""
+    """Return the passing value nearest to the current value, in steps to `farthest`.
+
+    Returns None if `farthest` fails.
+    """
     step_count = int(abs(farthest - current) / step + 1e-6)
     sign = 1.0 if farthest > current else -1.0
     values = [round(current + sign * k * step, 6) for k in range(1, step_count + 1)]

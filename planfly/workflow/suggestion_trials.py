@@ -124,7 +124,10 @@ class SuggestionTrials:
         self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)
 
     def find_passing(self) -> list[PassedTrial]:
-        """Try the first suggestion of each finding, then the second and so on, and return the suggestions that pass."""
+        """Try the first suggestion of each finding, then the second and so on.
+
+        Returns the suggestions that pass.
+        """
         requests = [
             (number, rank, finding)
             for rank, finding in enumerate(self._findings_to_try())
@@ -208,7 +211,9 @@ class SuggestionTrials:
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
-    """Return a suggestion enlarged by the further change that the verdict suggests, or None without such a change.
+    """Return a suggestion enlarged by the further change that the verdict suggests.
+
+    Returns None without such a change.
 
     verdict: verdict on the mission with the suggestion applied.
     If the finding itself is now ok, the steps that another leg needs for the same rule are added.
