@@ -143,7 +143,9 @@ CAMERA_FORMAT = (
 
 
 def is_valid_wind(speed: float, from_deg: float) -> bool:
-    """Return True if a wind speed (0 to 40 m/s) and the direction from which the wind blows (degrees) are allowed.
+    """Return True if the speed and the direction of a wind are allowed.
+
+    speed: 0 to 40 m/s.  from_deg: direction from which the wind blows, -360 to 360 degrees.
 
     >>> is_valid_wind(8.0, 270.0), is_valid_wind(float("nan"), 0.0)
     (True, False)

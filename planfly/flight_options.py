@@ -172,7 +172,9 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Decorate a function so that it takes the options of its ``Unpack[...]`` parameter as keywords with defaults.
+    """Decorate a function to take the options of its ``Unpack[...]`` parameter as keywords.
+
+    The options are listed in its signature, with their defaults.
 
     Raises the ArgumentError of `world.argument_types.check_types`.
 

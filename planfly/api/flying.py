@@ -34,7 +34,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
+from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight, with_engine
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log_path, fly_and_judge
@@ -208,7 +208,7 @@ def fly(
     program = named_program(options["sitl"])
     setup = with_engine(open_flight(mission, options, program), options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
-    with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
+    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
             airframe_for_setup(setup),

@@ -22,7 +22,7 @@ from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, with_tightened_limits
-from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
+from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
 from planfly.workflow.output_paths import (
@@ -259,7 +259,7 @@ def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
         write_atomically(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)
-    with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
+    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
             airframe,

@@ -374,7 +374,7 @@ def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> Non
 
 
 def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
-    """Print the steepest climb and descent, relative to the air and to the ground, and the speeds of level flight."""
+    """Print the steepest climb and descent, relative to air and ground, and the speeds of level flight."""
     altitudes = [float(amsl) for amsl in envelope.amsl[::2]]
     header = "".join(f"{amsl:>13.0f} m" for amsl in altitudes)
     print("\nsteepest climb / descent relative to the air, deg, by airspeed and altitude AMSL ('-': no steady flight)")
@@ -396,7 +396,7 @@ def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
 
 
 def _print_turns(aircraft: "Aircraft") -> None:
-    """Print tables of turn radii and of the shortest legs between two turns, with a row for each ground speed."""
+    """Print tables of turn radii and of the shortest legs between two turns, by ground speed."""
     from aircraft.envelope import turn_radius
 
     speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max]

@@ -200,7 +200,9 @@ def _fly_again(args: argparse.Namespace, folder: Path) -> int:
 
 @contextmanager
 def _report_stored_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """After an interruption, report the number of stored flights; yield a function that returns the exit code.
+    """Report the number of stored flights after an interruption.
+
+    Yields a function that returns the exit code.
 
     The exit code is 0 without an interruption. An interruption before the table exists is raised again.
     """

@@ -154,7 +154,9 @@ def answer_schema(name: str) -> dict[str, Any]:
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the schemas of the objects that an answer may be; several if options choose between the objects.
+    """Return the schemas of the objects that an answer may be.
+
+    There are several if the options choose between several objects.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']

@@ -80,7 +80,10 @@ def add_returns_parser(command_line: LineParser) -> None:
 
 
 def returns(args: argparse.Namespace) -> int:
-    """Judge every return; the exit code is 0 if all are safe, 4 if one is unsafe, and 3 if some are undecided."""
+    """Judge every return; return the exit code.
+
+    The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if some are undecided.
+    """
     from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.returns, args)

@@ -113,7 +113,7 @@ class _Probe:
         )
 
     def motor_table(self) -> MotorTable:
-        """Return thrust, power and torque of the motor over airspeed and throttle, at the altitude of the trim."""
+        """Return a table of thrust, power and torque over airspeed and throttle at the trim's altitude."""
         fdm, aircraft = self._fdm, self._aircraft
         source = "prop" if aircraft.model.settles else "external"
         thrust, torque, density = (
@@ -138,7 +138,10 @@ class _Probe:
         )
 
     def coefficients(self) -> Coefficients:
-        """Return the aerodynamic coefficients, by central differences about zero angle of attack at closed throttle."""
+        """Return the aerodynamic coefficients, by central differences at closed throttle.
+
+        The differences are about zero angle of attack.  The propeller may windmill.
+        """
         at_zero = self._coefficients_at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])

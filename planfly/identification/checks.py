@@ -49,7 +49,10 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
 
 
 def check_commands(records: Sequence[FlightRecord]) -> None:
-    """Raise LogError for a log whose throttle never moves, or whose elevator or aileron hardly moves in turns."""
+    """Raise LogError for a log whose throttle never moves, or whose surfaces hardly move in turns.
+
+    The surfaces are elevator and aileron.
+    """
     for source in dict.fromkeys(record.source for record in records):
         parts = [record for record in records if record.source == source]
         controls = np.concatenate([part.controls for part in parts])
@@ -67,7 +70,7 @@ def check_commands(records: Sequence[FlightRecord]) -> None:
 
 
 def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
-    """Raise LogError if the mean battery power of a log differs too much from that of the identified aircraft.
+    """Raise LogError if a log's mean battery power differs too much from the identified aircraft's.
 
     Without a logged current nothing is checked.
     """
@@ -92,7 +95,9 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
-    """Raise LogError for an implausible estimate: a reversed control, a value at its bound, or a changing mass.
+    """Raise LogError for an estimate with an implausible value.
+
+    Implausible are a reversed control, a lift slope or parameter beyond its limits, and a changing mass.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.

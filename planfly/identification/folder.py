@@ -102,7 +102,10 @@ class Identified:
         return draw_drive_power(self.estimate, len(self.draws))
 
     def aircraft_draws(self) -> Draws:
-        """Return the draws as properties of the model, with the factor on battery power if no current was logged."""
+        """Return the draws as values of the model's properties.
+
+        If no current was logged, the factor on battery power is one of them.
+        """
         properties = tuple(parameter.property_name for parameter in PARAMETERS)
         if self.estimate.with_current:
             return Draws(properties, self.draws)
@@ -125,7 +128,9 @@ def make_identification(
     outputs: Mapping[str, ServoOutput],
     until: float | None = None,
 ) -> Identified:
-    """Return an identification with 512 draws from its estimate, and with the cruise speed of the last log.
+    """Return an identification with 512 draws from its estimate.
+
+    The cruise speed is that of the last log.
 
     numbers: model values of the base, scaled to the aircraft.
     outputs: servo output of each control.
@@ -193,7 +198,9 @@ def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return the cruise, minimum and maximum airspeed that a log's parameters state, as true airspeeds at `AMSL`, m/s.
+    """Return cruise, minimum and maximum airspeed by a log's parameters, as true airspeeds at `AMSL`.
+
+    The unit is m/s.
 
     Airspeeds that the log does not state are those of the base.  ArduPlane's parameters are equivalent airspeeds.
     """

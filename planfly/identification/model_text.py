@@ -77,7 +77,7 @@ _REQUIRED_PARTS = (
 
 
 def check_base(base: Aircraft) -> None:
-    """Raise FlightError, with a one-line message, if the base's model lacks a part that `identified_xml` needs."""
+    """Raise FlightError if the base's model lacks a part that `identified_xml` needs."""
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:
@@ -220,7 +220,7 @@ _AIR = "<p> motor/airspeed-mps </p>"
 
 
 def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[ElementTree.Element]) -> str:
-    """Return the text of ``<external_reactions>``, with the properties and the forces of motor and propeller."""
+    """Return the text of ``<external_reactions>``: properties, and forces of motor and propeller."""
     identified_text = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS

@@ -88,7 +88,9 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the segments of a log that an identification can use: wing-borne flight with complete sensor data.
+    """Return the segments of wing-borne flight in a log that an identification can use.
+
+    A segment has no gap in sensors, surface commands, airspeed or wind.
 
     servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
     min_seconds: minimum total duration of the segments, s.
@@ -234,7 +236,10 @@ _SERIES = {
 
 
 def _check_usable(log: MotionLog) -> None:
-    """Raise LogError for a log of another vehicle, without a required series, or with a flap that moves in flight."""
+    """Raise LogError for a log that no identification can use.
+
+    These are logs of other vehicles, without a required series, and with a flap that moves in flight.
+    """
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
     series_names = _SERIES[log.program_kind]
@@ -361,7 +366,10 @@ def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return the minimum, trim and maximum pulse of an output, us, and its sign: -1 if the output is reversed."""
+    """Return the minimum, trim and maximum pulse (us) and the sign of an output.
+
+    The sign is -1 if the output is reversed, otherwise 1.
+    """
     value = log.parameters.get
     min_pulse, max_pulse = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
@@ -451,7 +459,9 @@ def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floa
 
 
 def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags:
-    """Return `usable` with the rows of a blocked airspeed sensor set to False; raise LogError if too many are blocked.
+    """Return `usable` with the rows of a blocked airspeed sensor set to False.
+
+    Raises LogError if too many usable rows are blocked.
 
     is_blocked: True where the airspeed sensor is blocked, (n,).
     """
@@ -464,7 +474,10 @@ def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags
 
 
 def _find_segments(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
-    """Return (first row, end row) of each run of True rows that lasts at least `min_duration` (s); end is excluded."""
+    """Return (first row, end row) of each run of True rows that lasts at least `min_duration`, s.
+
+    The end row is the first row after the run.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(begin, end) for begin, end in runs if end - begin >= min_duration * GRID_HZ]

@@ -26,7 +26,9 @@ class ServoOutput:
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """Return the control (n,) at each of the pulses (n,), us; constant beyond the shortest and longest pulse.
+        """Return the control (n,) at each of the pulses (n,), us.
+
+        Beyond the shortest and the longest pulse the control is constant.
 
         >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
         array([0.  , 0.25])
@@ -40,7 +42,9 @@ class ServoOutput:
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """Read a file of servo outputs, and return the output of each control (elevator, aileron, rudder, throttle).
+    """Read a file of servo outputs; return the output of each control, by name.
+
+    The controls are elevator, aileron, rudder and throttle.
 
     Raises FlightError for an invalid file.
 

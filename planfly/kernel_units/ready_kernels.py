@@ -139,7 +139,9 @@ UNITS: dict[str, Callable[[], None]] = {
 
 
 def run_unit(unit: str, report: Callable[[str], None]) -> None:
-    """Run a unit, which compiles its kernels; report ``ready KERNEL`` for each kernel that has been compiled.
+    """Run a unit, which compiles its kernels.
+
+    Calls `report` with ``ready KERNEL`` for each kernel that has been compiled.
 
     Raises KeyError for an unknown unit.
     """

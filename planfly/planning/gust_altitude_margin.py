@@ -79,7 +79,9 @@ class Shortfall(NamedTuple):
 
 
 def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
-    """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust: the given plan or another one.
+    """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust.
+
+    This is the given plan, or another plan that `search` finds.
 
     If no such plan is found, the given plan is returned as not safe, with the reason in its certificate.
 
@@ -119,7 +121,7 @@ def _gusts_displace_aircraft(plan: Plan, airframe: Airframe) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the kinds of gusts to consider, each with the function that computes its altitude displacement, m.
+    """Return the kinds of gusts to consider, each with the function for its altitude displacement, m.
 
     The function's arguments are the climb or sink rate that the aircraft holds in reserve (m/s) and the turbulence.
     Updrafts are considered only if the scenario has zones or a maximum height.
@@ -199,7 +201,9 @@ def _with_margin_at_threats(limits: Limits) -> Limits:
 
 
 def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
-    """Return True if a plan raised by `height_change` (m) exceeds the ceiling or the maximum height; False for 0 m.
+    """Return True if a plan raised by `height_change` (m) exceeds the ceiling or the maximum height.
+
+    The result is False for 0 m.
 
     The ends of the plan are not raised, unless it has no other waypoints.
     """
@@ -272,7 +276,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find, for each kind of gust and hazard, the place where the gust displaces the aircraft deepest into the hazard.
+    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
@@ -306,7 +310,9 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
 
 
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
-    """Cut the legs near the ends of a path into short parts, because the needed margin grows with the distance there.
+    """Cut the legs near the ends of a path into short parts.
+
+    The needed margin grows with the distance from the end there.
 
     Legs are not cut within turns.
 
@@ -420,7 +426,10 @@ def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone, or None."""
+    """Return the deepest displacement by a gust into or out of a zone, or None.
+
+    A gust may displace the aircraft into an exclusion zone or out of an inclusion zone.
+    """
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
@@ -436,7 +445,10 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return paths (p, 3) displaced by gusts, in steps of at most `_HEIGHT_STEP_M` up to the full displacement."""
+    """Return paths (p, 3) displaced by gusts in steps, up to the full displacement.
+
+    A step is at most `_HEIGHT_STEP_M` high, so that no hazard is missed.
+    """
     margins = np.maximum(parts.margin_before, parts.margin_after)
     step_count = max(1, math.ceil(float(margins.max()) / _HEIGHT_STEP_M))
     displacement = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * margins[:, None]

@@ -66,11 +66,11 @@ def limit_waypoint_orbits(
         has_usual_count = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return (
             plan
-            if has_usual_count or _keeps_few_orbits_and_corridor(plan, airframe)
+            if has_usual_count or _is_safe_in_gusts(plan, airframe)
             else _with_problem(plan, _corridor_problem_text(plan, airframe))
         )
     shorter_plan = plan if keeps_waypoints else drop_waypoints(plan, limits if search_limits is None else search_limits)
-    if _keeps_few_orbits_and_corridor(shorter_plan, airframe):
+    if _is_safe_in_gusts(shorter_plan, airframe):
         return shorter_plan
     remaining_orbits, count = expected_orbits(shorter_plan, autopilot, limits), len(shorter_plan.waypoints) - 2
     if search is not None:
@@ -78,7 +78,7 @@ def limit_waypoint_orbits(
         allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / remaining_orbits)), plan.scenario
         planner_table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})
         other_plan = replace(search(replace(scenario, planner=planner_table)), scenario=scenario)
-        if other_plan.safe and _keeps_few_orbits_and_corridor(other_plan, airframe):
+        if other_plan.safe and _is_safe_in_gusts(other_plan, airframe):
             return other_plan
     return _with_problem(plan, _orbit_problem_text(plan, autopilot, limits))
 
@@ -89,8 +89,11 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
 
-def _keeps_few_orbits_and_corridor(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if at most `MAX_EXPECTED_ORBITS` are expected, and each corner is flown within the corridor."""
+def _is_safe_in_gusts(plan: Plan, airframe: Airframe) -> bool:
+    """Return True if a plan has few enough expected orbits, and its corners stay in the corridor.
+
+    At most `MAX_EXPECTED_ORBITS` are accepted.
+    """
     if expected_orbits(plan, airframe.autopilot, airframe.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_corner_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
@@ -165,7 +168,10 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
 
 
 def _orbit_problem_text(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Return the problem text on the expected orbits of a plan, with a parameter value that would remedy them."""
+    """Return the problem text on the expected orbits of a plan, with a remedy.
+
+    The remedy is a parameter value, or less turbulence.
+    """
     count, name = len(plan.waypoints) - 2, autopilot.deviations.altitude_parameter
     orbits = expected_orbits(plan, autopilot, limits)
     radius = first_that_passes(

@@ -69,7 +69,10 @@ class SeededPlan:
 
     @property
     def safe(self) -> bool:
-        """True if safe by the paper's definition, without violation or kill exposure on its six points per leg."""
+        """True if the plan is safe by the paper's definition.
+
+        It has no violation and no kill exposure on its six points per leg.
+        """
         return not any(self.violations) and self.objectives.kill_exposure == 0.0
 
 
@@ -107,7 +110,9 @@ def problem_name(threats: int) -> str:
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return the probability of a kill or detection on a path, as if its six points per leg were independent.
+    """Return the probability of a kill or detection on a path.
+
+    The points of the path, six per leg, are treated as independent.
 
     The probability at a point is min(1, (scale / d)^4) for a threat at distance d within its radius.  The paper's sums
     (eq. 9, 10) over the same points have no upper bound.
@@ -308,7 +313,10 @@ def _number_text(value: float | None, digits: int) -> str:
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """Write the tables of a run: table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv."""
+    """Write the tables of a run.
+
+    They are table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv.
+    """
     columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
     write_atomically(
         folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows))

@@ -20,7 +20,9 @@ class Certificate(NamedTuple):
 
 
 def temporary_certificate() -> Certificate:
-    """Return a new self-signed certificate for ``localhost`` with a new private key (elliptic curve P-256).
+    """Return a new self-signed certificate for ``localhost``, with a new private key.
+
+    The key is on the elliptic curve P-256.
 
     >>> one, other = temporary_certificate(), temporary_certificate()
     >>> one.certificate.splitlines()[0], one.key == other.key

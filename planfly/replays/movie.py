@@ -85,7 +85,9 @@ def _write_frame_files(folder: Path, film: MovieFrames) -> list[Path]:
 
 
 def _make_palette(frame: Image.Image) -> Image.Image:
-    """Return an image whose palette serves all frames: the exact drawing colours, and main colours of `frame`.
+    """Return an image whose palette serves all frames.
+
+    It has the exact drawing colours, and the main colours of `frame`.
 
     If colors were chosen only by area, thin lines and small marks would get the colors of the ground.
     """
@@ -101,7 +103,10 @@ def _make_palette(frame: Image.Image) -> Image.Image:
 
 
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
-    """Return a frame with its colours replaced by the nearest colours of a palette, without transparent pixels."""
+    """Return a frame with its colours replaced by the nearest colours of a palette.
+
+    The result has no transparent pixels.
+    """
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
     opaque = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))

@@ -101,7 +101,7 @@ class _Player:
             self.step(0.02)
 
     def step(self, pause: float) -> None:
-        """Handle messages from the ground stations, send the messages that are due, and sleep for `pause` seconds."""
+        """Handle messages from the stations, send the messages that are due, and sleep for `pause` seconds."""
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._start_time, time.time()
         self._link.receive()

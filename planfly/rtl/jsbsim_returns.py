@@ -47,7 +47,9 @@ class NearestApproaches(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Simulate a return in JSBSim; return its minimum height above ground and minimum distance from kill spheres, m.
+    """Simulate a return in JSBSim.
+
+    Returns its minimum height above ground and its minimum distance from kill spheres, m.
 
     The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  Returns None for a
     return that cannot be flown.
@@ -69,7 +71,7 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
 def return_setup(
     world: ReturnWorld, start: Record, landing: LandingStart | None = None
 ) -> tuple[FlightSetup, Airframe]:
-    """Make setup and airframe of a flight that leads in to a return and flies it by the simulated ArduPlane.
+    """Make setup and airframe of a return, with a lead-in, flown by the simulated ArduPlane.
 
     The flight is in the mean wind, without turbulence and navigation error.
 
@@ -117,7 +119,10 @@ def find_nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApp
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """Make a mission that flies through the start of a return, on the same course and slope, and then commands RTL."""
+    """Make a mission that flies through the start of a return and then commands RTL.
+
+    It passes the start on the course and slope of the flight there.
+    """
     east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     ground_speed = max(1.0, math.hypot(velocity_east, velocity_north))

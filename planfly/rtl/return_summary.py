@@ -13,7 +13,9 @@ from world.errors import PlanflyError
 
 
 def return_starts(setup: FlightSetup, track: Track | None, interval: float) -> ReturnStarts:
-    """Return the states from which returns start, on the track, or on the planned path if nothing was flown.
+    """Return the states from which returns start, on the track or on the planned path.
+
+    The planned path is used if nothing was flown.
 
     interval: time between two returns, s.
     """

@@ -118,7 +118,10 @@ class ProgramReturns:
         return f"by {self.program} itself: {len(self.flown_pairs)} of the worst returns flown, {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
-        """Return a line for each return: its start, the simulated outcome, the program's outcome, and which applies."""
+        """Return a line for each return.
+
+        It names the start, the simulated outcome, the program's outcome, and which of them applies.
+        """
         texts = []
         for pair in self.pairs:
             east, north, _ = pair.simulated.start
@@ -139,7 +142,7 @@ class ProgramReturns:
         return texts
 
     def with_worse_results(self, returns: Returns) -> Returns:
-        """Return the returns, with each simulated result replaced by the program's result if the program's is worse."""
+        """Return the returns with the program's result wherever it is worse than the simulated result."""
         worse_result_by_id = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
             returns,
@@ -192,12 +195,17 @@ def choose_worst_returns(
 
 
 def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
-    """Return a sort key: the worst outcome first, safe returns last; among these the closest to a limit first."""
+    """Return a sort key that puts the worst outcome first.
+
+    Safe returns come last, the closest to a limit first.
+    """
     return (KINDS.index("safe"), limit_ratio(candidate)) if candidate.safe else badness(candidate)
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
-    """Return True if the straight lead-in to a start stays more than `_MIN_LEAD_IN_HEIGHT_M` above the ground.
+    """Return True if the straight lead-in to a start stays high enough above the ground.
+
+    The minimum is `_MIN_LEAD_IN_HEIGHT_M`.
 
     row: a row of `ReturnStarts.rows`.
     """
@@ -213,7 +221,9 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
 def fly_by_program(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `points` of the worst returns with the ArduPlane program, in the mean wind, with exact navigation.
+    """Fly at most `points` of the worst returns with the ArduPlane program.
+
+    The wind is the mean wind, and the navigation is exact.
 
     folder: folder for the flight logs of planfly and of the program; None writes no logs.
     Raises FlightError if the program does not start or stops during the flight.
@@ -290,7 +300,10 @@ def _judge_flown_return(
 
 
 def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
-    """Return the position where the judgement of a return ends: loiter centre, or last waypoint before the landing."""
+    """Return the position where the judgement of a return ends.
+
+    This is the loiter centre, or the last waypoint before the landing.
+    """
     if target.landing is None:
         return target.position
     return (target.landing, *target.landing.next_stops)[-1].position
@@ -314,7 +327,9 @@ def _cut_at_nearest_point(point: tuple[float, float, float], position: Floats) -
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target of a flown return: the target at which the path ends, or for which its last course heads.
+    """Identify the target of a flown return.
+
+    This is the target at which the path ends, or for which its last course heads.
 
     All possible targets of a return are tried.  If none fits, the target of the simulated ArduPlane is returned.
 

@@ -18,7 +18,9 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Set rare garbage collection, and limit linear algebra to one thread; call this before NumPy is imported.
+    """Set rare garbage collection, and limit linear algebra to one thread.
+
+    Call this function before NumPy is imported.
 
     Garbage collection during imports took a quarter of the start-up time, and spinning threads a tenth; no matrix in
     planfly is large enough for a second thread.

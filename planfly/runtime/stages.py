@@ -41,7 +41,9 @@ def send_progress_to(receiver: Receiver) -> Iterator[None]:
 
 
 def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
-    """Return the context of a stage of work, which yields a function to report units done, total and a remark.
+    """Return the context of a stage of work.
+
+    It yields a function to report the units done, the total and a remark.
 
     kind: common name of stages with the same pace, if the title is more specific ("planning" for any scenario).
 

@@ -99,7 +99,10 @@ def sibling_autosave_path(file: Path, first: Mission) -> Path:
 
 
 def _restore_settings(context: EditContext, data: Json) -> EditContext:
-    """Return the editing context with the saved settings, or `context` itself if the settings do not differ."""
+    """Return the editing context with the saved settings.
+
+    Returns `context` itself if the settings do not differ.
+    """
     scenario: Scenario = context.scenario
     spec, saved = json.loads(json.dumps(scenario.to_json())), data.get("settings", {})
     saved_parameters = data.get("parameters") or asdict(ChangedParameters())
@@ -132,7 +135,10 @@ def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[M
 
 
 def mission_data(mission: Mission) -> Json:
-    """Convert a mission to plain data, from which `mission_from_data` makes the same mission; NaN becomes None."""
+    """Convert a mission to plain data, from which `mission_from_data` makes the same mission.
+
+    NaN becomes None.
+    """
 
     def item_data(item: MissionItem) -> list[Any]:
         """Return the fields of an item, with None for NaN."""

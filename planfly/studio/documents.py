@@ -135,7 +135,10 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
 
 
 def _check_log_names_no_files(name: str, file: Path) -> None:
-    """Raise PlanflyError if the scenario in a log, or the scenario of its plan, names files of this machine."""
+    """Raise PlanflyError if a log names files of this machine.
+
+    Such a name may be in its scenario or in the scenario of its plan.
+    """
     container = Container()
     with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
         stream.seek(len(MAGIC))
@@ -148,7 +151,10 @@ def _check_log_names_no_files(name: str, file: Path) -> None:
 
 
 def _check_plan_names_no_files(name: str, data: bytes) -> None:
-    """Raise PlanflyError if the scenario of a plan names files of this machine, because a page must not read these."""
+    """Raise PlanflyError if the scenario of a plan names files of this machine.
+
+    A page must not read these files.
+    """
     try:
         scenario = json.loads(data)["scenario"]
         named_files = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
@@ -272,7 +278,7 @@ def _to_bytes(text: str | bytes) -> bytes:
 
 
 def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """Return a line for each content of a mission or its scenario that a ground station's file cannot store.
+    """Return a line for each content that a ground station's file cannot store.
 
     text: the mission as text of this file.
     """
@@ -298,7 +304,10 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
 
 
 def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str, ...]:
-    """Return lines on settings and parameters changed in the studio, which a ground station's file cannot store."""
+    """Return lines on settings and parameters that a ground station's file cannot store.
+
+    They are those changed in the studio.
+    """
     scenario = context.scenario
     differences = {
         "wind": opened_scenario.spec.wind != scenario.spec.wind,
@@ -346,7 +355,10 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
 
 
 def _check_plain_waypoints(mission: Mission) -> None:
-    """Raise MissionError for the first item that a plan cannot store: take-off, landing or a speed change en route."""
+    """Raise MissionError for the first item that a plan cannot store.
+
+    These are a take-off, a landing, and a change of speed along the path.
+    """
     first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
     for index, item in enumerate(mission.items):
         lost_content = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
@@ -361,7 +373,7 @@ def _check_plain_waypoints(mission: Mission) -> None:
 
 
 def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> Plan:
-    """Make a plan from the waypoints of an edited route, scored and certified like the plans of the planner.
+    """Make a plan from the waypoints of an edited route, certified like the planner's plans.
 
     Raises MissionError for a mission without a scenario, and for items that a plan cannot store.
     """

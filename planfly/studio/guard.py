@@ -34,7 +34,9 @@ HEADERS = (
 
 
 def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
-    """Return the HTTP status and the text with which a request is refused, or (0, "") if the request is accepted.
+    """Return the HTTP status and text with which a request is refused.
+
+    Returns (0, "") if the request is accepted.
 
     >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
     >>> request_refusal(asked, 80)
@@ -61,7 +63,10 @@ def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
 
 
 def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Return True if a browser opens the page itself; this is allowed, because the page has no data without a token."""
+    """Return True if a browser opens the page itself.
+
+    This is allowed from any site, because the page has no data without a token.
+    """
     header_values = dict(headers)
     is_document = (
         header_values.get(b"sec-fetch-mode") == "navigate" and header_values.get(b"sec-fetch-dest") == "document"

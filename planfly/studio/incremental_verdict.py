@@ -164,7 +164,10 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _is_in_window(finding: Finding, first: int, last: int) -> bool:
-    """Return True for a finding on a leg or corner between two waypoints, and for any violated threat or zone."""
+    """Return True if a finding is on a leg or corner between two waypoints.
+
+    The result is also True for any violated threat or zone.
+    """
     place = finding.place
     if finding.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
         return True

@@ -96,7 +96,7 @@ class Jobs:
             worker.close()
 
     def choices(self) -> Json:
-        """Return the page data that lists aircraft, autopilots, turbulence levels and algorithms to choose from."""
+        """Return the page data of aircraft, autopilots, turbulence levels and algorithms to choose from."""
         return {
             "aircraft": aircraft_names(),
             "autopilots": list(CHOICES["autopilot"]),
@@ -113,7 +113,10 @@ class Jobs:
         return [task.message for task in self._active.values()]
 
     def is_planning_first_path(self, session: Session) -> bool:
-        """Return True while a path is planned for an opened scenario, whose mission is a placeholder until then."""
+        """Return True while a path is planned for an opened scenario.
+
+        Until then the mission of the scenario is a placeholder.
+        """
         return self._uses_first_path and not session.is_changed
 
     def discard_results(self) -> None:
@@ -309,7 +312,10 @@ def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
 
 
 def _path_json(front_plan: FrontPlan) -> Json:
-    """Return page data of a planned path: length (m), radar exposure (s), minimum height (m), time (s), energy (Wh)."""
+    """Return page data of a planned path.
+
+    They include length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh).
+    """
     plan, (length, exposure, clearance, seconds, energy) = (
         front_plan.plan,
         round_to_json(

@@ -121,7 +121,9 @@ class Apply(_Message):
 
 
 class Settings(_Message):
-    """Change of settings; fields that are not given stay unchanged. Values are checked like the values of a scenario.
+    """Change of settings; fields that are not given stay unchanged.
+
+    Values are checked like the values of a scenario.
 
     limits: entries of [limits]; null removes an entry.  ceiling: m AMSL.
     parameter: one autopilot parameter, as NAME=VALUE.  without: names of the parameters to reset.

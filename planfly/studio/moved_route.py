@@ -89,7 +89,10 @@ def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
 
 
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
-    """Return True if each position item is one stop of the route, with an altitude independent of other items."""
+    """Return True if each position item is one stop of the route.
+
+    The altitude of each stop must also be independent of other items.
+    """
     if route.rtl_start >= 0 or route.direct_landing_start >= 0 or math.isfinite(route.landing_ground):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:

@@ -118,7 +118,10 @@ def _open_listener(port: int | None) -> socket.socket:
 
 @contextlib.contextmanager
 def _open_page(address: str) -> Iterator[None]:
-    """Open an address in the browser through a temporary file, so that no list of processes shows the token."""
+    """Open an address in the browser through a temporary file.
+
+    Otherwise the list of processes would show the token.
+    """
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"
         file.touch(0o600)

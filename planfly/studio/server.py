@@ -94,7 +94,10 @@ class Page:
 
 
 class Server:
-    """Server of the studio: it connects pages, session and worker processes, and leaves the sockets to uvicorn."""
+    """Server of the studio, which connects pages, session and worker processes.
+
+    The sockets are left to uvicorn.
+    """
 
     def __init__(self, session: Session, token: str, autosave_file: Path | None, folder: Path | None) -> None:
         """Prepare the server.
@@ -197,7 +200,10 @@ class Server:
             await asyncio.sleep(MESSAGE_PAUSE_S)
 
     async def _wait_for_free_slot(self) -> None:
-        """Wait until fewer than `MAX_PAGES` pages are connected; it polls, because pages may go without notice."""
+        """Wait until fewer than `MAX_PAGES` pages are connected.
+
+        The server polls, because pages may disconnect without notice.
+        """
         while len(self._pages) >= MAX_PAGES:
             await asyncio.sleep(_SLOT_CHECK_INTERVAL_S)
 
@@ -226,7 +232,10 @@ class Server:
         return None
 
     async def _write_frames(self, page: Page) -> None:
-        """Send the queued frames of a page, until cancelled; errors of a page that has disconnected are ignored."""
+        """Send the queued frames of a page, until cancelled.
+
+        Errors of a page that has disconnected are ignored.
+        """
         while True:
             frame = await page.frames.get()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
@@ -423,7 +432,10 @@ class Server:
                 self._loop.call_soon_threadsafe(self._handle_answer, worker, answer)
 
     def _handle_answer(self, worker: str, answer: Answer) -> None:
-        """Send the messages that a worker's answer causes to the pages; use a first planned path as the mission."""
+        """Send the messages that a worker's answer causes to the pages.
+
+        If it is the first planned path, the path becomes the mission.
+        """
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)
         if self.jobs.has_new_initial_plan(self.session):
@@ -431,7 +443,10 @@ class Server:
             self._initial_plan_task = asyncio.ensure_future(self._apply_initial_plan(choice))
 
     async def _apply_initial_plan(self, message: messages.Choose) -> None:
-        """Use the path that was planned at the start of the studio, unless the mission was edited in the meantime."""
+        """Use the path that was planned at the start of the studio.
+
+        If the mission was edited in the meantime, this is reported instead.
+        """
         try:
             await self._change_session(message)
         except StaleEdit:

@@ -228,7 +228,9 @@ class Session:
         self._add_to_history(mission, "plan a part")
 
     def _set_mission(self, mission: Mission, context: EditContext | None = None) -> None:
-        """Judge a mission, make it the current mission, and discard planned paths; change nothing if it is invalid.
+        """Judge a mission, make it the current mission, and discard planned paths.
+
+        An invalid mission changes nothing.
 
         context: the editing context to judge the mission with; None for the current context.
         """
@@ -363,7 +365,7 @@ class Session:
         return replace(flown_mission, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
 
     def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
-        """Return the mission with the items between two items replaced by the inner waypoints of a planned path.
+        """Return the mission with a planned path in place of the items between two items.
 
         first, last: indices of the two items.
         """

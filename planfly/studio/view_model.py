@@ -113,7 +113,10 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Return page data of the scenario's zones, then of the mission's fence zones, in the order that findings use."""
+    """Return page data of the scenario's zones and then of the mission's fence zones.
+
+    Findings number the zones in this order.
+    """
     zones = judged_airspace(setup).zones if mission.fences else scenario.zones
     return [
         {
@@ -130,7 +133,10 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 
 
 def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
-    """Return page data of a mission and its geometric verdict: items, route, path, states, findings and profile."""
+    """Return page data of a mission and its geometric verdict.
+
+    They include items, route, path, states, findings and profile.
+    """
     verdict, setup = judged_mission.verdict, judged_mission.setup
     states = place_states(judged_mission.requirements, verdict.findings)
     path = judged_mission.requirements.path
@@ -239,7 +245,10 @@ def verdict_json(verdict: Verdict) -> Json:
 
 
 def findings_json(verdict: Verdict) -> list[Json]:
-    """Return page data of the failed and undecided findings, then of the finding closest to its limit for each rule."""
+    """Return page data of the findings to list.
+
+    These are the failed and undecided findings, then the finding closest to its limit for each rule.
+    """
     return [_finding_json(number, finding) for number, finding in verdict.present().worth_listing(_MAX_LISTED_FINDINGS)]
 
 
@@ -264,7 +273,10 @@ def _finding_json(number: int, finding: Finding) -> Json:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return page data of the profile along the route: terrain, waypoints, and sections of threats and zones."""
+    """Return page data of the profile along the route.
+
+    They include terrain, waypoints, and sections of threats and zones.
+    """
     route = setup.route.waypoints
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))

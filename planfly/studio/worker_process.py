@@ -65,7 +65,9 @@ class Cancelled(Exception):
 
 
 class WorkerProcess:
-    """Interface of the server to a worker process. Its methods may be called from any thread, and never block.
+    """Interface of the server to a worker process.
+
+    Its methods may be called from any thread, and never block.
 
     A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
     """
@@ -289,7 +291,10 @@ class WorkerProcess:
 
 
 def run_worker(pipe: Connection) -> None:
-    """Run the newest task from the pipe, again and again until the pipe closes: the main loop of a worker process."""
+    """Run the newest task from the pipe until the pipe closes.
+
+    This is the main loop of a worker process.
+    """
     import signal
 
     # An interrupt at the terminal is handled by the server.

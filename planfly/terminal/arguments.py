@@ -50,7 +50,9 @@ def parse_wind(text: str) -> tuple[float, float]:
 
 
 def parse_camera(text: str) -> tuple[float, ...]:
-    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: sensor size and focal length (mm), and photo overlaps (percent).
+    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE.
+
+    They are the sensor size and the focal length (mm), and the photo overlaps (percent).
 
     >>> parse_camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
@@ -99,7 +101,10 @@ def parse_autopilots(text: str) -> list[str]:
 
 
 def parse_time_or_stations(text: str) -> float | str:
-    """Parse a time of the flight, s, or return a text with a colon unchanged: the addresses of ground stations."""
+    """Parse a time of the flight (s), or return the addresses of ground stations unchanged.
+
+    A text with a colon is taken for addresses.
+    """
     if ":" in text:
         return text
     return number_parser("end")(text)

@@ -12,7 +12,9 @@ _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return a table with a row for each rule and a column for each autopilot, then the main lines of each verdict.
+    """Return a table of verdicts, and then the main lines of each verdict.
+
+    The table has a row for each rule and a column for each autopilot.
 
     verdicts: verdict for each autopilot, keyed by name, in the order of the columns.
 

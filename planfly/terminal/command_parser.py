@@ -110,7 +110,10 @@ class CommandParser(argparse.ArgumentParser):
         return self.add_argument_group(title, description)
 
     def alias_keyword(self, keyword: str, option: str) -> None:
-        """Name an option in error messages in place of an API keyword that has another name than the option's dest."""
+        """Name the option that error messages show in place of an API keyword.
+
+        This is needed for a keyword that differs from the option's dest.
+        """
         self._aliases[keyword] = option
 
     def take_late_arguments(self, parsed: argparse.Namespace, unknown_arguments: list[str]) -> bool:

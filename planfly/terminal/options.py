@@ -271,7 +271,10 @@ def add_log_rate_option(group: OptionGroup) -> None:
 
 
 def add_imported_log_options(parser: CommandParser) -> None:
-    """Add the options that state what another program's log may lack: its mission, flight number and altitude datum."""
+    """Add the options for information that another program's log may lack.
+
+    They state its mission, flight number and altitude datum.
+    """
     group = parser.add_group("an autopilot's log")
     option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
     with_completer(option, file_completer(*MISSION_SUFFIXES))
@@ -321,7 +324,10 @@ def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def watch_stop_signals() -> Iterator[Callable[[], bool]]:
-    """Catch SIGINT and SIGTERM while the block runs; yield a function that returns True after either signal."""
+    """Catch SIGINT and SIGTERM while the block runs.
+
+    Yields a function that returns True after either signal.
+    """
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:

@@ -93,7 +93,10 @@ class _TolerantStream(_SafeStream):
                 raise _with_stream_name(error) from error
 
     def _drop_output(self) -> None:
-        """Discard all further text, and redirect the descriptor to the null device for the text still buffered."""
+        """Discard all further text.
+
+        The descriptor is redirected to the null device for the text that is still buffered.
+        """
         self._is_reader_gone = True
         # When the interpreter ends, it flushes the buffered text, which then goes to the null device.
         with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as null_file:
@@ -146,7 +149,7 @@ def plain_stream(stream: TextIO) -> TextIO:
 
 @contextlib.contextmanager
 def safe_streams() -> Iterator[None]:
-    """Escape control characters in standard output and error, and tolerate a closed pipe on standard output."""
+    """Escape control characters in standard output and error, and tolerate a closed pipe."""
     tolerant = _TolerantStream(sys.stdout)
     with contextlib.redirect_stdout(tolerant), contextlib.redirect_stderr(_SafeStream(sys.stderr)):
         try:
@@ -273,7 +276,10 @@ class _TimeLeft:
         return time.monotonic() - self._start_time
 
     def store_duration(self) -> None:
-        """Store the duration for the next run, unless the stage contained another stage, such as a compilation."""
+        """Store the duration of the stage for the next run.
+
+        A stage that contained another stage, such as a compilation, is not stored.
+        """
         if next(_stage_numbers) == self._number + 1:
             units = 0.0 if self._first_report is None else self._done - self._first_report[1]
             _store_duration(
@@ -494,7 +500,9 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 @contextlib.contextmanager
 def redirect_output(args: argparse.Namespace) -> Iterator[None]:
-    """Discard printed lines with --quiet, or send them to standard error if the JSON answer goes to standard output.
+    """Discard printed lines with --quiet, or keep them out of a JSON answer on standard output.
+
+    With ``--json -`` the lines are printed on standard error.
 
     Progress is not shown with --quiet.  Raises PlanflyError if the file for the JSON answer or the JUnit report is an
     input of the command, or if it exists and is not to be overwritten.

@@ -124,7 +124,10 @@ def fewer_plans_line(front: "Front") -> str:
 
 
 def front_lines(front: "Front", folder: Path) -> list[str]:
-    """Return the lines that the terminal shows for a front: conditions, a table of the plans, and the written files."""
+    """Return the lines that the terminal shows for a front.
+
+    They are the conditions, a table of the plans, and the written files.
+    """
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan

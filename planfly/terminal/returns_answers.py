@@ -210,7 +210,10 @@ class ReturnsAnswer:
 
 
 def suggestion_entry(result: ReturnsResult, trial: RemedyTrial) -> ReturnSuggestion:
-    """Return the JSON entry of a suggested remedy, with the numbers of safe and unsafe returns that it gives."""
+    """Return the JSON entry of a suggested remedy.
+
+    It has the numbers of safe and unsafe returns with this remedy.
+    """
     rally = None
     if trial.remedy.rally is not None:
         rally = []
@@ -269,7 +272,10 @@ def _round_to_tenths(value: float) -> float | None:
 
 
 def glides_entry(result: ReturnsResult) -> GlidesEntry:
-    """Return the JSON entry of all glides: the places that each second of the flight can reach without engine."""
+    """Return the JSON entry of all glides after an engine failure.
+
+    It names the place that can be reached from each second of the flight.
+    """
     glides = result.glides
     entries = []
     for glide_range in glides.ranges:
@@ -313,7 +319,10 @@ def glides_entry(result: ReturnsResult) -> GlidesEntry:
 
 
 def return_range_entry(result: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
-    """Return the JSON entry of consecutive returns with the same outcome, with the numbers of the worst return."""
+    """Return the JSON entry of consecutive returns with the same outcome.
+
+    Its numbers are those of the worst return.
+    """
     worst_return, scenario, round_to_tenths = return_range.worst, result.setup.scenario, _round_to_tenths
     return ReturnEntry(
         first_s=round(return_range.first, 2),

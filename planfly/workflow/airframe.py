@@ -79,7 +79,7 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 
 
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
-    """Load the scenario's aircraft, its envelope and autopilot, and the limits that scenario and aircraft set.
+    """Load the aircraft of a scenario, its autopilot, and the limits that scenario and aircraft set.
 
     parameters: autopilot parameters that replace the file's parameters, by name and in the units of the autopilot.
     Raises ScenarioError for an unknown aircraft or autopilot, or an airspeed outside the range of the aircraft, and
@@ -167,7 +167,10 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
 
 def with_tightened_limits(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """Return the airframe with the limits of a tightened scenario; envelope, airspeed and tracking error stay."""
+    """Return the airframe with the limits of a tightened scenario.
+
+    Envelope, airspeed and tracking error stay.
+    """
     old_limits = airframe.limits
     limits = make_limits(
         scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot)

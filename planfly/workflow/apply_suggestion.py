@@ -92,7 +92,9 @@ def apply_suggestion(
 
 
 def item_moves(context: MissionContext, before: Mission, after: Mission) -> tuple[ItemMove, ...]:
-    """Return the moves of the items between two missions; () if items were inserted, as for a change of airspeed.
+    """Return the moves of the items between two missions.
+
+    The result is empty if items were inserted, as for a change of airspeed.
 
     A change of altitude is 0 if the altitude is unknown.
     """
@@ -284,7 +286,10 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Move waypoints that lie outside the area, or too close to its edges, floor or ceiling, into the area."""
+    """Move waypoints that are outside the area, or too close to its borders, into the area.
+
+    Borders are the edges, the floor and the ceiling.
+    """
     scenario, points = edited.context.scenario, edited.waypoint_positions()
     (west, east), (south, north) = scenario.bounds.tolist()
     min_position = np.array([west, south, scenario.floor]) + change.wanted
@@ -296,7 +301,7 @@ def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding)
 
 
 def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Move the waypoints near the sphere of a missile so that the nearest point of their legs moves away from it."""
+    """Move the waypoints near a missile so that the nearest point of their legs moves away from it."""
     missile = edited.context.scenario.threats.position[change.place.index or 0, :2]
     legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
     if not legs:

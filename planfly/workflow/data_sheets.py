@@ -70,7 +70,7 @@ _MIN_AIRSPEED_STALL_RATIO = 1.2
 
 
 def stated_parameters(file: Path) -> dict[str, float]:
-    """Read a parameter file; return the parameters that describe the aircraft and differ from their defaults.
+    """Return the parameters of a file that describe the aircraft and differ from their defaults.
 
     The keys are current names of ArduPlane's parameters.
 
@@ -288,11 +288,13 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         max_speed_sd=top_speed_sd,
         climb_guessed="climb" in sized.guessed,
     )
-    return uncertainty, _draw_with_climb(uncertainty, balance, climb_sd / thrust_slopes[0])
+    return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
 
 
-def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
-    """Draw the factors of `DRAW_COUNT` aircraft; their thrust compensates the effect of other factors on the climb.
+def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
+    """Draw the factors of `DRAW_COUNT` aircraft.
+
+    The factor on thrust compensates the effect of the other factors on the climb.
 
     balance: change of the logarithm of the thrust per logarithm of each other factor.
     thrust_sd: standard deviation of the logarithm of the thrust that varies the climb.
@@ -310,7 +312,7 @@ def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thr
 
 
 def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
-    """Return the standard deviation of the logarithm of the power at cruise, as calibrated on real aircraft.
+    """Return the standard deviation of the log of the cruise power, calibrated on real aircraft.
 
     power: estimated power at cruise, W.
     min_drag_sd: standard deviation of the logarithm of the minimum drag.
@@ -323,7 +325,7 @@ def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float)
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Return (4,): climb angle (rad), descent angle (rad), top speed (m/s) and log of the cruise power (W).
+    """Return (4,): climb angle (rad), descent angle (rad), top speed (m/s), log of cruise power (W).
 
     The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
     in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.
@@ -346,7 +348,7 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
 
 
 def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> Floats:
-    """Return the change (4,) of `_performance_vector` if a factor of the model grows by one standard deviation.
+    """Return the change (4,) of `_performance_vector` for one standard deviation of a factor.
 
     estimated: values for the estimated aircraft, (4,).
     sd: standard deviation of the factor's logarithm.
@@ -389,7 +391,10 @@ _MAX_PITCH_DEG = 25.0
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Trim points of the model at altitude `AMSL`: at cruise speed, and in its slowest and fastest level flight."""
+    """Trim points of the model at altitude `AMSL`.
+
+    They are at cruise speed, and in the slowest and fastest level flight.
+    """
 
     level: Trim
     climb: Trim
@@ -471,7 +476,7 @@ def _make_files(
         f"{name}.xml": model,
         f"{name}.toml": metadata,
         "gains.toml": gains_text(gains_from_model(aircraft, fdm)),
-        "ardupilot.parm": arduplane_parameters(aircraft, performance, fdm, file_parameters),
+        "ardupilot.parm": arduplane_parameters_text(aircraft, performance, fdm, file_parameters),
         "ardupilot.toml": servo_text(aircraft, performance),
         "uncertainty.toml": uncertainty_text(uncertainty),
         DRAWS_FILE: draws_text(draws),
@@ -560,7 +565,7 @@ motor_lag_s = {numbers.lag[1]:.6g}
 # Write ArduPlane parameters and servos.
 
 
-def arduplane_parameters(
+def arduplane_parameters_text(
     aircraft: Aircraft, performance: Performance, fdm: Fdm, file_parameters: Mapping[str, float]
 ) -> str:
     """Return the text of ``ardupilot.parm``: ArduPlane parameters computed from the model's trim points.
@@ -667,7 +672,10 @@ _README_ROWS = (
 
 
 def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Performance) -> list[str]:
-    """Return a line of ``README.md`` on the file's TRIM_THROTTLE if the model's throttle in level flight differs."""
+    """Return a line of ``README.md`` if the file's TRIM_THROTTLE differs from the model's throttle.
+
+    The throttle is that of level flight.
+    """
     throttle, stated = 100.0 * performance.level.throttle, file_parameters.get("TRIM_THROTTLE")
     if stated is None or round(throttle) == round(stated):
         return []

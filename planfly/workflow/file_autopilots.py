@@ -70,7 +70,10 @@ def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Sce
 
 
 def _set_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with an autopilot and the file that names it, even if it is the default autopilot."""
+    """Return the scenario with an autopilot, and the file that names the autopilot.
+
+    The autopilot is set even if it is the default autopilot.
+    """
     params = scenario.flight.params
     new_scenario = with_flight(scenario, autopilot=autopilot, params=params)
     table = new_scenario.flight.model_copy(update={"autopilot_from": file})

@@ -155,7 +155,9 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
 
 
 def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the planned mission, a description of its source, and its plan's scenario (None without plan.json).
+    """Return the planned mission, a description of its source, and the scenario of its plan.
+
+    The scenario is None without a plan.json.
 
     Raises LogError if neither the options nor the log contain the mission.
     """
@@ -241,7 +243,7 @@ def _flight_setup(
 
 
 def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
-    """Return the limits on path and speed at the cruise airspeed that the autopilot or else the scenario states.
+    """Return the limits on path and speed at the cruise airspeed of the autopilot or the scenario.
 
     If neither states an airspeed, the median airspeed of the log is used.  If the log does not state the autopilot's
     bank limit, the lower limit of scenario and autopilot applies.
@@ -385,7 +387,9 @@ def fly_again(
 
 @dataclass(frozen=True, slots=True)
 class DrawnFlight:
-    """Sampled deviations of one simulated flight from the nominal aircraft, the log's wind and the logged positions.
+    """Sampled deviations of one simulated flight.
+
+    They are deviations from the nominal aircraft, the log's wind and the logged positions.
 
     variation: deviation of the aircraft from its model.
     wind: velocity added to the log's mean wind, towards north and east, m/s.
@@ -429,7 +433,9 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Return a setup whose mission begins in flight, where the first segment reached the take-off's altitude.
+    """Return a setup whose mission begins in flight, at the take-off's altitude.
+
+    It begins where the first segment of the flight reached this altitude.
 
     The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  A mission without
     a take-off, and a segment that never reached this altitude, are returned unchanged.
@@ -469,7 +475,7 @@ def _refly_followed_legs(
     advance: Advance | None,
     draw: DrawnFlight | None = None,
 ) -> Reflight:
-    """Simulate the followed legs with the model of an aircraft, and compare this flight with the logged flight.
+    """Simulate followed legs with the model of an aircraft, and compare the flight with the log.
 
     aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.
     draw: variations of aircraft, wind and start of one sampled flight, or None.

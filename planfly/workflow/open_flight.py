@@ -68,7 +68,7 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
 
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of the plan's mission in the scenario named by the options."""
+    """Make the setup of a plan in its own scenario, or of its mission in a named scenario."""
     fences, named_world, terrain = (
         read_named_fences(options.get("fence") or ()),
         options.get("scenario"),
@@ -213,7 +213,9 @@ def make_setup(
 
 
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
-    """Return the autopilot with an RTL that uses the mission's landing sequence, if the mission has a sequence.
+    """Return the autopilot with an RTL that uses the mission's landing sequence.
+
+    Without a landing sequence the autopilot is unchanged.
 
     The parameters for this are assumed: values from a parameter file or the scenario stay.
     """
@@ -224,7 +226,9 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
-    """Return a note on each commanded airspeed that the autopilot ignores, or replaces with its nearest limit.
+    """Return a note on each commanded airspeed beyond the autopilot's limits.
+
+    The autopilot ignores this airspeed, or flies the nearest limit.
 
     ArduPlane takes DO_CHANGE_SPEED as an airspeed only if its speed type is 0, and ignores values beyond its limits.
     PX4 takes it as an airspeed whatever the type, and flies the nearest limit.

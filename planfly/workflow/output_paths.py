@@ -97,7 +97,10 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
 
 
 def check_output_folder(folder: Path, overwrite: bool) -> None:
-    """Raise PlanflyError if a folder is or lies in a file, cannot be made, or is not empty without `overwrite`."""
+    """Raise PlanflyError if an output folder cannot or must not be written.
+
+    This is the case if it is or lies in a file, cannot be made, or is not empty without `overwrite`.
+    """
     existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not existing.is_dir():
         where = folder if existing == folder.absolute() else existing
@@ -160,7 +163,7 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
 def file_target(
     target: str | Path, name: str, seed: int, *, suffix: str, overwrite: bool, source: Path | None = None
 ) -> Path:
-    """Return the path of the output file, with its placeholders replaced and checked by `check_output_file`.
+    """Return the path of the output file, with placeholders replaced, after `check_output_file`.
 
     A path with placeholders in a missing folder is not checked; the caller makes the folder.
     suffix: suffix that the file must have, because its format does not depend on its name.

@@ -38,7 +38,9 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Find the first parameter of which another value makes the flight pass, with its nearest such value, or None.
+    """Find the first parameter of which another value makes the flight pass.
+
+    Returns it with its nearest passing value, or None.
 
     findings: findings of the flight that failed.
     passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
@@ -115,7 +117,9 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 def judge_airframe_flight(
     setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
 ) -> AirframeAnswer:
-    """Fly a setup with planfly's guidance and no navigation error, to judge the airframe without its autopilot.
+    """Fly a setup with planfly's guidance and no navigation error, and judge the flight.
+
+    It shows whether the airframe, without its autopilot, can fly the mission.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -210,7 +214,9 @@ def judge_with_reference_flights(
     fly: FlyReference = "failed",
     should_abort: AbortCheck = never_abort,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight, with reference flights that explain the verdict but do not decide it, and tried suggestions.
+    """Judge a flight, with reference flights that explain the verdict, and tried suggestions.
+
+    The reference flights do not decide the verdict.
 
     requirements: the route requirements of the flown setup.
     track, end_reason: the flight, and the reason for its end.

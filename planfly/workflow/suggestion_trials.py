@@ -60,7 +60,10 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
 
 
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a change improves the verdict, and leaves neither the finding nor a passed finding undecided."""
+    """Return True if a change improves the verdict and makes no finding undecided.
+
+    The finding itself must be decided after the change, even if it was undecided before.
+    """
     open_before = {finding_key(item) for item in old_verdict.findings if item.ok is not True}
     undecided_after = set(map(finding_key, undecided_findings(new_verdict.findings)))
     is_decided = all(item.ok for item in new_verdict.findings if finding_key(item) == finding_key(finding))
@@ -69,7 +72,10 @@ def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> b
 
 @dataclass(frozen=True)
 class PassedTrial:
-    """A suggestion of a finding that passed its trial, enlarged if necessary, and the setup that it was tried with."""
+    """A suggestion of a finding that passed its trial, and the setup of this trial.
+
+    The suggestion was enlarged if necessary.
+    """
 
     finding: Finding
     suggestion: Suggestion
@@ -88,7 +94,10 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
 
 
 def judge_mission_geometry(setup: FlightSetup) -> Verdict:
-    """Judge the geometry of a mission without a flight, with only those suggestions that pass a geometric trial."""
+    """Judge the geometry of a mission without a flight.
+
+    The verdict has only those suggestions that pass a geometric trial.
+    """
     requirements = route_requirements(setup)
     verdict = judge_geometry(setup, requirements)
     return with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
@@ -242,7 +251,10 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
-    """Return the steps of a suggestion, each increased by the enlarged step still needed at the same place."""
+    """Return the steps of a suggestion, increased by the enlarged steps still needed.
+
+    Steps are added to the step of the same kind at the same place.
+    """
     further_steps = [replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_steps]
     steps: dict[object, Change] = {}
     for change in (*suggestion, *further_steps):
@@ -253,7 +265,10 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
 
 
 def _merge_lengths(suggestion: Suggestion, needed_lengths: Suggestion) -> Suggestion:
-    """Return the suggested lengths of legs, replaced by the lengths still needed; ``current`` stays as before."""
+    """Return the suggested lengths of legs, replaced by the lengths still needed.
+
+    The present length in ``current`` stays as before.
+    """
     lengths = {change.place: change for change in suggestion}
     for change in needed_lengths:
         current = lengths[change.place].current if change.place in lengths else change.current

@@ -103,7 +103,9 @@ def _limits_table(spec: Spec) -> Spec:
 
 
 def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
-    """Tighten the climb and descent limits in `spec` if slopes failed, to less than the flattest failed slope.
+    """Tighten the climb and descent limits in `spec` if slopes failed.
+
+    The new limit is less than the flattest failed slope.
 
     A limit of the scenario that exceeds the limit of the aircraft is first replaced by "aircraft".
     """
@@ -134,7 +136,10 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 
 
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
-    """Limit turns in `spec` to the limit of the aircraft, or else lower the bank, if turns or corners failed."""
+    """Tighten the turns in `spec` if turns or corners failed.
+
+    They are limited to the limit of the aircraft; if they already are, the bank is lowered.
+    """
     if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
     current = _limits_table(spec).get("max_turn_deg", "aircraft")
@@ -221,7 +226,9 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds, each with limits tightened after the previous round, until a round is flyable.
+    """Plan and fly in rounds with tightened limits, until a round is flyable.
+
+    Each round is tightened by the failures of the round before.
 
     max_rounds: maximum number of rounds after the first.
     fly_round: plans in a scenario and flies; returns the verdict, and True if the plan was flown.
