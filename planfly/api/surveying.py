@@ -42,7 +42,7 @@ from planfly.surveys.survey_text import (
     usable_segments_text,
 )
 from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import flight_text
+from planfly.workflow.crash_safe_log import length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
@@ -207,7 +207,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     """Fly a mission, measure its photo lines, and look for remedies if they are requested."""
     _check_has_survey(setup)
     airframe = airframe_for_setup(setup)
-    with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
+    with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
         flight = fly_and_judge(setup, airframe, None, advance, reference="never")
     result = _measure_survey(flight.requirements, flight.track, flight.verdict)
     if not suggest or result.usable:
