@@ -29,7 +29,7 @@ from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
+from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
     has_required_overlap,
     is_line_usable,
@@ -214,7 +214,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
         return result
     with stage("looking for what would help") as advance:
         step_counter = count(1)
-        trials = survey_remedies(
+        trials = find_survey_remedies(
             flight.setup, airframe, flight.verdict, lambda text: advance(next(step_counter), 0.0, text)
         )
     return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)

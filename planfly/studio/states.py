@@ -116,7 +116,7 @@ def _rule_name(finding: Finding) -> str:
 
 
 def _closeness(finding: Finding) -> float:
-    """Return the margin of a finding as a multiple of the margin below which it is shown as near its limit."""
+    """Return the margin of a finding, relative to the margin below which it is shown as near its limit."""
     scale, margin = RULE_WORDS[finding.rule].scale, finding.margin or 0.0
     if scale is None:
         if finding.limit is None or not finding.limit:
