@@ -272,7 +272,7 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     (8.0, 28.0)
     """
     wind = options.get("wind")
-    speed, from_deg = (None, None) if wind is None else _parse_wind(wind)
+    speed, from_deg = (None, None) if wind is None else _wind_numbers(wind)
     if from_deg is not None and not is_valid_wind(0.0, from_deg):
         raise ArgumentError.of_argument(
             "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
@@ -316,7 +316,7 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     }
 
 
-def _parse_wind(wind: Wind) -> Wind:
+def _wind_numbers(wind: Wind) -> Wind:
     """Return speed (m/s) and direction (degrees) of a wind as numbers.
 
     Raises ArgumentError for other values.

@@ -122,6 +122,7 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
 
 
 def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
+    """Return the answer of the command for --json."""
     from planfly.terminal.verdict_answers import VerdictsDocument
 
     documents = {name: verdict.document() for name, verdict in verdicts.items()}
@@ -129,6 +130,7 @@ def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, 
 
 
 def _verdict_answer(result: "Judged") -> str:
+    """Return the answer of the command for --json."""
     from logs.verdict.verdict import verdict_json
 
     return verdict_json(result.verdict)

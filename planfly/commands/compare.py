@@ -53,6 +53,7 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:

@@ -92,6 +92,7 @@ def _guess_columns(args: argparse.Namespace) -> int:
 
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import ImportAnswer
 
     verdict = flight.verdict.document()
@@ -138,6 +139,7 @@ def refly(args: argparse.Namespace) -> int:
 
 
 def _refly_answer(result: "Reflown", code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import ReflyAnswer
 
     return ReflyAnswer(exit_code=code, lines=list(result.lines), files=[str(file) for file in result.files])

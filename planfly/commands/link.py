@@ -79,6 +79,7 @@ def link(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
+    """Return the answer of the command for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry
 

@@ -43,6 +43,7 @@ class Command(NamedTuple):
         return self._load("add_{}_parser")
 
     def _load(self, name_format: str) -> Any:
+        """Return the function of the command's module whose name is `name_format` with the command's name."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, name_format.format(self.function or self.name))
 

@@ -80,6 +80,7 @@ def show_help(args: argparse.Namespace) -> int:
 
 
 def _report_bad_usage(reason: str) -> int:
+    """Print the reason why the usage is wrong, and return the exit code for bad input."""
     print(f"planfly help: {reason}", file=sys.stderr)
     return BAD_INPUT
 

@@ -156,7 +156,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
         toml = folder / f"{name}.toml"
         toml.write_text(_metadata_text(identified, battery, 0.0), encoding="utf-8")
-        _check_level_flight(identified, read_aircraft(folder))
+        _check_level_flight_at_cruise(identified, read_aircraft(folder))
         envelope = load_envelope(read_aircraft(folder))
         min_speed, max_speed = envelope.level_speeds(0.0)
         toml.write_text(_metadata_text(identified, battery, min_speed, max_speed), encoding="utf-8")
@@ -178,7 +178,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
     }
 
 
-def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
+def _check_level_flight_at_cruise(identified: Identified, aircraft: Aircraft) -> None:
     """Raise LogError, with the reason, if the identified model has no level flight at cruise."""
     if steady_flight(Fdm(aircraft), identified.cruise, AMSL) is not None:
         return

@@ -405,7 +405,7 @@ def _has_current(log: MotionLog) -> bool:
 
 
 def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
-    """Return True for each time of the grid at which lifting motors ran or a VTOL mode was set, (n,)."""
+    """Return a boolean mask (n,): True where lifting motors run or a VTOL mode is set."""
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:
@@ -419,7 +419,7 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
 
 
 def _settled_flight_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, pulses: Floats) -> Flags:
-    """Return True for each time of the grid in settled wing-borne flight without gaps in the data, (n,).
+    """Return a boolean mask (n,): True in settled wing-borne flight without gaps in the data.
 
     Gaps are pauses in sensors, surface commands, airspeed or wind.  The first `_SETTLING_TIME_S` of each segment are
     False.
@@ -441,7 +441,7 @@ def _settled_flight_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floa
 
 
 def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
-    """Return True for each row with a blocked airspeed sensor, (n,).
+    """Return a boolean mask (n,): True where the airspeed sensor is blocked.
 
     In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind does.
     air_velocity: ground velocity minus wind, to north and east, (n, 2) m/s.

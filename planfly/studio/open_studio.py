@@ -86,7 +86,7 @@ def open_studio(
         address = f"http://{HOST}:{listener.getsockname()[1]}/#t={token}"
         with _open_page(address) if browser else contextlib.nullcontext():
             on_message(f"studio  {address}")
-            asyncio.run(_serve(server, listener, stop))
+            asyncio.run(_run_web_server(server, listener, stop))
 
 
 def _autosave_stem(target: str) -> str:
@@ -136,7 +136,7 @@ def _open_page(address: str) -> Iterator[None]:
         yield
 
 
-async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
+async def _run_web_server(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
     """Serve pages on a socket until `stop` returns True."""
     import uvicorn
 

@@ -128,9 +128,9 @@ class Server:
         self.jobs.start_first_task(self.session)
         while True:
             await asyncio.sleep(AUTOSAVE_INTERVAL_S)
-            await self._autosave()
+            await self._autosave_session()
 
-    async def _autosave(self) -> None:
+    async def _autosave_session(self) -> None:
         """Save changed edits; an error is reported to the pages once."""
         if self._autosave_file is not None and (self.session.needs_autosave or self.session.autosaved_rev):
             # On a full disk the studio goes on without autosave, and reports the error once.
@@ -145,7 +145,7 @@ class Server:
 
     async def close(self) -> None:
         """Autosave, and end the processes."""
-        await self._autosave()
+        await self._autosave_session()
         self.jobs.close()
         self._judge_thread.shutdown(wait=False, cancel_futures=True)
         self._draw_thread.shutdown(wait=False, cancel_futures=True)
@@ -162,7 +162,7 @@ class Server:
     # One page.
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve a page until it disconnects."""
+        """Accept a websocket; if it sends the token, serve its page until the page disconnects or is too slow."""
         await socket.accept()
         page = await self._authenticate(socket)
         if page is None:
@@ -267,11 +267,11 @@ class Server:
         """Send choices, world, mission, tasks, results and terrain to a page that has just connected."""
         page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
         page.send(self.session.world_message())
-        for message in (*self.jobs.progress_messages(), self._mission_message(), *self.jobs.result_messages()):
+        for message in (*self.jobs.progress_messages(), self._mission_message_for_page(), *self.jobs.result_messages()):
             page.send(message)
         await self._send_ground(page)
 
-    def _mission_message(self) -> Json:
+    def _mission_message_for_page(self) -> Json:
         """Return the message with the mission; "planning" is true while its first path is being planned."""
         return {**self.session.mission_message(), "planning": self.jobs.is_planning_first_path(self.session)}
 
@@ -322,7 +322,7 @@ class Server:
             await self._dispatch(page, message)
         except StaleEdit:
             page.send({"kind": "stale"})
-            page.send(self._mission_message())
+            page.send(self._mission_message_for_page())
         except PlanflyError as error:
             page.send({"kind": "fault", "text": str(error)})
         except INTERNAL as error:
@@ -368,7 +368,7 @@ class Server:
             await self._run_judging(lambda: self._apply_change(message))
             if session.rev == rev:
                 return
-            mission_message = await self._run_judging(self._mission_message)
+            mission_message = await self._run_judging(self._mission_message_for_page)
         if session.world_rev != world_rev:
             self._broadcast(session.world_message())
         self._broadcast(mission_message)
@@ -429,9 +429,9 @@ class Server:
         """Forward an answer of a worker from its thread to the event loop."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._handle_answer, worker, answer)
+                self._loop.call_soon_threadsafe(self._send_messages_of_answer, worker, answer)
 
-    def _handle_answer(self, worker: str, answer: Answer) -> None:
+    def _send_messages_of_answer(self, worker: str, answer: Answer) -> None:
         """Send the messages that a worker's answer causes to the pages.
 
         If it is the first planned path, the path becomes the mission.

@@ -267,7 +267,7 @@ class Session:
                 )
                 return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
             case Apply():
-                return self._apply_suggestion(message)
+                return self._mission_with_suggestion(message)
 
     def _indices_to_raise(self, indices: list[int] | None) -> tuple[int, ...]:
         """Return the indices of the items to raise, without landings unless all of them are landings.
@@ -328,13 +328,13 @@ class Session:
             mission = self.context.with_updated_radii(mission, nearest_index)
         return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
 
-    def _apply_suggestion(self, message: Apply) -> tuple[Mission, str]:
+    def _mission_with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission changed by a suggestion, and a description of the edit.
 
         Raises MissionError for a suggestion that no longer exists or does not pass its trial.
         """
         if message.flown:
-            return self._apply_flown_suggestion(message)
+            return self._mission_with_flown_suggestion(message)
         findings = self.judged.verdict.findings
         if not message.finding < len(findings):
             raise MissionError(f"{self.document.name}: that finding no longer exists", field="finding")
@@ -353,7 +353,7 @@ class Session:
         moves = [move for change in trial.suggestion for move in change.moves]
         return mission, f"apply a suggestion of {finding.rule}" + (f": move {moves_text(moves)}" if moves else "")
 
-    def _apply_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
+    def _mission_with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission as flown in the trial of a suggestion, and a description of the edit.
 
         Raises MissionError if the mission was changed after the trial.

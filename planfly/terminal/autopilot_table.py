@@ -27,7 +27,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     ardupilot: flyable
     px4: not flyable: speed; NAV_ACC_RAD 10
     """
-    rows = [("", *verdicts), ("verdict", *(_answer_text(verdict) for verdict in verdicts.values()))]
+    rows = [("", *verdicts), ("verdict", *(_verdict_result_text(verdict) for verdict in verdicts.values()))]
     # Keyed by title: photo lines and their overlap are shown apart, and have the rule "survey" in common.
     rules_by_title = [{rule.words.title: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
     all_findings = [finding for verdict in verdicts.values() for finding in verdict.findings]
@@ -51,7 +51,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     return lines
 
 
-def _answer_text(verdict: Verdict) -> str:
+def _verdict_result_text(verdict: Verdict) -> str:
     """Return the result of a verdict as a short text for a cell of the table, such as "not flyable"."""
     if verdict.undecided:
         return verdict.answer

@@ -196,7 +196,7 @@ def _last_durations() -> dict[str, _LastDuration]:
     return durations
 
 
-def _store_duration(kind: str, duration: _LastDuration) -> None:
+def _write_duration(kind: str, duration: _LastDuration) -> None:
     """Store the duration of the last stage of a kind; ignore an error in writing the file."""
     text = json.dumps(_last_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
     with contextlib.suppress(OSError):
@@ -282,7 +282,7 @@ class _TimeLeft:
         """
         if next(_stage_numbers) == self._number + 1:
             units = 0.0 if self._first_report is None else self._done - self._first_report[1]
-            _store_duration(
+            _write_duration(
                 self._kind, _LastDuration(self._measured_time() / units if units > 0.0 else 0.0, self.elapsed())
             )
 
@@ -462,16 +462,18 @@ class _Lines:
                 )
 
     def _print_first_line(self, estimate: str) -> None:
+        """Print the line that a stage begins, with an estimate of its duration."""
         self._has_started = True
         self._print_and_note_time(f"{self._title} ... ({estimate})")
 
     def _print_and_note_time(self, line: str) -> None:
+        """Print a line, and record the time at which it was printed."""
         self._last_print_time = self._time_left.elapsed()
         _print_line(line)
 
 
 def _ignore_progress(*_: object) -> None:
-    pass
+    """Ignore progress and lines, for a command with --quiet."""
 
 
 # Receiver that shows progress on standard error.

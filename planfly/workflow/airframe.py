@@ -46,7 +46,7 @@ class Airframe:
 
 
 def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan | None = None) -> Plan:
-    """Return a plan with the departure and the approach that its scenario requires added.
+    """Return the plan with the departure and the approach that its scenario requires.
 
     If the scenario requires neither, the plan is returned unchanged.
 

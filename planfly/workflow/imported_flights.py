@@ -89,7 +89,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     """
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
-    mission, mission_origin, plan_scenario = _planned_mission(path, flight, options)
+    mission, mission_origin, plan_scenario = _read_mission(path, flight, options)
     mission = fences.add_to_mission(mission)
     has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not has_plan_heights:
@@ -154,7 +154,7 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
-def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
+def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
     """Return the planned mission, a description of its source, and the scenario of its plan.
 
     The scenario is None without a plan.json.

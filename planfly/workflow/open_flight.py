@@ -93,6 +93,7 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
 
 
 def _terrain_option(options: MissionOptions) -> str | None:
+    """Return the option `terrain` as text, or None if it is not given."""
     terrain = options.get("terrain")
     return None if terrain is None else str(terrain)
 

@@ -166,14 +166,14 @@ class SuggestionTrials:
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
         """Return a passing trial of a suggestion, enlarged if necessary, or None."""
         candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
-        passed_candidate = first_that_passes(candidates, lambda candidate: self._passes(finding, candidate[1]))
+        passed_candidate = first_that_passes(candidates, lambda candidate: self._passes_trial(finding, candidate[1]))
         if passed_candidate is None:
             return None
         (*first_changes, last_change), trial = passed_candidate
         moves = item_moves(self.context, self.judged.mission, trial.setup.mission)
         return PassedTrial(finding, (*first_changes, replace(last_change, moves=moves)), trial.setup)
 
-    def _passes(self, finding: Finding, trial: Trial) -> bool:
+    def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
         """Return True if a trial passes by geometry, and by a flight if the judged verdict is flown.
 
         A trial beyond the allowed number of flights fails.

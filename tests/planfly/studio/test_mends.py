@@ -370,8 +370,8 @@ def test_a_full_disk_is_said_once(tmp_path: Path) -> None:
         server = server_of(session, tmp_path / "file" / "kept.json")
         page = Page(NoSocket(), dark=False)  # type: ignore[arg-type]
         server._pages.add(page)
-        await server._autosave()
-        await server._autosave()
+        await server._autosave_session()
+        await server._autosave_session()
         return sent(page)
 
     (fault,) = asyncio.run(run())
