@@ -180,7 +180,7 @@ def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> F
 
 
 def _fractions_to_controls(fractions: Floats, aircraft: Aircraft, angles: tuple[bool, bool, bool]) -> Floats:
-    """Convert logged fractions of full travel, or angles, to the controls of the model, (n, 4).
+    """Convert logged fractions of full travel, or angles, to the model's controls (n, 4).
 
     The controls are elevator, aileron, rudder (rad) and throttle.  Full travel is the maximum deflection of the base
     aircraft.

@@ -286,7 +286,7 @@ def paper_file_names(problems: Sequence[int]) -> list[str]:
 
 
 def table_text(rows: Sequence[TableRow]) -> str:
-    """Format the table for a terminal."""
+    """Return the paper's table as text for a terminal."""
     header = (
         f"{'threats':>7}  {'algorithm':<15}{'safe':>7}{'certified':>11}  {'PLR median':>10}  {'worst':>6}"
         f"  {'PKill median':>12}  {'worst':>6}  {'PRD median':>10}  {'CPU s':>6}"

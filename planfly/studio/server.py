@@ -131,7 +131,7 @@ class Server:
             await self._autosave_session()
 
     async def _autosave_session(self) -> None:
-        """Save changed edits; an error is reported to the pages once."""
+        """Autosave the session if it has changed; report an error to the pages once."""
         if self._autosave_file is not None and (self.session.needs_autosave or self.session.autosaved_rev):
             # On a full disk the studio goes on without autosave, and reports the error once.
             try:

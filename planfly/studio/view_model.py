@@ -232,7 +232,7 @@ def _state_pair(state: State) -> list[str]:
 
 
 def verdict_json(verdict: Verdict) -> Json:
-    """Return page data of a verdict's answer and its lines."""
+    """Return page data of a verdict: state, answer, headline, lines, level and count of failures."""
     presentation = verdict.present()
     return {
         "state": presentation.state,

@@ -34,7 +34,7 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     if mission is None or not mission_autopilot:
         return scenario
     if table.autopilot is None:
-        return _set_autopilot(scenario, mission_autopilot, mission.source)
+        return _with_autopilot(scenario, mission_autopilot, mission.source)
     if mission_autopilot != table.autopilot and table.autopilot in TITLES:
         if table.autopilot_from is None:
             raise MissionError.from_error(
@@ -66,11 +66,11 @@ def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Sce
         remedy = "--autopilot names the autopilot that is to fly"
         message = f"{params_path}: {origin.evidence}: {remedy}"
         raise ParameterError(message, file=params_path, field="autopilot", value=origin.evidence, allowed=remedy)
-    return _set_autopilot(scenario, origin.autopilot, params_path) if origin.autopilot else scenario
+    return _with_autopilot(scenario, origin.autopilot, params_path) if origin.autopilot else scenario
 
 
-def _set_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with an autopilot, and the file that names the autopilot.
+def _with_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
+    """Return the scenario with `autopilot`, and with `file` as the file that names this autopilot.
 
     The autopilot is set even if it is the default autopilot.
     """
