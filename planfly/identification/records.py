@@ -88,9 +88,7 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the segments of wing-borne flight in a log that an identification can use.
-
-    A segment has no gap in sensors, surface commands, airspeed or wind.
+    """Return the segments of wing-borne flight without gaps in the data, for an identification.
 
     servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
     min_seconds: minimum total duration of the segments, s.
