@@ -32,8 +32,8 @@ from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from flight.simulation.track import Track
-from planfly.identification.base_numbers import base_model, scale_model
-from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
+from planfly.identification.base_numbers import base_model, scale_base_model
+from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identification
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.instrumented_flights import (
@@ -77,7 +77,7 @@ def drawn_truth(seed: int) -> Truth:
         for field, sd in (_FIXED_SIGMAS | _INERTIA_SIGMAS).items():
             values[field] = float(np.clip(draw.normal(1.0, sd), 1.0 - 2.0 * sd, 1.0 + 2.0 * sd))
         truth = Truth(**values)
-        base = scale_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+        base = scale_base_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
         flown = performance(base, true_values(truth), _CRUISE_MPS, DENSITY)
         stable = truth.pitch_stiffness > 0.5 and truth.weathercock > 0.4 and truth.roll_damping > 0.5
         if math.radians(4.0) < flown.climb[0] < math.radians(16.0) and flown.throttle[0] < 0.93 and stable:
@@ -181,7 +181,7 @@ def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: B
     "refused", "undecided" or "flyable".
     """
     prior = load_aircraft("aerosonde")
-    found = make_identified(prior, base, estimate, [log], read_servos(prior.folder / "ardupilot.toml"))
+    found = make_identification(prior, base, estimate, [log], read_servos(prior.folder / "ardupilot.toml"))
     place = folder / "mine"
     place.mkdir()
     for name, text in folder_files(found, "mine", (prior.battery_voltage, prior.battery_energy)).items():
@@ -205,7 +205,7 @@ def one_variant(seed: int, repeats: int, shorts: int, factor: float, *, missions
     truth = drawn_truth(seed)
     values = true_values(truth)
     numbers = base_model(load_aircraft("aerosonde"))
-    base = scale_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+    base = scale_base_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
     made: dict[str, Any] = {
         "seed": seed,
         "truth": {one.name: round(getattr(truth, one.name), 3) for one in fields(truth)},

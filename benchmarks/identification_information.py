@@ -40,7 +40,7 @@ from aircraft.identification.flow import flow_from_forces
 from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.performance import GRAVITY, performance
 from benchmarks.identification import drawn_truth, fly_missions, true_values
-from planfly.identification.base_numbers import base_model, scale_model
+from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.folder import DENSITY
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
@@ -165,7 +165,7 @@ def one_seed(seed: int) -> dict[str, Any]:
     values = true_values(truth)
     prior = load_aircraft("aerosonde")
     numbers = base_model(prior)
-    base = scale_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+    base = scale_base_model(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
     with tempfile.TemporaryDirectory() as place:
         tracks, changed = fly_missions(Path(place), truth, seed)
         logs = [sensed(track, changed, drawn_sensors(seed), seed + 100_000 * k) for k, track in enumerate(tracks)]

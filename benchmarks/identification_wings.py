@@ -25,8 +25,8 @@ from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_m
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import full_throttle_climb, idle_descent, steady_flight
-from planfly.identification.base_numbers import base_model, scale_model
-from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
+from planfly.identification.base_numbers import base_model, scale_base_model
+from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identification
 from planfly.identification.model_text import identified_xml
 from planfly.identification.records import flight_records, log_outputs
 from planfly.identification.servos import read_servos
@@ -102,7 +102,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
         draw = np.random.default_rng([seed, 3])
         wind = (float(draw.uniform(1.0, 5.0)), float(draw.uniform(0.0, 360.0)))
         track = fly_wing(wing, folder, seed, repeats=repeats, wind=wind)
-        numbers = scale_model(base_model(base), wing.mass, base.wing_span, base.wing_area)
+        numbers = scale_base_model(base_model(base), wing.mass, base.wing_span, base.wing_area)
         made: dict[str, Any] = {
             "base": name,
             "seed": seed,
@@ -121,7 +121,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
             log = log_of_elevons(track, wing, drawn_sensors(seed, battery=battery), seed)
             records = flight_records(log, base, log_outputs(log, base))
             estimate = estimate_model(records, numbers)
-            found = make_identified(base, numbers, estimate, [log], read_servos(base.folder / "ardupilot.toml"))
+            found = make_identification(base, numbers, estimate, [log], read_servos(base.folder / "ardupilot.toml"))
             own = folder / ("with" if battery else "without")
             own.mkdir()
             files = folder_files(found, own.name, (base.battery_voltage, base.battery_energy))

@@ -28,7 +28,7 @@ from aircraft.identification.performance import performance
 from logs.importers.motion_log import read_motion
 from logs.views.drawing import draw_chart, png_bytes
 from logs.views.prediction import band_chart
-from planfly.identification.base_numbers import base_model, scale_model
+from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.folder import DENSITY
 from planfly.identification.records import flight_records
 
@@ -62,7 +62,7 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
     )
     predicted = planfly.predict(THOR, folder / "thor", aircraft=str(half))
     sheet = find_aircraft(str(base))
-    numbers = scale_model(base_model(sheet), 1.959, 1.27, 0.3097, 11.1)
+    numbers = scale_base_model(base_model(sheet), 1.959, 1.27, 0.3097, 11.1)
     motion = read_motion(THOR)
     records = flight_records(motion, sheet)
     earlier = [record.between(0.0, THOR_UNTIL_S) for record in records]

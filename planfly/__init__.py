@@ -10,32 +10,32 @@
     planfly.report(flown, "report")
 
 plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
-plan_front                           a choice of paths: short, unseen, high above ground, sparing
+plan_front                           a choice of paths: short, little exposed to radar, high above ground, low energy
 fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
 fly_by_each                          fly it by several simulated autopilots
 check, judge, read_log               judge a log, a plan or a mission; read a log, its track as a table
-figures, report, compare             matplotlib figures; a page of a flight; two flights beside each other
+figures, report, compare             matplotlib figures; a page of a flight; two flights compared
 export, foxglove_layout              files for ground stations, maps and other programs
 replay, timeline, instruments, movie a flight again, from its log
 play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
 guess_columns                        a table of columns, by which CSV, MAT, Parquet and HDF5 files are logs
-returns                              will it come home, from everywhere on its way
+returns                              whether the aircraft would come home from each point of its route
 link                                 the radio link to the ground station along a flight
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
 open_studio                          a page on which a mission is dragged, judged, flown and saved
-scenarios, aircraft                  what is embedded
+scenarios, aircraft                  the built-in scenarios and aircraft
 terrain                              the ground of an area as a file, from tiles or from the Copernicus DEM's server
-new_scenario                         a commented scenario of one's own, from here to there over this ground
+new_scenario                         a commented scenario of your own, between two positions over a terrain
 make_scenario                        a scenario with other threats (arrays, a data frame) and other values, in Python
-describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of one's own
-identify_aircraft                    that folder from flight logs, with what is not known of it
+describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of your own
+identify_aircraft                    such a folder from flight logs, with the uncertainty of each estimate
 predict                              a logged flight that a model has not seen, as bands of 95 %
 paper_tables, optimise               the paper's section V; the planner's optimisers alone, by ask and tell
-progress                             have the progress of the calls reported
-PlanflyError                         what bad input raises, with file, field, value and allowed; and its kinds
+progress                             report the progress of calls to a function
+PlanflyError                         the error for bad input, with file, field, value and allowed range; its subclasses
 
 Paths are `str` or `pathlib.Path`.  The command line is ``planfly --help``.
 """

@@ -105,7 +105,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 
 
 def check_arguments(**given: Any) -> None:
-    """Raise ArgumentError for the first argument outside its range or allowed words.
+    """Raise ArgumentError for the first argument that is outside its range or not an allowed word.
 
     given: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.
 
@@ -142,17 +142,19 @@ CAMERA_FORMAT = (
 )
 
 
-def is_wind(speed: float, from_deg: float) -> bool:
-    """Return True if the speed of a steady wind, m/s, and the direction from which it blows, degrees, are allowed.
+def is_valid_wind(speed: float, from_deg: float) -> bool:
+    """Return True if the speed and the direction of a wind are allowed.
 
-    >>> is_wind(8.0, 270.0), is_wind(float("nan"), 0.0)
+    speed: 0 to 40 m/s.  from_deg: direction from which the wind blows, -360 to 360 degrees.
+
+    >>> is_valid_wind(8.0, 270.0), is_valid_wind(float("nan"), 0.0)
     (True, False)
     """
     return 0.0 <= speed <= 40.0 and -360.0 <= from_deg <= 360.0
 
 
 def is_valid_position(lat: float, lon: float) -> bool:
-    """Return True if a latitude and a longitude, degrees, are valid; latitudes near the poles are not.
+    """Return True if a latitude (-89 to 89 degrees) and a longitude (-180 to 180 degrees) are allowed.
 
     >>> is_valid_position(-33.9, 18.4), is_valid_position(91.0, 0.0)
     (True, False)
@@ -160,14 +162,16 @@ def is_valid_position(lat: float, lon: float) -> bool:
     return -89.0 <= lat <= 89.0 and -180.0 <= lon <= 180.0
 
 
-def is_camera(numbers: Sequence[float]) -> bool:
-    """Return True if three or five numbers describe a camera.
+def is_valid_camera(numbers: Sequence[float]) -> bool:
+    """Return True if three or five numbers describe a camera within the allowed ranges.
 
-    The numbers are the sensor size across and along the track, mm, the focal length, mm, and optionally the overlaps
-    with the next photo and with the next line, percent.
+    The numbers are the sensor size across and along the track (mm), the focal length (mm), and optionally the overlaps
+    with the next photo and with the next line (percent).
 
-    >>> is_camera((23.5, 15.6, 16.0)), is_camera((23.5, 15.6, 16.0, 75.0, 60.0)), is_camera((23.5, 15.6, 0.0))
-    (True, True, False)
+    >>> is_valid_camera((23.5, 15.6, 16.0)), is_valid_camera((23.5, 15.6, 16.0, 75.0, 60.0))
+    (True, True)
+    >>> is_valid_camera((23.5, 15.6, 0.0))
+    False
     """
     if len(numbers) not in (3, 5) or not all(
         0.0 < number <= limit for number, limit in zip(numbers, _MAX_CAMERA_SIZES_MM, strict=False)

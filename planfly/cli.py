@@ -31,8 +31,8 @@ _MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command, and return its exit code.
 
-    argv: arguments without the program's name; None for those of the process.  With None, SIGINT and SIGTERM end the
-    process, and so does the end of the command: its exit code is the process's.
+    argv: arguments without the program's name; None for the arguments of the process.  With None this function does not
+    return: the process ends with the exit code of the command, or after SIGINT or SIGTERM.
     """
     if argv is not None:
         return _run_and_report(argv)
@@ -53,7 +53,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command, report errors of the machine and interruptions in one line, and return the exit code."""
+    """Run one command, report errors of the machine and interruptions in one line.
+
+    Returns the exit code.
+    """
     try:
         with safe_streams():
             return _run_command(argv)
@@ -87,7 +90,7 @@ def _run_command(argv: Sequence[str] | None) -> int:
 
 
 def _is_machine_error(cause: BaseException | None) -> bool:
-    """Return True if a file could not be read because of an error of the machine, not because of its content."""
+    """Return True if an error of the machine caused an error, such as too many open files or a disk error."""
     return isinstance(cause, OSError) and cause.errno in _MACHINE_ERRORS
 
 

@@ -35,5 +35,5 @@ def judge_log(log: FlightLog) -> Verdict:
 
 
 def loss_text(log: FlightLog) -> str:
-    """Describe the missing part of an incomplete log in one line; return "" for a complete log."""
+    """Return a line on the missing part of an incomplete log, or "" for a complete log."""
     return "" if log.complete else f"{log.source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"

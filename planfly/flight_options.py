@@ -9,7 +9,7 @@ from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_
 
 from flight.autopilots.catalog import program_class_for
 from flight.simulation.setup import EngineChoice, VerticalDatum
-from planfly.arguments import check_arguments, is_wind
+from planfly.arguments import check_arguments, is_valid_wind
 from planfly.workflow.file_autopilots import with_file_autopilot
 from world.argument_types import check_types
 from world.errors import ArgumentError
@@ -172,7 +172,9 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Decorate a function: list the options of its ``Unpack[...]`` parameter in its signature, with their defaults.
+    """Decorate a function to take the options of its ``Unpack[...]`` parameter as keywords.
+
+    The options are listed in its signature, with their defaults.
 
     Raises the ArgumentError of `world.argument_types.check_types`.
 
@@ -231,7 +233,7 @@ def select_mission_options(options: MissionOptions) -> MissionOptions:
 
 
 def fence_file_names(options: MissionOptions) -> list[str]:
-    """Return the names of the fence files."""
+    """Return the names of the files that the option `fence` names."""
     fence = options.get("fence") or ()
     return [str(file) for file in ([fence] if isinstance(fence, str | Path) else fence)]
 
@@ -270,8 +272,8 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     (8.0, 28.0)
     """
     wind = options.get("wind")
-    speed, from_deg = (None, None) if wind is None else _parse_wind(wind)
-    if from_deg is not None and not is_wind(0.0, from_deg):
+    speed, from_deg = (None, None) if wind is None else _wind_numbers(wind)
+    if from_deg is not None and not is_valid_wind(0.0, from_deg):
         raise ArgumentError.of_argument(
             "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
         )
@@ -281,7 +283,9 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
-    """Return the entries of a scenario's [flight] table that state the options; None for an option that is not given.
+    """Return the entries of a scenario's [flight] table for the options.
+
+    The entry of an option that is not given is None.
 
     program: file of a real autopilot (SITL) that flies instead of a simulated autopilot, or None.
     Raises ArgumentError for an unknown autopilot, and if both an autopilot and a program are given.
@@ -312,8 +316,11 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     }
 
 
-def _parse_wind(wind: Wind) -> Wind:
-    """Parse a wind as two numbers.  Raises ArgumentError for other values."""
+def _wind_numbers(wind: Wind) -> Wind:
+    """Return speed (m/s) and direction (degrees) of a wind as numbers.
+
+    Raises ArgumentError for other values.
+    """
     try:
         speed, from_deg = wind
         if isinstance(wind, str | bytes):

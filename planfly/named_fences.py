@@ -24,7 +24,7 @@ class NamedFences:
     zones: tuple[tuple[str, FileZones], ...] = ()
 
     def add_to_mission(self, mission: Mission) -> Mission:
-        """Return a mission with the fence items added."""
+        """Return the mission with the fence items added; a warning states that its own fence still applies."""
         if not self.items:
             return mission
         warnings = mission.warnings
@@ -34,7 +34,7 @@ class NamedFences:
         return replace(mission, fences=number_items([*mission.fences, *self.items]), warnings=warnings)
 
     def add_to_scenario(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with the zones added.  Raises the ScenarioError of `with_zones`."""
+        """Return the scenario with the zones of all files added.  Raises ScenarioError for an invalid zone."""
         for source, file_zones in self.zones:
             scenario = with_zones(scenario, file_zones.zones, source, file_zones.notes)
         return scenario

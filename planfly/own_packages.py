@@ -11,14 +11,17 @@ _BAD_USAGE_CODE = 2
 
 
 class HiddenPackage(NamedTuple):
-    """Package of planfly that another module hides.  found: file of the other module.  own: file of the package."""
+    """Package of planfly that another module hides.
+
+    found: file of the other module.  own: file of the package.
+    """
 
     found: str
     own: str
 
 
 def find_hidden_package(home: Path) -> HiddenPackage | None:
-    """Find a module that Python would import in place of a package of planfly; return None without one.
+    """Find a module that Python would import in place of a package of planfly, or return None.
 
     Nothing is imported.
 
@@ -37,7 +40,10 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
 
 
 def _module_file(name: str) -> str | None:
-    """Return the file that Python imports or would import for a name, or None without one."""
+    """Return the file of the module that Python imported, or would import, by a name.
+
+    Returns None if there is no such file.
+    """
     if name in sys.modules:
         return getattr(sys.modules[name], "__file__", None)
     spec = find_spec(name)

@@ -7,7 +7,9 @@ from logs.verdict.rules.fence_rule import make_zone_test
 
 
 def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
-    """Return the mission of a plan with the scenario's area and zones as fence, and notes on what a fence cannot store.
+    """Return a plan's mission with a fence, and notes on what the fence leaves out.
+
+    The fence is made from the threats, the area and the zones of the scenario.
 
     Shapes that the planned path violates according to the rule `fence` are omitted, and named in the notes.
 

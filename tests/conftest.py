@@ -56,7 +56,7 @@ def _no_estimates_of_other_runs(tmp_path_factory: pytest.TempPathFactory) -> Ite
     """No test's progress depends on what this machine did before, or on how quick it is."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(output, "_durations_file", lambda: tmp_path_factory.getbasetemp() / "none" / "durations.json")
-        patch.setattr(output, "_store_duration", lambda *_: None)
+        patch.setattr(output, "_write_duration", lambda *_: None)
         patch.setattr(output, "_REFRESH_INTERVAL_S", 86_400.0)
         yield
 

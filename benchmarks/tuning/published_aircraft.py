@@ -13,7 +13,7 @@ from aircraft.model_writer import AeroCoefficients, ModelNumbers, model_xml
 from aircraft.propulsion import ActuatorDisc, ShaftPower
 from flight.dynamics.fdm import Fdm
 from flight.guidance.model_gains import gains_from_model, gains_text
-from planfly.workflow.data_sheets import arduplane_parameters, measure_performance, servo_text
+from planfly.workflow.data_sheets import arduplane_parameters_text, measure_performance, servo_text
 
 # Beard and McLain, first edition, appendix E.1.  The table's drag due to elevator is linear (0.30 a radian) and would
 # propel an aircraft that trims with its elevons up; it is left out, as is the table's drag due to angle of attack,
@@ -180,7 +180,7 @@ def write(name: str) -> None:
     slow, fast = flown.slowest.airspeed, flown.fastest.airspeed
     print(f"{name}: level {flown.level}\n  climb {climb:.1f}, idle {sink:.1f} degrees; {slow:.2f} to {fast:.2f} m/s")
     (folder / "gains.toml").write_text(gains_text(gains_from_model(aircraft, fdm)), encoding="utf-8")
-    (folder / "ardupilot.parm").write_text(arduplane_parameters(aircraft, flown, fdm, {}), encoding="utf-8")
+    (folder / "ardupilot.parm").write_text(arduplane_parameters_text(aircraft, flown, fdm, {}), encoding="utf-8")
     (folder / "ardupilot.toml").write_text(servo_text(aircraft, flown), encoding="utf-8")
 
 

@@ -34,10 +34,10 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
+from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight, with_engine
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
-from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log, fly_and_judge
+from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log_path, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
@@ -208,7 +208,7 @@ def fly(
     program = named_program(options["sitl"])
     setup = with_engine(open_flight(mission, options, program), options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
-    with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
+    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
             airframe_for_setup(setup),
@@ -226,7 +226,7 @@ def fly(
 def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
     """Convert a judged flight to its result; a flight that did not start has no log and no flight model."""
     log = log if len(flight.track) else None
-    program_log = None if log is None or program is None else autopilot_log(log, program)
+    program_log = None if log is None or program is None else autopilot_log_path(log, program)
     return FlownMission(
         flight.setup,
         flight.track,
@@ -283,12 +283,12 @@ def _prepare_log_file(
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, setup.name, setup.seed, suffix=".mcap", overwrite=overwrite, source=source)
     if program is not None:
-        check_output_file(autopilot_log(target, program), overwrite, source)
+        check_output_file(autopilot_log_path(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
     if log == FLY_LOG:
         # Remove the report and the pictures of the previous flight.
         prepare_folder(target.parent, LOG_FIGURES)
-    report_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
+    report_replaced(target, *((autopilot_log_path(target, program),) if program is not None else ()))
     return target
 
 

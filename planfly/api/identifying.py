@@ -14,9 +14,9 @@ from aircraft.identification.prediction import PredictedLog
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
-from planfly.identification.base_numbers import base_model, scale_model
+from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.checks import check_battery, check_commands, check_estimate, check_power
-from planfly.identification.folder import Identified, folder_files, make_identified
+from planfly.identification.folder import Identified, folder_files, make_identification
 from planfly.identification.model_text import check_base
 from planfly.identification.propulsion_check import PowerConflict
 from planfly.identification.records import (
@@ -28,10 +28,10 @@ from planfly.identification.records import (
     flight_records,
     log_outputs,
     recording_setting,
-    slowest_rows,
+    slowest_log_rate,
 )
 from planfly.identification.servos import ServoOutput, read_servos
-from planfly.identification.wide_numbers import WideNumber, wide_numbers
+from planfly.identification.wide_quantities import WideQuantity, wide_quantities
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.data_sheets import parse_sheet
@@ -88,7 +88,7 @@ class IdentifiedAircraft:
     predicted: PredictedLog
     without_current: tuple[str, ...] = ()
     slow: tuple[SlowLog, ...] = ()
-    wide: tuple[WideNumber, ...] = ()
+    wide: tuple[WideQuantity, ...] = ()
     conflict: PowerConflict | None = None
 
 
@@ -130,7 +130,7 @@ def identify_aircraft(
     stated_numbers = {"mass": mass, "span": span, "area": area}
     _check_stated_numbers(stated_numbers, prior)
     volts, energy = _find_battery(prior, battery)
-    base_numbers = scale_model(base_model(prior), **stated_numbers, volts=volts)
+    base_numbers = scale_base_model(base_model(prior), **stated_numbers, volts=volts)
     check_base(prior)
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}", "reading logs"):
         motion_logs = [read_motion(path) for path in paths]
@@ -143,11 +143,11 @@ def identify_aircraft(
     check_commands(records)
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
-        has_fast_rows = all(slowest_rows(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
+        has_fast_rows = all(slowest_log_rate(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
         check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
         check_power(estimate, records, base_numbers)
-        identified = make_identified(prior, base_numbers, estimate, motion_logs, outputs, until)
+        identified = make_identification(prior, base_numbers, estimate, motion_logs, outputs, until)
         files = folder_files(identified, target.name, (volts, energy))
     with stage("predicting"):
         predicted = score_predictions(estimate, checked or records, base_numbers, prior.name)
@@ -305,10 +305,10 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
     )
 
 
-def _find_wide_numbers(identified: Identified) -> tuple[WideNumber, ...]:
+def _find_wide_numbers(identified: Identified) -> tuple[WideQuantity, ...]:
     """Return sink rate and power, each if the logs determine it only within a wide interval."""
     _, sink, power = _performance_intervals(identified)
-    return wide_numbers(sink, power, with_current=identified.estimate.with_current)
+    return wide_quantities(sink, power, with_current=identified.estimate.with_current)
 
 
 # Lower end, estimate and upper end (95 %) of a number.
@@ -348,5 +348,5 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
     """Return the logs whose sensors or servo outputs have fewer than `AMPLE_HZ` rows per second."""
-    rates = [(log, slowest_rows(log)) for log in logs]
+    rates = [(log, slowest_log_rate(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

@@ -16,7 +16,7 @@ from planfly.flight_options import PlanOptions, load_scenario_with_options, take
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
+from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_airframe
 from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
 from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
@@ -246,7 +246,7 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
 
 def conditions_of_plan(plan: Plan) -> Conditions:
     """Return the aircraft, speed, weather, autopilot and terrain that a plan was made for."""
-    aircraft, _ = find_airframe(plan.scenario)
+    aircraft, _ = find_aircraft_and_energy(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
     return plan_conditions(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 

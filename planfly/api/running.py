@@ -21,8 +21,8 @@ from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
-from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
-from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
+from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, with_tightened_limits
+from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
 from planfly.workflow.output_paths import (
@@ -32,7 +32,7 @@ from planfly.workflow.output_paths import (
     expand_path_pattern,
     prepare_folder,
 )
-from planfly.workflow.pipeline import autopilot_log, fly_and_judge
+from planfly.workflow.pipeline import autopilot_log_path, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
 from planner.plan import Plan, plan_json
@@ -217,7 +217,7 @@ def _fly_rounds(
         planning_scenario: scenario with the limits of this round.
         """
         planning_airframe = (
-            airframe if planning_scenario is scenario else tightened_airframe(airframe, planning_scenario)
+            airframe if planning_scenario is scenario else with_tightened_limits(airframe, planning_scenario)
         )
         with stage(f"planning {scenario.name}", "planning") as advance:
             plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
@@ -225,7 +225,7 @@ def _fly_rounds(
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(lock_path(folder))
             if task.program is not None:
-                report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
+                report_replaced(folder / "flight.mcap", autopilot_log_path(folder / "flight.mcap", task.program))
             prepare_folder(folder)
         flown_rounds.append(_record_round(task, plan, len(flown_rounds)))
         if on_round is not None:
@@ -267,7 +267,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         write_atomically(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)
-    with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
+    with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
             airframe,

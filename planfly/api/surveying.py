@@ -23,13 +23,13 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FlownMission, check_keywords_not_given
-from planfly.arguments import CAMERA_FORMAT, check_arguments, is_camera
+from planfly.arguments import CAMERA_FORMAT, check_arguments, is_valid_camera
 from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
+from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
     has_required_overlap,
     is_line_usable,
@@ -42,7 +42,7 @@ from planfly.surveys.survey_text import (
     usable_segments_text,
 )
 from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import flight_text
+from planfly.workflow.crash_safe_log import length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
@@ -181,7 +181,7 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
         camera_numbers = tuple(float(number) for number in numbers)
     except (TypeError, ValueError):
         camera_numbers = ()
-    if isinstance(numbers, str | bytes) or not is_camera(camera_numbers):
+    if isinstance(numbers, str | bytes) or not is_valid_camera(camera_numbers):
         raise ArgumentError.of_argument(
             "camera", numbers, f"expected {CAMERA_FORMAT}, such as (23.5, 15.6, 16)", shown=repr(numbers)
         )
@@ -210,14 +210,14 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     """Fly a mission, measure its photo lines, and look for remedies if requested."""
     _check_has_survey(setup)
     airframe = airframe_for_setup(setup)
-    with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
+    with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
         flight = fly_and_judge(setup, airframe, None, advance, reference="never")
     result = _measure_survey(flight.requirements, flight.track, flight.verdict)
     if not suggest or result.usable:
         return result
     with stage("looking for what would help") as advance:
         step_counter = count(1)
-        trials = survey_remedies(
+        trials = find_survey_remedies(
             flight.setup, airframe, flight.verdict, lambda text: advance(next(step_counter), 0.0, text)
         )
     return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)

@@ -30,7 +30,7 @@ from planfly.workflow.airframe import (
     choose_seed,
     load_airframe,
     max_turn_bank,
-    with_tracking,
+    with_tracking_error,
 )
 from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
@@ -370,4 +370,4 @@ def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -
     exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = exact_envelope if is_drawn else old_limits.envelope
     limits = make_limits(scenario, envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot))
-    return with_tracking(limits, airframe.autopilot, scenario)
+    return with_tracking_error(limits, airframe.autopilot, scenario)

@@ -183,7 +183,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     origin_text = "from a data sheet" if has_sheet else f"as {Path(args.source or 'aerosonde').name}"
     print(f"aircraft  {folder_text}/ ({', '.join(files)}), {origin_text}")
     if has_sheet:
-        _print_sheet(new_aircraft)
+        _print_data_sheet_performance(new_aircraft)
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
     print(
         f"next      `planfly aircraft {shlex.quote(str(folder_text))}` shows it; `planfly fly MISSION --aircraft"
@@ -236,7 +236,10 @@ def _identify(args: argparse.Namespace) -> int:
 
 
 def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) -> None:
-    """Print the errors of predictions half a second ahead by each model, and the whiteness of the innovations."""
+    """Print each model's rms errors 0.5 s ahead, and the whiteness of the identified model's innovations.
+
+    check: log that was predicted, or None for the logs of the identification.
+    """
     from aircraft.identification.prediction import QUANTITIES
 
     predicted = result.predicted
@@ -272,7 +275,7 @@ def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
         )
 
 
-def _print_sheet(aircraft: "Aircraft") -> None:
+def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
     """Print the performance of a data sheet's model, and its uncertainty."""
     from aircraft.uncertainty import read_uncertainty
     from flight.dynamics.envelope_tables import load_envelope
@@ -371,13 +374,13 @@ def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> Non
 
 
 def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
-    """Print the steepest climb and descent, relative to the air and to the ground, and the speeds of level flight."""
+    """Print the steepest climb and descent, relative to air and ground, and the speeds of level flight."""
     altitudes = [float(amsl) for amsl in envelope.amsl[::2]]
     header = "".join(f"{amsl:>13.0f} m" for amsl in altitudes)
     print("\nsteepest climb / descent relative to the air, deg, by airspeed and altitude AMSL ('-': no steady flight)")
     print(f"  m/s  {header}")
     for airspeed in envelope.airspeed.tolist():
-        cells = "".join(f"{_angle_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in altitudes)
+        cells = "".join(f"{_angle_pair_text(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in altitudes)
         print(f"  {airspeed:5.1f}{cells}")
     for title, index in (("level, from", 0), ("level, to", 1)):
         cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in altitudes)
@@ -389,11 +392,11 @@ def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
         (f"{_WIND_MPS:g} m/s headwind", -_WIND_MPS, 0.0),
         (f"{_WIND_MPS:g} m/s crosswind", 0.0, _WIND_MPS),
     ):
-        print(f"  {title:<18}{_angle_pair(*envelope.slope_limits(aircraft.airspeed, 500.0, tail, cross))}")
+        print(f"  {title:<18}{_angle_pair_text(*envelope.slope_limits(aircraft.airspeed, 500.0, tail, cross))}")
 
 
 def _print_turns(aircraft: "Aircraft") -> None:
-    """Print turn radii, and the shortest legs between two turns, by ground speed."""
+    """Print tables of turn radii and of the shortest legs between two turns, by ground speed."""
     from aircraft.envelope import turn_radius
 
     speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max]
@@ -413,7 +416,7 @@ def _print_turns(aircraft: "Aircraft") -> None:
         )
 
 
-def _angle_pair(climb: float, descent: float) -> str:
+def _angle_pair_text(climb: float, descent: float) -> str:
     """Return two angles (rad) as text in degrees, such as "5.2 / 8.0"; "-" replaces NaN."""
 
     def angle_text(angle: float) -> str:

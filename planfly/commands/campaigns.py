@@ -151,7 +151,7 @@ def campaign(args: argparse.Namespace) -> int:
     """Fly a campaign, resume one, or fly one of its flights again."""
     folder = _result_folder(args, "campaign")
     if args.refly is not None:
-        return _fly_again(args, folder)
+        return _repeat_flight(args, folder)
     with _report_stored_flights(folder, "campaign.sqlite") as interrupted:
         result = call_api(planfly.campaign, args, out=folder)
     if interrupted():
@@ -184,7 +184,7 @@ def _result_folder(args: argparse.Namespace, kind: str) -> Path:
     return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
 
 
-def _fly_again(args: argparse.Namespace, folder: Path) -> int:
+def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
     """Repeat one flight of the campaign in a folder, with a log; return 4 if the flight was not flyable."""
     from logs.verdict.wording import place_text
 
@@ -200,7 +200,9 @@ def _fly_again(args: argparse.Namespace, folder: Path) -> int:
 
 @contextmanager
 def _report_stored_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
-    """After an interruption, report the number of stored flights; yield a function that returns the exit code.
+    """Report the number of stored flights after an interruption.
+
+    Yields a function that returns the exit code.
 
     The exit code is 0 without an interruption. An interruption before the table exists is raised again.
     """

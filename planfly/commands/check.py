@@ -36,7 +36,10 @@ LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
 def add_mission_or_log_argument(parser: CommandParser) -> None:
-    """Add the argument for a mission, which is flown first, or for a flight log of planfly or another program."""
+    """Add the argument for a mission or a flight log of planfly or another program.
+
+    A mission is flown first.
+    """
     with_completer(
         parser.add_argument(
             "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
@@ -112,13 +115,14 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     flights = call_api(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}
     code = max(verdict_code(verdict) for verdict in verdicts.values())
-    write_json_if_requested(args, lambda: _verdicts_answer(verdicts, args.what, code))
+    write_json_if_requested(args, lambda: _answer_for_each_autopilot(verdicts, args.what, code))
     write_junit_if_requested(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
     print("\n".join(autopilot_lines(verdicts)))
     return code
 
 
-def _verdicts_answer(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
+def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
+    """Return the answer of the command for --json."""
     from planfly.terminal.verdict_answers import VerdictsDocument
 
     documents = {name: verdict.document() for name, verdict in verdicts.items()}
@@ -126,6 +130,7 @@ def _verdicts_answer(verdicts: Mapping[str, "Verdict"], mission: str, code: int)
 
 
 def _verdict_answer(result: "Judged") -> str:
+    """Return the answer of the command for --json."""
     from logs.verdict.verdict import verdict_json
 
     return verdict_json(result.verdict)

@@ -31,7 +31,10 @@ def add_compare_parser(command_line: LineParser) -> None:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences, and draw them if a folder is named; return 3 if one of the logs is incomplete."""
+    """Print the differences, and draw them if a folder is named.
+
+    The exit code is 3 if one of the logs is incomplete.
+    """
     from logs.views.report.compare import difference_lines
 
     logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]
@@ -50,6 +53,7 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:

@@ -72,6 +72,7 @@ def fly(args: argparse.Namespace) -> int:
 
 
 def _json_answer(mission: str, flight: "FlownMission", code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import FlyAnswer
 
     return FlyAnswer(

@@ -76,7 +76,7 @@ def import_log(args: argparse.Namespace) -> int:
 
 
 def _guess_columns(args: argparse.Namespace) -> int:
-    """Write a starting table of columns, and print how many of its lines are to be checked."""
+    """Write a table of columns guessed from data files, and print how many guesses are to be checked."""
     for name, value in (("FLIGHT.mcap", args.target), ("--json", args.json), ("--junit", args.junit)):
         if value is not None:
             raise PlanflyError(f"--columns-from writes a table and no flight log: without {name}", field=name)
@@ -92,6 +92,7 @@ def _guess_columns(args: argparse.Namespace) -> int:
 
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import ImportAnswer
 
     verdict = flight.verdict.document()
@@ -138,6 +139,7 @@ def refly(args: argparse.Namespace) -> int:
 
 
 def _refly_answer(result: "Reflown", code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import ReflyAnswer
 
     return ReflyAnswer(exit_code=code, lines=list(result.lines), files=[str(file) for file in result.files])

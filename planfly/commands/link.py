@@ -60,7 +60,10 @@ def add_link_parser(command_line: LineParser) -> None:
 
 
 def link(args: argparse.Namespace) -> int:
-    """Judge the link; the exit code is 0 if it is kept, 4 if it is lost for too long, and 3 if it is not known."""
+    """Judge the radio link; return the exit code.
+
+    The exit code is 0 if the link is kept, 4 if it is lost for too long, and 3 if this is not known.
+    """
     from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.link, args)
@@ -76,6 +79,7 @@ def link(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
+    """Return the answer of the command for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry
 

@@ -91,6 +91,7 @@ def add_plan_parser(command_line: LineParser) -> None:
 
 
 def _algorithms_help() -> str:
+    """Return the help text that lists the algorithms."""
     from planner.search.algorithms import algorithm_lines
 
     return f"algorithms:\n{algorithm_lines()}"
@@ -156,6 +157,7 @@ def _plan_front(args: argparse.Namespace) -> int:
 
 
 def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
 

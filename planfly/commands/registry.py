@@ -43,6 +43,7 @@ class Command(NamedTuple):
         return self._load("add_{}_parser")
 
     def _load(self, name_format: str) -> Any:
+        """Return the function of the command's module whose name is `name_format` with the command's name."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, name_format.format(self.function or self.name))
 
@@ -135,7 +136,9 @@ def commands_with_json() -> list[str]:
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of a command's answer. Raises KeyError for a command without an answer.
+    """Return the JSON schema (draft 2020-12) of a command's answer.
+
+    Raises KeyError for a command without an answer.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']
@@ -152,7 +155,9 @@ def answer_schema(name: str) -> dict[str, Any]:
 
 
 def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the object schemas of an answer; there are several if options choose between several objects.
+    """Return the schemas of the objects that an answer may be.
+
+    There are several if the options choose between several objects.
 
     >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
     ['planfly.verdict/3', 'planfly.verdicts/1']

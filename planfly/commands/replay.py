@@ -104,7 +104,10 @@ def add_replay_parser(command_line: LineParser) -> None:
 
 
 def replay(args: argparse.Namespace) -> int:
-    """Show the instruments or the timeline, or replay as the options request; return 3 for an incomplete log."""
+    """Show the instruments or the timeline, or replay as the options request.
+
+    The exit code is 3 for an incomplete log.
+    """
     to_station = isinstance(args.to, str)
     if bool(args.foxglove) + bool(args.movie) + to_station > 1:
         options = "--foxglove, --movie, --to IP:PORT"

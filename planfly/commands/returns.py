@@ -80,7 +80,10 @@ def add_returns_parser(command_line: LineParser) -> None:
 
 
 def returns(args: argparse.Namespace) -> int:
-    """Judge every return; the exit code is 0 if all are safe, 4 if one is unsafe, and 3 if some are undecided."""
+    """Judge every return; return the exit code.
+
+    The exit code is 0 if all returns are safe, 4 if one is unsafe, and 3 if some are undecided.
+    """
     from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.returns, args)
@@ -117,13 +120,14 @@ def returns(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
+    """Return the answer of the command for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,
         ReturnsAnswer,
         glides_entry,
-        program_entry,
-        return_entry,
+        program_returns_entry,
+        return_range_entry,
         suggestion_entry,
     )
 
@@ -142,8 +146,8 @@ def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
         ],
         rtl_autoland=judged_returns.autoland,
         not_judged=list(judged_returns.unjudged_parts),
-        ranges=[return_entry(result, return_range) for return_range in judged_returns.ranges],
-        by_program=program_entry(result),
+        ranges=[return_range_entry(result, return_range) for return_range in judged_returns.ranges],
+        by_program=program_returns_entry(result),
         left_out=judged_returns.omitted_count,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),

@@ -67,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _json_answer(result: "RunResult", has_rounds: bool, code: int) -> object:
+    """Return the answer of the command for --json."""
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
     rounds = [

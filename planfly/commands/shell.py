@@ -7,7 +7,7 @@ import planfly
 from planfly.terminal.arguments import SHELLS, shell_script, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
-from planfly.terminal.options import add_json_option
+from planfly.terminal.options import add_json_and_quiet_options
 from planfly.terminal.output import write_json_if_requested
 from world.files import did_you_mean
 
@@ -80,6 +80,7 @@ def show_help(args: argparse.Namespace) -> int:
 
 
 def _report_bad_usage(reason: str) -> int:
+    """Print the reason why the usage is wrong, and return the exit code for bad input."""
     print(f"planfly help: {reason}", file=sys.stderr)
     return BAD_INPUT
 
@@ -91,7 +92,7 @@ def _report_bad_usage(reason: str) -> int:
 def add_scenarios_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly scenarios``."""
     parser = command_line.add_command("scenarios", "list the built-in scenarios, one line each", "planfly scenarios")
-    add_json_option(parser.add_group("results"), "scenarios")
+    add_json_and_quiet_options(parser.add_group("results"), "scenarios")
 
 
 def scenarios(args: argparse.Namespace) -> int:

@@ -63,7 +63,10 @@ def add_survey_parser(command_line: LineParser) -> None:
 
 
 def survey(args: argparse.Namespace) -> int:
-    """Judge every photo line; return 4 if one is not usable, otherwise the exit code of the verdict on the flight."""
+    """Judge every photo line; return the exit code.
+
+    The exit code is 4 if a photo line is not usable, otherwise that of the verdict on the flight.
+    """
     from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.survey, args)
@@ -111,6 +114,7 @@ def _camera_option(result: "SurveyResult") -> str:
 
 
 def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
+    """Return the answer of the command for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,

@@ -42,7 +42,7 @@ _TABLE_ROWS = 15
 
 
 def base_model(aircraft: Aircraft) -> BaseModel:
-    """Return the model values of an aircraft.
+    """Return the mass, inertia, aerodynamic coefficients and motor of an aircraft's JSBSim model.
 
     An electric motor modelled as in the Aerosonde, or a propeller disc modelled as in the Zagi and the X8, keeps its
     formulas; any other motor is tabulated.
@@ -61,7 +61,9 @@ def base_model(aircraft: Aircraft) -> BaseModel:
 
 
 def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
-    """Return the model values of an aircraft with varied properties; its motor is tabulated.
+    """Return the values of `base_model` for an aircraft with varied properties.
+
+    The motor of the result is always tabulated.
 
     Raises FlightError for an aircraft without steady flight at cruise.
     """
@@ -93,7 +95,7 @@ class _Probe:
         self._pressure_force = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def base_model(self, motor: Motor, *, has_torque_reaction: bool) -> BaseModel:
-        """Return the model's numbers with a motor.
+        """Return the values of the model, with `motor` as its motor.
 
         has_torque_reaction: True if the propeller's torque rolls the aircraft.
         """
@@ -111,7 +113,7 @@ class _Probe:
         )
 
     def motor_table(self) -> MotorTable:
-        """Return thrust, power and torque of the motor over airspeed and throttle, at the altitude of the trim."""
+        """Return a table of thrust, power and torque over airspeed and throttle at the trim's altitude."""
         fdm, aircraft = self._fdm, self._aircraft
         source = "prop" if aircraft.model.settles else "external"
         thrust, torque, density = (
@@ -136,7 +138,10 @@ class _Probe:
         )
 
     def coefficients(self) -> Coefficients:
-        """Return coefficients by central differences about the trim at closed throttle; the propeller may windmill."""
+        """Return the aerodynamic coefficients, by central differences at closed throttle.
+
+        The differences are about zero angle of attack.  The propeller may windmill.
+        """
         at_zero = self._coefficients_at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
@@ -184,21 +189,21 @@ class _Probe:
         )
 
     def _with_deflection(self, surface: int, deflection: float) -> Floats:
-        """Return the coefficients with one surface deflected, rad, at zero angle of attack."""
+        """Return the coefficients (6,) at zero angle of attack with one surface deflected, rad."""
         return self._coefficients_at(0.0, surfaces=deflection * np.eye(3)[surface])
 
     def _with_rate(self, axis: int, rate: float) -> Floats:
-        """Return the coefficients with one angular rate, rad/s, at zero angle of attack."""
+        """Return the coefficients (6,) at zero angle of attack with an angular rate (rad/s) about one axis."""
         return self._coefficients_at(0.0, rates=rate * np.eye(3)[axis])
 
     def _derivative(self, function: Callable[[float], Floats], step: float) -> Floats:
-        """Return the derivative of a function at 0 by a central difference."""
+        """Return the derivative (6,) of a function at 0 by a central difference."""
         return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
     def _coefficients_at(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return the coefficients of drag, lift, side force, roll, pitch and yaw moment at closed throttle, (6,).
+        """Return (6,): coefficients of drag, lift, side force, roll, pitch and yaw moment, at closed throttle.
 
         alpha, beta: angles of attack and sideslip, rad.
         rates: angular rates p, q, r, rad/s, zero by default.
@@ -244,7 +249,10 @@ def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:
 
 
 def read_motor(aircraft: Aircraft) -> Motor | None:
-    """Return the constants of a model's motor or propeller disc, or None for a motor model of another form."""
+    """Return the motor or propeller disc with the constants of a model.
+
+    Returns None for a motor model of another form.
+    """
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {function.get("name", ""): function for function in root.iter("function")}
@@ -256,7 +264,7 @@ def read_motor(aircraft: Aircraft) -> Motor | None:
 
 
 def _function_values(function: ElementTree.Element) -> list[float]:
-    """Return the constants of a JSBSim function, in the order of the file; NaN for an empty element."""
+    """Return the numbers in a JSBSim function, in the order of the file; NaN for an empty element."""
     return [float(value.text or "nan") for value in function.iter("v")]
 
 
@@ -317,7 +325,7 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
     )
 
 
-def scale_model(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
+def scale_base_model(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
     """Scale a model to another mass (kg), span (m) and wing area (m^2).
 
     Inertia scales with mass and span squared.  The chord keeps its ratio to area / span.  Induced drag is CL^2 divided

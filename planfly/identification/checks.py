@@ -36,7 +36,7 @@ _BLOCK_SECONDS = 30.0
 
 
 def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
-    """Raise LogError if the median voltage in flight is impossible for a battery of this nominal voltage.
+    """Raise LogError if the median voltage of a record is impossible for a battery of the nominal voltage.
 
     volts: nominal voltage of the battery, V.
     """
@@ -49,7 +49,10 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
 
 
 def check_commands(records: Sequence[FlightRecord]) -> None:
-    """Raise LogError for a log whose throttle never moves, or whose elevator or aileron hardly moves in turns."""
+    """Raise LogError for a log whose throttle never moves, or whose surfaces hardly move in turns.
+
+    The surfaces are elevator and aileron.
+    """
     for source in dict.fromkeys(record.source for record in records):
         parts = [record for record in records if record.source == source]
         controls = np.concatenate([part.controls for part in parts])
@@ -67,7 +70,10 @@ def check_commands(records: Sequence[FlightRecord]) -> None:
 
 
 def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
-    """Raise LogError if the logged battery power is not the power of the identified aircraft in these flights."""
+    """Raise LogError if a log's mean battery power differs too much from the identified aircraft's.
+
+    Without a logged current nothing is checked.
+    """
     if not estimate.with_current:
         return
     factors = (float(estimate.values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
@@ -89,7 +95,9 @@ def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseM
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
-    """Raise LogError for an implausible estimate: a reversed control, a value at its bound, or a changing mass.
+    """Raise LogError for an estimate with an implausible value.
+
+    Implausible are a reversed control, a lift slope or parameter beyond its limits, and a changing mass.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
@@ -128,7 +136,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
 
 
 def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
-    """Return the change of mass over all logs, as a fraction of the mass, and its standard deviation.
+    """Return the change of mass within the logs, as a fraction of the mass, and its standard deviation.
 
     An aircraft that burns fuel or drops a load needs an ever smaller angle of attack than its assumed mass requires.
     The change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above

@@ -73,11 +73,11 @@ class Identified:
 
     base: the aircraft from which the identification started.
     numbers: model values of the base, scaled to the aircraft.
-    draws: draws of the estimate, (512, n).
+    draws: parameter values of 512 aircraft drawn from the estimate, (512, n).
     logs: the logs used.
     outputs: the servo outputs.
     cruise: cruise airspeed, m/s, true.
-    until: end of the part of each log that was used, s of the log; None for the whole log.
+    until: time in each log from which rows were not used, s; None if all rows were used.
     """
 
     base: Aircraft
@@ -90,7 +90,7 @@ class Identified:
     until: float | None = None
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return the performance of the estimate, arrays (1,), and the performance of all draws, arrays (512,)."""
+        """Return the performance of the estimate, with arrays (1,), and of all draws, with arrays (512,)."""
         best, samples = (
             performance(self.numbers, values, self.cruise, DENSITY) for values in (self.estimate.values, self.draws)
         )
@@ -102,19 +102,25 @@ class Identified:
         return draw_drive_power(self.estimate, len(self.draws))
 
     def aircraft_draws(self) -> Draws:
-        """Return the draws as properties of the model, with the factor on battery power if no current was logged."""
+        """Return the draws as values of the model's properties.
+
+        If no current was logged, the factor on battery power is one of them.
+        """
         properties = tuple(parameter.property_name for parameter in PARAMETERS)
         if self.estimate.with_current:
             return Draws(properties, self.draws)
         return Draws((*properties, DRIVE_POWER), np.column_stack([self.draws, self.drive_power]))
 
     def power_conflict(self) -> PowerConflict | None:
-        """Return the conflict between the estimated drag and power in level flight, or None without a conflict."""
+        """Return the conflict between the estimated drag and power in level flight.
+
+        Returns None without a conflict.
+        """
         best, _ = self.performance()
         return power_conflict(float(best.drag[0]) * self.cruise, float(best.power[0]), self.numbers.mass)
 
 
-def make_identified(
+def make_identification(
     base: Aircraft,
     numbers: BaseModel,
     estimate: Estimate,
@@ -122,11 +128,13 @@ def make_identified(
     outputs: Mapping[str, ServoOutput],
     until: float | None = None,
 ) -> Identified:
-    """Return an identification: the estimate, 512 draws from it, and the cruise speed of the last log.
+    """Return an identification with 512 draws from its estimate.
+
+    The cruise speed is that of the last log.
 
     numbers: model values of the base, scaled to the aircraft.
     outputs: servo output of each control.
-    until: end of the used part of the logs, s, or None if all rows were used.
+    until: time in each log from which rows were not used, s; None if all rows were used.
     """
     cruise = _airspeeds(logs[-1], base)[0]
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise, until)
@@ -148,7 +156,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
         toml = folder / f"{name}.toml"
         toml.write_text(_metadata_text(identified, battery, 0.0), encoding="utf-8")
-        _check_level_flight(identified, read_aircraft(folder))
+        _check_level_flight_at_cruise(identified, read_aircraft(folder))
         envelope = load_envelope(read_aircraft(folder))
         min_speed, max_speed = envelope.level_speeds(0.0)
         toml.write_text(_metadata_text(identified, battery, min_speed, max_speed), encoding="utf-8")
@@ -163,14 +171,14 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
             mission = identification_mission(aircraft, envelope, *home)
             files["identify.waypoints"] = waypoints_text(mission)
     return files | {
-        **_parameter_file(identified),
+        **_parameter_file_text_by_name(identified),
         "ardupilot.toml": _servo_file_text(identified.outputs),
         "posterior.toml": posterior_text(identified),
         "draws.csv": draws_text(identified.aircraft_draws()),
     }
 
 
-def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
+def _check_level_flight_at_cruise(identified: Identified, aircraft: Aircraft) -> None:
     """Raise LogError, with the reason, if the identified model has no level flight at cruise."""
     if steady_flight(Fdm(aircraft), identified.cruise, AMSL) is not None:
         return
@@ -190,9 +198,11 @@ def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, minimum and maximum true airspeed at `AMSL`, m/s.
+    """Return cruise, minimum and maximum airspeed by a log's parameters, as true airspeeds at `AMSL`.
 
-    Values that the log does not state are taken from the base.  ArduPlane's parameters are equivalent airspeeds.
+    The unit is m/s.
+
+    Airspeeds that the log does not state are those of the base.  ArduPlane's parameters are equivalent airspeeds.
     """
     parameters = flown_parameters(log)
     ratio = math.sqrt(1.225 / DENSITY)
@@ -266,8 +276,11 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     return {name: value for name, value in flight_parameters.items() if not name.startswith(_HARDWARE_PREFIXES)}
 
 
-def _parameter_file(identified: Identified) -> dict[str, str]:
-    """Return ``ardupilot.parm`` and its text: the base's file for a log without parameters, if it has one."""
+def _parameter_file_text_by_name(identified: Identified) -> dict[str, str]:
+    """Return the text of ``ardupilot.parm`` by this file name, from the parameters of the last log.
+
+    For a log without parameters the base's file is copied; if the base has no such file, the result is empty.
+    """
     log, base_file = identified.logs[-1], identified.base.folder / AIRCRAFT_FILE
     parameters = flown_parameters(log)
     if not parameters:
@@ -294,7 +307,7 @@ def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
 
 
 def posterior_text(identified: Identified) -> str:
-    """Return the text of ``posterior.toml``."""
+    """Return the text of ``posterior.toml``: the estimated quantities, their correlation, and the logs."""
     estimate = identified.estimate
     _, samples = identified.performance()
     # Standard deviation of the logarithm; if it exceeds 1, nothing is known of the value.

@@ -63,7 +63,7 @@ def identification_mission(
 def _waypoints(
     aircraft: Aircraft, envelope: Envelope, base: float, repeats: int
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield east, north and altitude of each waypoint, m, and the airspeed on the leg to the waypoint, m/s.
+    """Yield east, north and altitude (m) of each waypoint, and the airspeed on the leg to it (m/s).
 
     base: altitude of the first waypoint, m AMSL.
     repeats: number of times that the sequence is flown.

@@ -77,7 +77,7 @@ _REQUIRED_PARTS = (
 
 
 def check_base(base: Aircraft) -> None:
-    """Raise FlightError, with a one-line message, if the base's model lacks a part that `identified_xml` needs."""
+    """Raise FlightError if the base's model lacks a part that `identified_xml` needs."""
     try:
         root = ElementTree.parse(base.model_file).getroot()
     except (OSError, ElementTree.ParseError) as error:
@@ -102,7 +102,10 @@ def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementT
 
 
 def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) -> None:
-    """Write the wing's dimensions, the moments of inertia and the mass into a model."""
+    """Set wing area, span, chord, moments of inertia and mass of a model.
+
+    base: aircraft of the model, for error messages.
+    """
     ixx, iyy, izz, ixz = numbers.inertia
     sizes = {
         "metrics/wingarea": (numbers.area, "M2"),
@@ -125,17 +128,20 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) ->
 
 
 def _factor_minus_one(name: str) -> str:
-    """Return the XML sum of a factor and -1."""
+    """Return the XML of the factor ``ident/NAME`` minus 1."""
     return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
 
 
 def _product_term(coefficient: float, *factors: str) -> str:
-    """Return the XML product of a coefficient and factors, which are XML themselves."""
+    """Return the XML product of a coefficient and of factors given as XML."""
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return JSBSim functions for the lift coefficient of the base and of the estimate, up to `_MAX_ALPHA_RAD`."""
+    """Return the JSBSim functions for the lift coefficients of the base and the estimate.
+
+    The angle of attack is clipped to plus or minus `_MAX_ALPHA_RAD`.
+    """
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
@@ -148,7 +154,9 @@ def _lift_functions(numbers: BaseModel) -> str:
 
 
 def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the JSBSim function that adds the estimated terms to an axis, or "" for an axis without such terms.
+    """Return the JSBSim function that adds the estimated terms to an axis.
+
+    Returns "" for an axis without estimated terms.
 
     drag, control: XML factors that the base applies to drag and to control deflections, or "".
     """
@@ -212,7 +220,7 @@ _AIR = "<p> motor/airspeed-mps </p>"
 
 
 def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[ElementTree.Element]) -> str:
-    """Return the text of ``<external_reactions>``, with the properties and the forces of motor and propeller."""
+    """Return the text of ``<external_reactions>``: properties, and forces of motor and propeller."""
     identified_text = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS

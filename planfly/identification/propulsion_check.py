@@ -40,7 +40,7 @@ class PowerConflict:
 
 
 def power_conflict(drag_power: float, power: float, mass: float) -> PowerConflict | None:
-    """Return a conflict if the identified drag needs more power than was identified, otherwise None.
+    """Return the conflict if the identified power is too small for the identified drag, otherwise None.
 
     drag_power: drag times airspeed in level flight, W.
     power: identified battery power in level flight, W.

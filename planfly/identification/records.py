@@ -1,4 +1,4 @@
-"""Resample the logged motion on one time grid, and select the stretches that an identification can use."""
+"""Resample the logged motion on one time grid, and select the segments that an identification can use."""
 
 import math
 from collections.abc import Mapping
@@ -22,9 +22,9 @@ AMPLE_HZ = 20.0
 MIN_SECONDS = 180.0
 # Minimum usable flight time of a log that only checks an estimate, s; a minute of flight has as much after its cuts.
 MIN_CHECK_SECONDS = 30.0
-# Minimum duration of a stretch, s.
+# Minimum duration of a segment, s.
 MIN_STRETCH = 30.0
-# Maximum pause between rows of the sensors within a stretch, s.
+# Maximum pause between rows of the sensors within a segment, s.
 _MAX_SENSOR_GAP_S = 0.5
 # Maximum pause between rows of airspeed or wind, which are logged more slowly, s.
 _MAX_AIR_GAP_S = 1.0
@@ -88,11 +88,11 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the segments of a log that an identification can use: flight on the wing, without lifting motors.
+    """Return the segments of wing-borne flight without gaps in the data, for an identification.
 
     servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
     min_seconds: minimum total duration of the segments, s.
-    until: end of the part that is used, s of the log.
+    until: time in the log from which rows are not used, s.
     Raises LogError, with a one-line message, for a log that cannot be used.
     """
     _check_usable(log)
@@ -112,14 +112,14 @@ def flight_records(
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
     height = _interpolate(log.height, grid)[:, 0]
-    ratio = _interpolate(log.ratio, grid)[:, 0] if len(log.ratio.time) else _airspeed_ratio(height)
+    ratio = _interpolate(log.ratio, grid)[:, 0] if len(log.ratio.time) else _true_airspeed_ratio(height)
     airspeed = _interpolate(log.airspeed, grid)[:, 0] * ratio
     inertial = _interpolate(log.inertial, grid)
     attitude = np.column_stack(
         [np.interp(grid, log.attitude.time, np.unwrap(angle)) for angle in log.attitude.values.T]
     )
     battery = _interpolate(log.battery, grid) if _has_current(log) else np.full((len(grid), 2), np.nan)
-    usable = _usable_rows(log, grid, airspeed / ratio, pulses) & (grid < until)
+    usable = _settled_flight_rows(log, grid, airspeed / ratio, pulses) & (grid < until)
     velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
     is_blocked = _blocked_airspeed_rows(airspeed, velocity[:, :2] - wind, attitude[:, 2])
     usable = _cut_blocked_rows(log, usable, is_blocked)
@@ -146,27 +146,28 @@ def flight_records(
 def _check_duration(
     log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, cut: bool
 ) -> None:
-    """Raise LogError for too little usable flight.
+    """Raise LogError if the segments are shorter in total than `min_seconds`.
 
-    until: end of the part that is used, s of the log.
+    until: time in the log from which rows are not used, s.
     cut: True if flight on lifting motors was cut.
     """
     seconds = sum(record.seconds for record in records)
     if seconds < min_seconds:
         vtol_note = "; flight on lifting motors is not used" if cut else ""
         until_note = f" before {until:g} s" if math.isfinite(until) else ""
-        message = f"only {seconds:.0f} s{until_note} are usable flight on the wing{vtol_note}"
+        message = f"only {seconds:.0f} s{until_note} are usable wing-borne flight{vtol_note}"
         allowed = f"at least {min_seconds:g} s are needed"
         if min_seconds == MIN_SECONDS:
             allowed += f" to identify an aircraft, and {MIN_CHECK_SECONDS:g} s to check one"
-        allowed += f", in stretches of at least {MIN_STRETCH:g} s without gaps"
+        allowed += f", in segments of at least {MIN_STRETCH:g} s without gaps"
         raise LogError(f"{log.source}: {message}: {allowed}", file=log.source, value=seconds, allowed=allowed)
 
 
 def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
-    """Return elevator, aileron, rudder, rad, and throttle, (n, 4).  pulses: pulses of the outputs, us, (n, m).
+    """Return the controls (n, 4) at the logged pulses: elevator, aileron, rudder (rad) and throttle.
 
     With elevons, elevator and aileron are half the sum and half the difference of the elevons.
+    pulses: pulses of the m servo outputs, (n, m) us.
     """
     controls = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
     if LEFT in controls:
@@ -177,9 +178,11 @@ def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> F
 
 
 def _fractions_to_controls(fractions: Floats, aircraft: Aircraft, angles: tuple[bool, bool, bool]) -> Floats:
-    """Convert fractions of full travel, or angles, to controls, rad and throttle, (n, 4).
+    """Convert logged fractions of full travel, or angles, to the model's controls (n, 4).
 
-    Full travel is the maximum deflection of the base aircraft.
+    The controls are elevator, aileron, rudder (rad) and throttle.  Full travel is the maximum deflection of the base
+    aircraft.
+    fractions: elevator, aileron, rudder and throttle of the log, (n, 4).
     angles: True for each surface whose values are angles, rad.
     """
     # Positive is nose up and yaw to the right; the model's elevator and rudder have the opposite sign.
@@ -231,7 +234,10 @@ _SERIES = {
 
 
 def _check_usable(log: MotionLog) -> None:
-    """Raise LogError for a log that no identification can use."""
+    """Raise LogError for a log that no identification can use.
+
+    These are logs of other vehicles, without a required series, and with a flap that moves in flight.
+    """
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
     series_names = _SERIES[log.program_kind]
@@ -258,13 +264,13 @@ def _check_usable(log: MotionLog) -> None:
                 raise LogError(f"{log.source}: {message}, but its effect is not modelled", file=log.source)
 
 
-def slowest_rows(log: MotionLog) -> float:
-    """Return the lower of two log rates, inertial sensors and surface commands, rows per second."""
+def slowest_log_rate(log: MotionLog) -> float:
+    """Return the lower of the log rates of inertial sensors and surface commands, Hz."""
     return min(log.inertial.rate, log.surface_commands.rate)
 
 
 def recording_setting(log: MotionLog) -> str:
-    """Return the parameter, with its value, that records sensors and outputs at a high rate."""
+    """Return the setting that records sensors and outputs at a high rate, such as "LOG_BITMASK 65535"."""
     if log.program_kind in _RECORDING_SETTINGS:
         return _RECORDING_SETTINGS[log.program_kind]
     return f"SDLOG_PROFILE {_HIGH_RATE_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_HIGH_RATE_BITMASK}"
@@ -290,7 +296,7 @@ def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
 
 
 def _servo_functions(log: MotionLog) -> dict[int, int]:
-    """Return SERVOn_FUNCTION for each output, or ArduPlane's defaults if the log has none."""
+    """Return SERVOn_FUNCTION by output number, or ArduPlane's defaults if the log has no such parameter."""
     functions = {
         k: int(log.parameters[f"SERVO{k}_FUNCTION"])
         for k in range(1, log.outputs.values.shape[1] + 1)
@@ -300,7 +306,10 @@ def _servo_functions(log: MotionLog) -> dict[int, int]:
 
 
 def _first_output(log: MotionLog, function: int) -> int:
-    """Return the number of the first output with a SERVOn_FUNCTION, or 0 without one."""
+    """Return the number of the first output whose SERVOn_FUNCTION is `function`.
+
+    Returns 0 if there is no such output.
+    """
     return next((number for number, output_function in _servo_functions(log).items() if output_function == function), 0)
 
 
@@ -355,7 +364,10 @@ def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
 
 
 def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return the minimum, trim and maximum pulse of an output, us, and its sign: -1 if the output is reversed."""
+    """Return the minimum, trim and maximum pulse (us) and the sign of an output.
+
+    The sign is -1 if the output is reversed, otherwise 1.
+    """
     value = log.parameters.get
     min_pulse, max_pulse = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
@@ -363,24 +375,24 @@ def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, flo
 
 
 def _time_grid(log: MotionLog) -> Floats:
-    """Return times at `GRID_HZ` over the period that all series cover, s, (n,)."""
+    """Return the times (n,) of the common grid, s: at `GRID_HZ` over the period that all series cover."""
     series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     start_time, end_time = max(samples.time[0] for samples in series), min(samples.time[-1] for samples in series)
     return np.arange(start_time, end_time, 1.0 / GRID_HZ)
 
 
 def _interpolate(samples: Samples, grid: Floats) -> Floats:
-    """Interpolate each column linearly at the times of the grid, (n, columns)."""
+    """Interpolate each column of the samples linearly at the times of the grid; return (n, columns)."""
     return np.column_stack([np.interp(grid, samples.time, column) for column in samples.values.T])
 
 
 def _hold_samples(samples: Samples, grid: Floats) -> Floats:
-    """Resample on the grid; each sample holds its value until the next sample."""
+    """Resample at the times of the grid, holding each sample until the next sample; return (n, columns)."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
 
 
-def _airspeed_ratio(amsl: Floats) -> Floats:
+def _true_airspeed_ratio(amsl: Floats) -> Floats:
     """Return the ratio of true to equivalent airspeed in the standard atmosphere.  amsl: altitude, m AMSL."""
     return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
 
@@ -391,7 +403,7 @@ def _has_current(log: MotionLog) -> bool:
 
 
 def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
-    """Flag the rows at which lifting motors ran or a VTOL mode was set."""
+    """Return a boolean mask (n,): True where lifting motors run or a VTOL mode is set."""
     rows = np.zeros(len(grid), np.bool_)
     for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:
@@ -404,8 +416,12 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
     return rows
 
 
-def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, pulses: Floats) -> Flags:
-    """Flag the rows in free flight on the wing, without gaps in sensors, airspeed or wind."""
+def _settled_flight_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, pulses: Floats) -> Flags:
+    """Return a boolean mask (n,): True in settled wing-borne flight without gaps in the data.
+
+    Gaps are pauses in sensors, surface commands, airspeed or wind.  The first `_SETTLING_TIME_S` of each segment are
+    False.
+    """
     min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_vtol_rows(log, grid, pulses)
     sensors = [
@@ -423,9 +439,11 @@ def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, puls
 
 
 def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
-    """Flag the windows in which the airspeed hardly varies although ground velocity minus wind does.
+    """Return a boolean mask (n,): True where the airspeed sensor is blocked.
 
-    air_velocity: ground velocity minus wind, to north and east, m/s, (n, 2).
+    In a window with a blocked sensor the airspeed hardly varies, although the ground velocity minus wind does.
+    air_velocity: ground velocity minus wind, to north and east, (n, 2) m/s.
+    heading: (n,) rad.
     """
     along = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
     length = round(_COMPARED_WINDOW_S * GRID_HZ)
@@ -439,7 +457,12 @@ def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floa
 
 
 def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags:
-    """Return the usable rows without those of a blocked airspeed sensor; raise LogError if these are too many."""
+    """Return `usable` with the rows of a blocked airspeed sensor set to False.
+
+    Raises LogError if too many usable rows are blocked.
+
+    is_blocked: True where the airspeed sensor is blocked, (n,).
+    """
     blocked_seconds, seconds = float((usable & is_blocked).sum()) / GRID_HZ, float(usable.sum()) / GRID_HZ
     if blocked_seconds > _MAX_BLOCKED_FRACTION * seconds:
         shown = f"hardly varies for {blocked_seconds:.0f} s of {seconds:.0f} s of flight"
@@ -449,7 +472,10 @@ def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags
 
 
 def _find_segments(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
-    """Return first row and end row of each run of True of at least a duration, s."""
+    """Return (first row, end row) of each run of True rows that lasts at least `min_duration`, s.
+
+    The end row is the first row after the run.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(begin, end) for begin, end in runs if end - begin >= min_duration * GRID_HZ]

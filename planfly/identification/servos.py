@@ -14,14 +14,21 @@ from world.files import read_toml
 
 @dataclass(frozen=True, slots=True)
 class ServoOutput:
-    """A servo output (from 1), and the control (rad, or fraction of full throttle) at its pulses (us, increasing)."""
+    """A servo output and the control that it moves.
+
+    output: number of the output, from 1.
+    pulse: pulse lengths, increasing, us.
+    value: control at each pulse, rad, or fraction of full throttle.
+    """
 
     output: int
     pulse: tuple[float, ...]
     value: tuple[float, ...]
 
     def control(self, pulses: Floats) -> Floats:
-        """Return the control at each pulse, constant beyond the end pulses, (n,).  pulses: (n,), us.
+        """Return the control (n,) at each of the pulses (n,), us.
+
+        Beyond the shortest and the longest pulse the control is constant.
 
         >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
         array([0.  , 0.25])
@@ -35,7 +42,9 @@ class ServoOutput:
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """Read a file of servo outputs, and return the output of each control (elevator, aileron, rudder, throttle).
+    """Read a file of servo outputs; return the output of each control, by name.
+
+    The controls are elevator, aileron, rudder and throttle.
 
     Raises FlightError for an invalid file.
 

@@ -26,12 +26,12 @@ def answer_requests() -> int:
     while True:
         unit = requested.get()
         try:
-            with_large_stack(functools.partial(run_unit, unit, _report))
+            with_large_stack(functools.partial(run_unit, unit, _print_line))
         except Exception:
             # The kernels of this unit are compiled later, where they are needed, and report their own errors there.
-            _report(f"failed {unit}")
+            _print_line(f"failed {unit}")
         else:
-            _report(f"done {unit}")
+            _print_line(f"done {unit}")
 
 
 def _queue_requests(requested: queue.Queue[str]) -> None:
@@ -41,8 +41,8 @@ def _queue_requests(requested: queue.Queue[str]) -> None:
     os._exit(0)
 
 
-def _report(line: str) -> None:
-    """Print a line for the process that started this one."""
+def _print_line(line: str) -> None:
+    """Print a line for the parent process."""
     print(line, flush=True)
 
 

@@ -19,7 +19,7 @@ from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.rtl.return_summary import return_summary, returns_line
-from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.problem import make_problem
@@ -77,41 +77,41 @@ def _make_scenario() -> Scenario:
     return scenario_from_spec(tomllib.loads(SCENARIO_TEXT), "field")
 
 
-def _make_world() -> tuple[Scenario, Airframe]:
-    """Return the small scenario and its airframe."""
+def _make_scenario_and_airframe() -> tuple[Scenario, Airframe]:
+    """Return the scenario of `_make_scenario` and its airframe."""
     scenario = _make_scenario()
     return scenario, load_airframe(scenario)
 
 
-def _make_problem() -> None:
+def _compile_problem_kernels() -> None:
     """Compile the kernels that prepare a planning problem."""
     scenario = _make_scenario()
-    aircraft, _ = find_airframe(scenario)
+    aircraft, _ = find_aircraft_and_energy(scenario)
     limits = make_limits(
         scenario, load_envelope(aircraft), aircraft.airspeed, math.radians(scenario.flight.max_bank_deg)
     )
     make_problem(scenario, limits)
 
 
-def _compute_tracking_error() -> None:
+def _compile_tracking_kernels() -> None:
     """Compile the kernels of ArduPlane's tracking error."""
     tracking_error(ArduPilotParameters.defaults(), load_aircraft("aerosonde").airspeed, "gnss")
 
 
-def _rank_scores() -> None:
+def _compile_rank_kernels() -> None:
     """Compile the kernels that rank the scores of paths."""
     best_first(np.zeros((SAMPLE_COUNT, SCORE_COLUMNS)))
 
 
-def _plan_part(part: str) -> None:
-    """Compile the kernels of one part of the planner."""
-    scenario, airframe = _make_world()
+def _compile_planner_kernels(part: str) -> None:
+    """Compile the kernels of one part of the planner.  part: a name in `PARTS`, or `FRONT`."""
+    scenario, airframe = _make_scenario_and_airframe()
     call_kernels(part, scenario, airframe.limits)
 
 
-def _fly_mission() -> None:
+def _compile_flight_kernels() -> None:
     """Compile the kernels that fly, judge and record a mission."""
-    scenario, airframe = _make_world()
+    scenario, airframe = _make_scenario_and_airframe()
     setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     flight = fly_and_judge(setup, airframe, None)
     returns_line(setup, flight.track)
@@ -120,26 +120,28 @@ def _fly_mission() -> None:
         recorder.finish(flight.ended, flight.verdict)
 
 
-def _judge_glides() -> None:
+def _compile_glide_kernels() -> None:
     """Compile the kernels that judge returns and glides."""
-    scenario, airframe = _make_world()
+    scenario, airframe = _make_scenario_and_airframe()
     setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     return_summary(setup, None).data_for_pictures()
 
 
 # Function of each unit by name.
 UNITS: dict[str, Callable[[], None]] = {
-    "problem": _make_problem,
-    "tracking": _compute_tracking_error,
-    "ranks": _rank_scores,
-    **{part: functools.partial(_plan_part, part) for part in (*PARTS, FRONT)},
-    "flight": _fly_mission,
-    "glides": _judge_glides,
+    "problem": _compile_problem_kernels,
+    "tracking": _compile_tracking_kernels,
+    "ranks": _compile_rank_kernels,
+    **{part: functools.partial(_compile_planner_kernels, part) for part in (*PARTS, FRONT)},
+    "flight": _compile_flight_kernels,
+    "glides": _compile_glide_kernels,
 }
 
 
 def run_unit(unit: str, report: Callable[[str], None]) -> None:
-    """Run a unit, which compiles its kernels; report ``ready KERNEL`` for each kernel that has been compiled.
+    """Run a unit, which compiles its kernels.
+
+    Calls `report` with ``ready KERNEL`` for each kernel that has been compiled.
 
     Raises KeyError for an unknown unit.
     """
@@ -156,7 +158,9 @@ def run_unit(unit: str, report: Callable[[str], None]) -> None:
 
 
 def is_ready(kernel: str) -> bool:
-    """Return True if a kernel has been compiled, or loaded from the cache, in this process.  kernel: "module.name".
+    """Return True if a kernel has been compiled, or loaded from the cache, in this process.
+
+    kernel: "module.name".
 
     >>> is_ready("world.terrain.steepest_slopes") in (True, False)
     True

@@ -143,7 +143,7 @@ PLANNING_AND_FLYING = (*_SHARED, "scores", "flight", "shortening", "routes", "ce
 
 
 def list_unit_kernels(units: tuple[str, ...]) -> frozenset[str]:
-    """Return the names of all kernels that some units compile.
+    """Return the names of all kernels that the given units compile.
 
     >>> len(list_unit_kernels(("scores", "paper")))
     13

@@ -83,7 +83,12 @@ class ServeOptions:
 
 @dataclass(frozen=True, slots=True)
 class ServedScenario:
-    """Scenario with its aircraft and seed, the initial mission, and the items of named fences."""
+    """Scenario in which a vehicle is served.
+
+    seed: seed of the turbulence.
+    mission: initial mission, or None to wait for an upload.
+    fence: items of the named fences, if there is no initial mission.
+    """
 
     scenario: Scenario
     airframe: Airframe
@@ -111,7 +116,7 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
 
 
 def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters of a scenario's autopilot, keyed by name, with stated values applied.
+    """Return the values of the autopilot's parameters by name, with `stated_values` applied.
 
     The cruise airspeed is the airspeed of the airframe.  Raises PlanflyError for values that are not allowed.
     """
@@ -122,8 +127,8 @@ def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float])
     return values | {cruise: airframe.airspeed} if cruise in values else values
 
 
-def fly_process(connection: Connection, options: ServeOptions) -> None:
-    """Fly missions on request until the connection closes; the main function of a flight process."""
+def run_flight_process(connection: Connection, options: ServeOptions) -> None:
+    """Fly missions on request until the connection closes: the main function of a flight process."""
     detects_parent_end = threading.Event()
     end_with_parent(detects_parent_end)
     factory = ServedFlights(options)
@@ -139,7 +144,7 @@ def fly_process(connection: Connection, options: ServeOptions) -> None:
 
 
 class ServedFlights:
-    """Judge missions in the served scenario, and log flights into the served folder."""
+    """Factory of a flight process, which judges missions in the served scenario and opens flight logs."""
 
     def __init__(self, options: ServeOptions) -> None:
         self._served = load_served_scenario(options)
@@ -151,7 +156,7 @@ class ServedFlights:
         self.speed = options.speed
 
     def warm_up(self) -> None:
-        """Fly and judge half a second, so that all kernels are compiled before a station sends a mission."""
+        """Fly and judge half a second of flight, to compile all kernels before a station sends a mission."""
         scenario = self._served.scenario
         points = np.linspace(scenario.start, scenario.destination, 3)
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
@@ -207,8 +212,9 @@ class ServedFlights:
     def prepare_diversion(self, request: DivertFlight, position: Floats) -> PreparedFlight:
         """Prepare a flight in another mode, which starts at the current position.
 
-        position: east, north and altitude, m, (3,).
-        The mission is flown from its first item in AUTO; RTL returns home; other modes loiter for `LOITER_DURATION_S`.
+        In AUTO the mission is flown from its first item, in RTL the aircraft returns home, and in other modes it
+        loiters for `LOITER_DURATION_S`.
+        position: east, north and altitude AMSL, (3,) m.
         """
         served_scenario = self._served
         lat, lon = (
@@ -232,7 +238,7 @@ class ServedFlights:
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":
-        """Open a log with the next free name ``flight-NNN.mcap``."""
+        """Open a log with the next free name ``flight-NNN.mcap``.  mode: mode of the flight, such as `AUTO`."""
         self._logs.mkdir(parents=True, exist_ok=True)
         number = 1
         while True:
@@ -246,7 +252,10 @@ class ServedFlights:
 
 
 def _loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem:
-    """Return a loiter around a center; values that the center does not state are taken from `current_item`."""
+    """Return the item of a loiter around `center`.
+
+    A position or an altitude that `center` does not state is taken from `current_item`.
+    """
     has_position = math.isfinite(center.lat_deg) and math.isfinite(center.lon_deg)
     item_at_altitude = (
         replace(current_item, frame=center.frame, alt=center.alt) if math.isfinite(center.alt) else current_item
@@ -271,7 +280,7 @@ class ServedLog:
         self._track_blocks: list[Track] = []
 
     def write(self, block: Track) -> None:
-        """Append rows, and flush them to the file."""
+        """Append the rows of a block to the log, and flush them to the file."""
         self._track_blocks.append(block)
         self._recorder.write(block)
         self._recorder.flush()
@@ -317,7 +326,7 @@ class ServedLog:
 
 
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts for stations: size of a mission, its verdict, and items that are not flown as written."""
+    """Return the texts on a mission for stations: its size, its geometric verdict, and notes on its route."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.positions[:, :2], axis=0), axis=1).sum()) / 1000.0
     size_text = StatusText(f"mission: {len(route.points)} waypoints, {length:.1f} km; {route.started}", INFO)
@@ -330,7 +339,7 @@ _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "surve
 
 
 def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts with the verdict on the flown part of a path that the aircraft left early.
+    """Return texts with the verdict on the flown part of a path that the aircraft left before its end.
 
     basis: basis of the verdict, such as "flown in GUIDED".
     """
@@ -345,7 +354,10 @@ def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[Sta
 
 
 def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts that describe a verdict, the worst finding first.  basis: basis of the verdict, such as "flown"."""
+    """Return texts that describe a verdict: its result, the deciding parameter, and the failed findings.
+
+    basis: basis of the verdict, such as "flown" or "geometry".
+    """
     failed_findings = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
         return (StatusText(f"verdict ({basis}): FLYABLE", INFO),)
@@ -356,7 +368,10 @@ def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
 
 
 def _finding_texts(findings: list[Finding]) -> list[StatusText]:
-    """Return a text for each of the first findings, and the number of the others."""
+    """Return a text for each of the first findings, then the number of other findings.
+
+    At most `_MAX_TEXTS_PER_VERDICT` findings are named.
+    """
     texts = [
         StatusText(f"{_finding_heading(finding)}: {finding.reason}", WARNING)
         for finding in findings[:_MAX_TEXTS_PER_VERDICT]
@@ -367,6 +382,9 @@ def _finding_texts(findings: list[Finding]) -> list[StatusText]:
 
 
 def _finding_heading(finding: Finding) -> str:
-    """Return the rule of a finding, with its place unless the text of the finding names the place."""
+    """Return the rule of a finding as text, with its place.
+
+    The place is left out if the reason of the finding names it.
+    """
     rule_name = rule_word(finding.rule)
     return rule_name if finding.placed else f"{rule_name} at {place_text(finding.place)}"

@@ -14,7 +14,7 @@ from flight.live.station_requests import vehicle_parameters
 from flight.live.telemetry import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
-from planfly.live.served_flights import ServedScenario, ServeOptions, autopilot_parameters, fly_process
+from planfly.live.served_flights import ServedScenario, ServeOptions, autopilot_parameters, run_flight_process
 from world.frames import to_geo
 from world.interruption import children_ignore_sigint, delay_signals, end_children
 from world.scenario import Scenario
@@ -55,7 +55,7 @@ def serve_vehicle(
 def _make_vehicle(
     link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
-    """Return the vehicle that stations see, without a mission.  speed: multiple of real time."""
+    """Return the vehicle for the stations, still without a mission.  speed: multiple of real time."""
     airframe = served_scenario.airframe
     autopilot_settings = airframe.autopilot.parameters
     parameters = vehicle_parameters(
@@ -93,7 +93,7 @@ class _FlightPool:
             child.join(timeout=0.0)
         self._children = [child for child in self._children if child.is_alive()]
         link_end, process_end = self._context.Pipe()
-        child = self._context.Process(target=fly_process, args=(process_end, self._options), daemon=True)
+        child = self._context.Process(target=run_flight_process, args=(process_end, self._options), daemon=True)
         with children_ignore_sigint(), delay_signals():
             child.start()
         process_end.close()
@@ -108,7 +108,8 @@ class _FlightPool:
 def standby_at_start(scenario: Scenario) -> Standby:
     """Return state and home of a vehicle without a mission.
 
-    The vehicle is at the scenario's start, with the course to the destination; home is on the ground there.
+    The vehicle is at the scenario's start and heads for the destination.  Home is on the ground below the start, or at
+    the altitude of the start without terrain.
     """
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))

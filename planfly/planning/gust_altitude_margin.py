@@ -79,7 +79,9 @@ class Shortfall(NamedTuple):
 
 
 def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
-    """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust: the given plan or another one.
+    """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust.
+
+    This is the given plan, or another plan that `search` finds.
 
     If no such plan is found, the given plan is returned as not safe, with the reason in its certificate.
 
@@ -94,10 +96,10 @@ def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None
     >>> ensure_altitude_margin(plan, airframe) is plan
     True
     """
-    if not plan.safe or not _gusts_matter(plan, airframe):
+    if not plan.safe or not _gusts_displace_aircraft(plan, airframe):
         return plan
-    if climb_problem := _climb_problem(plan, airframe):
-        return _with_problems(plan, [climb_problem])
+    if problem_text := _climb_problem_text(plan, airframe):
+        return _with_problems(plan, [problem_text])
     shortfalls = find_shortfalls(plan, airframe)
     if not shortfalls:
         return plan
@@ -108,8 +110,8 @@ def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None
     return _with_problems(plan, [_shortfall_text(shortfall, plan, airframe) for shortfall in shortfalls])
 
 
-def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if gusts may displace the aircraft by more than its tracking error."""
+def _gusts_displace_aircraft(plan: Plan, airframe: Airframe) -> bool:
+    """Return True if gusts may displace an aircraft that has no climb or sink rate in reserve."""
     return any(
         displacement(0.0, plan.scenario.wind.turbulence)
         for _, displacement in _gust_displacements(plan.scenario, airframe.autopilot)
@@ -119,9 +121,10 @@ def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the kinds of gusts that matter, each with a function that computes the altitude displacement, m.
+    """Return the kinds of gusts to consider, each with the function for its altitude displacement, m.
 
-    The function's arguments are the climb or sink rate that the aircraft holds in reserve, m/s, and the turbulence.
+    The function's arguments are the climb or sink rate that the aircraft holds in reserve (m/s) and the turbulence.
+    Updrafts are considered only if the scenario has zones or a maximum height.
     """
     deviations = autopilot.deviations
     displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", deviations.gust_sink)]
@@ -137,8 +140,10 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
-def _climb_problem(plan: Plan, airframe: Airframe) -> str:
-    """Return a problem if the aircraft climbs too slowly for any margin against downdrafts, otherwise "".
+def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
+    """Return the problem of an aircraft that climbs too slowly for any margin against downdrafts.
+
+    Returns "" otherwise.
 
     With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, more downdrafts arrive before the aircraft has climbed back.
     Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none
@@ -159,7 +164,9 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
 
 
 def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
-    """Search for a plan with the altitude margin that gusts need; return None if none is found.
+    """Search for a plan without shortfalls, within limits that leave climb and sink rate unused.
+
+    Returns None if no such plan is found.
 
     shortfalls: shortfalls of the given plan.
     """
@@ -194,7 +201,12 @@ def _with_margin_at_threats(limits: Limits) -> Limits:
 
 
 def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
-    """Return True if a plan raised by `height_change`, m, exceeds the ceiling or the maximum height."""
+    """Return True if a plan raised by `height_change` (m) exceeds the ceiling or the maximum height.
+
+    The result is False for 0 m.
+
+    The ends of the plan are not raised, unless it has no other waypoints.
+    """
     if not height_change:
         return False
     scenario, inner_points = plan.scenario, plan.waypoints[1:-1]
@@ -230,10 +242,10 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
     return limits
 
 
-def limits_of_alternatives(plan: Plan, airframe: Airframe) -> Limits:
+def limits_for_alternatives(plan: Plan, airframe: Airframe) -> Limits:
     """Return search limits for alternatives to a safe plan: the tightest limits that this plan meets."""
     limits = airframe.limits.with_margin()
-    if not _gusts_matter(plan, airframe):
+    if not _gusts_displace_aircraft(plan, airframe):
         return limits
     for unused_fraction in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
         gust_limits = limits_in_gusts(plan, airframe, unused_fraction)
@@ -247,13 +259,13 @@ def limits_of_alternatives(plan: Plan, airframe: Airframe) -> Limits:
 
 
 class _Parts(NamedTuple):
-    """Path cut into parts near its ends.
+    """Path whose legs are cut into short parts near its ends, with the altitude margin that gusts need.
 
     gust: the kind of gusts.
-    points: ends of the parts, (p, 3), m.
+    points: ends of the parts, (p, 3) m.
     legs: leg of each part, (p - 1,).
-    margin_before, margin_after: altitude that a gust may cost or add at each point, in the part that ends there and in
-    the part that starts there, (p,), m.
+    margin_before: margin at each point for the part that ends there, (p,) m.
+    margin_after: margin at each point for the part that starts there, (p,) m.
     """
 
     gust: Gust
@@ -264,9 +276,9 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find for each kind of hazard the place where a gust displaces the aircraft deepest into it.
+    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard.
 
-    Hazards are the required clearance, the maximum height, missiles and zones; only displacements into them are
+    Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
     """
     limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
@@ -298,11 +310,15 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
 
 
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
-    """Cut the legs near the ends of a path into short parts, except within turns, because the margin grows there.
+    """Cut the legs near the ends of a path into short parts.
 
-    waypoints: (w, 3), m.
-    margins: altitude that gusts may cost or add on each leg, (w - 1,), m.
-    end_margins: margin needed at the ends, (2,), m.
+    The needed margin grows with the distance from the end there.
+
+    Legs are not cut within turns.
+
+    waypoints: (w, 3) m.
+    margins: altitude that gusts may cost or add on each leg, (w - 1,) m.
+    end_margins: margin needed at both ends of the path, (2,) m.
     """
     ends = waypoints[[0, -1]]
     tangents = turn_tangents(problem.certified.aircraft, waypoints) * _TANGENT_RATIO
@@ -332,7 +348,10 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Return for both ends of a path the name, the height above ground (m) and the index of the point."""
+    """Return (name, height above ground in m, index of the point) for both ends of a path.
+
+    The result is empty without terrain.
+    """
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
@@ -341,7 +360,10 @@ def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, 
 
 
 def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a downdraft below the required clearance."""
+    """Return the deepest displacement by a downdraft into the required clearance.
+
+    The depth is 0 m if no displacement reaches into the clearance.
+    """
     data = problem.certified
     hazard_text = f"into the clearance of {data.clearance:g} m"
     for name, height, index in _heights_at_ends(problem, parts):
@@ -363,7 +385,12 @@ def _clearance_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _max_height_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the highest displacement by an updraft above the maximum height, or None without a maximum height."""
+    """Return the place where an updraft lifts the aircraft highest above ground.
+
+    Returns None without a maximum height.
+
+    The depth is the height above the maximum height, negative if the aircraft stays below.
+    """
     data, max_height = problem.certified, problem.certified.airspace.max_height
     if max_height == math.inf:
         return None
@@ -399,7 +426,10 @@ def _missile_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
-    """Return the deepest displacement by a gust into an exclusion zone or out of an inclusion zone, or None."""
+    """Return the deepest displacement by a gust into or out of a zone, or None.
+
+    A gust may displace the aircraft into an exclusion zone or out of an inclusion zone.
+    """
     data = problem.certified
     if not is_limited(data.airspace) or not problem.scenario.zones:
         return None
@@ -415,7 +445,10 @@ def _zone_shortfall(problem: Problem, parts: _Parts) -> Shortfall | None:
 
 
 def _gust_paths(parts: _Parts) -> list[Floats]:
-    """Return paths (p, 3) displaced by gusts, in steps up to the full displacement, so that no hazard is missed."""
+    """Return paths (p, 3) displaced by gusts in steps, up to the full displacement.
+
+    A step is at most `_HEIGHT_STEP_M` high, so that no hazard is missed.
+    """
     margins = np.maximum(parts.margin_before, parts.margin_after)
     step_count = max(1, math.ceil(float(margins.max()) / _HEIGHT_STEP_M))
     displacement = np.array([0.0, 0.0, -1.0 if parts.gust == "downdrafts" else 1.0]) * margins[:, None]

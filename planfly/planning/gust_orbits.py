@@ -66,11 +66,11 @@ def limit_waypoint_orbits(
         has_usual_count = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return (
             plan
-            if has_usual_count or _is_accepted(plan, airframe)
-            else _with_problem(plan, _corridor_problem(plan, airframe))
+            if has_usual_count or _is_safe_in_gusts(plan, airframe)
+            else _with_problem(plan, _corridor_problem_text(plan, airframe))
         )
     shorter_plan = plan if keeps_waypoints else drop_waypoints(plan, limits if search_limits is None else search_limits)
-    if _is_accepted(shorter_plan, airframe):
+    if _is_safe_in_gusts(shorter_plan, airframe):
         return shorter_plan
     remaining_orbits, count = expected_orbits(shorter_plan, autopilot, limits), len(shorter_plan.waypoints) - 2
     if search is not None:
@@ -78,9 +78,9 @@ def limit_waypoint_orbits(
         allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / remaining_orbits)), plan.scenario
         planner_table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})
         other_plan = replace(search(replace(scenario, planner=planner_table)), scenario=scenario)
-        if other_plan.safe and _is_accepted(other_plan, airframe):
+        if other_plan.safe and _is_safe_in_gusts(other_plan, airframe):
             return other_plan
-    return _with_problem(plan, _orbit_problem(plan, autopilot, limits))
+    return _with_problem(plan, _orbit_problem_text(plan, autopilot, limits))
 
 
 def _with_problem(plan: Plan, problem: str) -> Plan:
@@ -89,8 +89,11 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
 
-def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
-    """Return True if few enough orbits are expected, and the aircraft stays in the corridor at every corner."""
+def _is_safe_in_gusts(plan: Plan, airframe: Airframe) -> bool:
+    """Return True if a plan has few enough expected orbits, and its corners stay in the corridor.
+
+    At most `MAX_EXPECTED_ORBITS` are accepted.
+    """
     if expected_orbits(plan, airframe.autopilot, airframe.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_corner_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
@@ -102,7 +105,10 @@ def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
 
 
 def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
-    """Return the distance from the legs at each corner in gusts, m; empty if unknown."""
+    """Return the largest distance from the legs at each corner in gusts, m.
+
+    The result is empty without a tracking error.
+    """
     limits = airframe.limits
     if (tracking := limits.tracking) is None:
         return []
@@ -113,8 +119,8 @@ def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
     ]
 
 
-def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
-    """Describe the corner at which the aircraft leaves the corridor most."""
+def _corridor_problem_text(plan: Plan, airframe: Airframe) -> str:
+    """Return the problem text on the corner with the largest distance from the legs."""
     excursions = _corner_excursions(plan, airframe)
     max_excursion = max(excursions)
     return (
@@ -141,7 +147,9 @@ def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
 
 
 def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
-    """Return the maximum number of waypoints, including the ends, for alternatives to a safe plan in level flight.
+    """Return the maximum number of waypoints, including the ends, for alternatives to a safe plan.
+
+    The probability of an orbit is that of level flight.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -159,8 +167,11 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / probability)))
 
 
-def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Describe the orbits that make a plan unsafe in its turbulence, and a remedy."""
+def _orbit_problem_text(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
+    """Return the problem text on the expected orbits of a plan, with a remedy.
+
+    The remedy is a parameter value, or less turbulence.
+    """
     count, name = len(plan.waypoints) - 2, autopilot.deviations.altitude_parameter
     orbits = expected_orbits(plan, autopilot, limits)
     radius = first_that_passes(

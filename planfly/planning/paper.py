@@ -69,7 +69,10 @@ class SeededPlan:
 
     @property
     def safe(self) -> bool:
-        """True if safe by the paper's definition, without violation or kill exposure on its six points per leg."""
+        """True if the plan is safe by the paper's definition.
+
+        It has no violation and no kill exposure on its six points per leg.
+        """
         return not any(self.violations) and self.objectives.kill_exposure == 0.0
 
 
@@ -107,12 +110,14 @@ def problem_name(threats: int) -> str:
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return the probability of a kill or detection on a path, from independent chances at points of its legs.
+    """Return the probability of a kill or detection on a path.
 
-    The chance at distance d from a unit in reach is (scale / d)^4, at most 1, at each of six points of a leg.  The
-    paper's sums (eq. 9, 10) over the same points have no upper bound.
+    The points of the path, six per leg, are treated as independent.
 
-    waypoints: (w, 3), m.
+    The probability at a point is min(1, (scale / d)^4) for a threat at distance d within its radius.  The paper's sums
+    (eq. 9, 10) over the same points have no upper bound.
+
+    waypoints: (w, 3) m.
     kind: "kill" or "detection".
     """
     fractions = np.arange(6)[:, None] / 6.0
@@ -129,7 +134,7 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
-    """Plan a problem of the paper once, and return the values for tables and figures.
+    """Plan a problem of the paper with one seed, and return the values for tables and figures.
 
     threats: number of threats, which names the problem.
     algorithm: name of a planner, or `STRIP_ALGORITHM`.
@@ -198,7 +203,10 @@ def usable_cores() -> int:
 
 
 def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:
-    """Yield the results in the order of the tasks; the first task runs in this process, to compile the kernels."""
+    """Yield the plan of each task (threats, algorithm, seed), in order, made in `count` processes.
+
+    The first task runs in this process, to compile the kernels.
+    """
     yield plan_once(*tasks[0])
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
@@ -225,8 +233,8 @@ def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
     return plan_once(*task)
 
 
-def make_table(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """Make the table of the paper, with one row for each problem and algorithm, in the order of planning."""
+def summarise_plans(plans: Sequence[SeededPlan]) -> list[TableRow]:
+    """Return the rows of the paper's table, one for each problem and algorithm, in the order of planning."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for seeded_plan in plans:
         groups.setdefault((seeded_plan.threats, seeded_plan.algorithm), []).append(seeded_plan)
@@ -256,11 +264,10 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
 
 
 def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
-    """Return a value of each plan, (n,).  value: function that computes it."""
+    """Return a value of each plan, (n,).  value: function that computes the value of a plan."""
     return np.array([value(seeded_plan) for seeded_plan in group])
 
 
-# ----------------------------------------------------------------------
 # ----------------------------------------------------------------------
 # Print the table on the terminal, and write JSON, CSV and figures into a folder.
 
@@ -269,14 +276,17 @@ PAPER_SCHEMA = "planfly.planning.paper/1"
 TABLE_FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
 
 
-def file_names(problems: Sequence[int]) -> list[str]:
-    """Return the names of all files that a run writes for some problems.  problems: numbers of threats."""
+def paper_file_names(problems: Sequence[int]) -> list[str]:
+    """Return the names of all files that are written for the given problems.
+
+    problems: numbers of threats.
+    """
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
     return [*TABLE_FILES, *pictures]
 
 
 def table_text(rows: Sequence[TableRow]) -> str:
-    """Format the table for a terminal."""
+    """Return the paper's table as text for a terminal."""
     header = (
         f"{'threats':>7}  {'algorithm':<15}{'safe':>7}{'certified':>11}  {'PLR median':>10}  {'worst':>6}"
         f"  {'PKill median':>12}  {'worst':>6}  {'PRD median':>10}  {'CPU s':>6}"
@@ -303,7 +313,10 @@ def _number_text(value: float | None, digits: int) -> str:
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """Write the tables of a run: table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv."""
+    """Write the tables of a run.
+
+    They are table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv.
+    """
     columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
     write_atomically(
         folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows))
@@ -362,7 +375,7 @@ _PLAN_COLUMNS = [
 
 
 def _csv_text(columns: Sequence[str], rows: Any) -> str:
-    """Return CSV text with a header."""
+    """Return CSV text with a header of column names.  rows: lists of values in the order of the columns."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
@@ -442,11 +455,11 @@ def paper_tables(
         check_output_folder(folder, overwrite)
     with stage("planning", "planning the paper's problems") as advance:
         plans = plan_section(problems, runs, algorithm, jobs, advance)
-    rows = make_table(plans)
+    rows = summarise_plans(plans)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         with lock_path(folder):
-            prepare_folder(folder, tuple(file_names(PROBLEMS)))
+            prepare_folder(folder, tuple(paper_file_names(PROBLEMS)))
             write_tables(folder, rows, plans)
             with stage("drawing", "drawing the paper's figures"):
                 write_figures(folder, plans)

@@ -1,6 +1,6 @@
 """Plan a Pareto front for a scenario, with the default plan of every command and alternatives."""
 
-from planfly.planning.gust_altitude_margin import limits_of_alternatives
+from planfly.planning.gust_altitude_margin import limits_for_alternatives
 from planfly.planning.gust_orbits import max_waypoints_in_gusts
 from planfly.workflow.airframe import Airframe
 from planfly.workflow.make_plan import Advance, finish_plan, make_plan
@@ -29,17 +29,17 @@ def make_pareto_plans(
     """
     default_plan = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
 
-    def finish(plan: Plan) -> Plan:
+    def finish_alternative(plan: Plan) -> Plan:
         return finish_plan(plan, airframe, continues=continues)
 
     return plan_front(
         scenario,
-        limits_of_alternatives(default_plan, airframe),
+        limits_for_alternatives(default_plan, airframe),
         count,
         seed=seed,
         progress=advance,
         stop=stop,
         default=default_plan,
         waypoints=max_waypoints_in_gusts(default_plan, airframe),
-        finish=finish,
+        finish=finish_alternative,
     )

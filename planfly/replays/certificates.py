@@ -9,7 +9,7 @@ _VALID_UNTIL = datetime(9999, 12, 31, tzinfo=UTC)
 
 
 class Certificate(NamedTuple):
-    """A self-signed certificate and its private key, as PEM text.
+    """A self-signed TLS certificate and its private key, as PEM text.
 
     Both exist in the memory of the run's processes, and, for the moment in which Python's TLS loads them, in a
     temporary folder that only their user can read.
@@ -20,7 +20,9 @@ class Certificate(NamedTuple):
 
 
 def temporary_certificate() -> Certificate:
-    """Return a new self-signed certificate for ``localhost`` with a new private key (elliptic curve P-256).
+    """Return a new self-signed certificate for ``localhost``, with a new private key.
+
+    The key is on the elliptic curve P-256.
 
     >>> one, other = temporary_certificate(), temporary_certificate()
     >>> one.certificate.splitlines()[0], one.key == other.key

@@ -65,7 +65,7 @@ def play_to_foxglove(
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the Foxglove server behind a gate that checks the origin of each page.
+    """Start the Foxglove server behind a gate that checks the origin of each page, and return the server.
 
     No page can bypass the gate, because no browser trusts the certificate of the server.
     """
@@ -88,7 +88,10 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
 
 
 def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, should_stop: ShouldStop) -> None:
-    """Wait for the first subscriber.  Raises FlightError after `timeout` seconds; None waits without limit."""
+    """Wait for the first subscriber, or until `should_stop` returns True.
+
+    Raises FlightError after `timeout` seconds; None waits without limit.
+    """
     clock = RunningClock()
     while not broadcast.listeners and not should_stop():
         if timeout is not None and clock() > timeout:
@@ -132,7 +135,10 @@ def _play_messages(
 
 
 class _Broadcast:
-    """Topics of the log, the newest message of each scene, and the subscribers, as a listener of Foxglove's server."""
+    """Listener of Foxglove's server, which sends the messages of a log to the subscribers of their topics.
+
+    It stores the newest message of each scene for clients that subscribe later.
+    """
 
     def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
         self.context = foxglove.Context()
@@ -152,7 +158,7 @@ class _Broadcast:
         self._waiting: list[tuple[float, str]] = []
 
     def record_scenes_until(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
-        """Keep the newest scene of each topic before `start_ns`, and return the remaining messages."""
+        """Store the newest scene of each topic before `start_ns`, and return the messages from `start_ns` on."""
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)
@@ -168,7 +174,7 @@ class _Broadcast:
             channel.log(message.data, log_time=message.log_time)
 
     def serve_new_subscribers(self) -> None:
-        """Send the current scenes to new subscribers."""
+        """Send the newest scenes to the subscribers whose subscription has just become active."""
         while not self._arrivals.empty():
             self._waiting.append(self._arrivals.get())
         now = time.monotonic()
@@ -181,12 +187,12 @@ class _Broadcast:
         ]
 
     def _record_scene(self, message: LogMessage) -> None:
-        """Keep a message if it contains a scene, for clients that subscribe later."""
+        """Store a message as the newest scene of its topic; other messages are ignored."""
         if message.channel.topic.startswith(("/scene/", "/points/")):
             self._scenes[message.channel.topic] = message
 
     def on_subscribe(self, client: Any, channel: Any) -> None:
-        """Record a new subscriber of a topic."""
+        """Record a new subscriber of a topic; called in a thread of the server."""
         self._arrivals.put((time.monotonic(), channel.topic))
         self.listeners += 1
 

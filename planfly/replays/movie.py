@@ -35,7 +35,9 @@ SUFFIXES = (".gif", ".mp4")
 def write_movie(
     log: FlightLog, target: Path, start: float, end: float, *, speed: float | None, overwrite: bool
 ) -> list[Path]:
-    """Write a .gif or .mp4 file, or a folder of frame-0000.png and so on.
+    """Write a film of a flight as a .gif or .mp4 file, or as a folder of frame-0000.png and so on.
+
+    Returns the files.
 
     start, end: start and end in flight time, s.
     speed: multiple of real time; None for a film of 20 s.
@@ -55,12 +57,12 @@ def write_movie(
         allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,}; raise `speed`"
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
-        return _write_folder(target, film)
+        return _write_frame_files(target, film)
     write_atomically(target, _encode_gif(film) if kind == ".gif" else _encode_mp4(film, program))
     return [target]
 
 
-def _draw_frames(film: MovieFrames) -> Iterator[Image.Image]:
+def _yield_frames(film: MovieFrames) -> Iterator[Image.Image]:
     """Yield the frames of a film as images, and report the progress."""
     with stage("drawing", "drawing frames") as advance:
         for number, frame in enumerate(film.frames(), 1):
@@ -68,13 +70,13 @@ def _draw_frames(film: MovieFrames) -> Iterator[Image.Image]:
             advance(number, len(film), f"frame {number} of {len(film)}")
 
 
-def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
-    """Write each frame to a file, and remove old frames."""
+def _write_frame_files(folder: Path, film: MovieFrames) -> list[Path]:
+    """Write each frame to a file, after removing old frames, and return the files."""
     folder.mkdir(parents=True, exist_ok=True)
     for old_file in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
         old_file.unlink()
     files = []
-    for number, image in enumerate(_draw_frames(film)):
+    for number, image in enumerate(_yield_frames(film)):
         data = io.BytesIO()
         image.save(data, "PNG")
         files.append(folder / f"frame-{number:04d}.png")
@@ -83,7 +85,9 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
 
 
 def _make_palette(frame: Image.Image) -> Image.Image:
-    """Return an image with a palette for all frames: the exact drawing colours, and the main other colours.
+    """Return an image whose palette serves all frames.
+
+    It has the exact drawing colours, and the main colours of `frame`.
 
     If colors were chosen only by area, thin lines and small marks would get the colors of the ground.
     """
@@ -99,7 +103,10 @@ def _make_palette(frame: Image.Image) -> Image.Image:
 
 
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
-    """Return a frame with its colours replaced by the nearest colours of a palette, without transparent pixels."""
+    """Return a frame with its colours replaced by the nearest colours of a palette.
+
+    The result has no transparent pixels.
+    """
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
     opaque = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))
@@ -108,8 +115,11 @@ def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
 
 
 def _encode_gif(film: MovieFrames) -> bytes:
-    """Encode a film as GIF; all frames have the same colours, and each contains only the changed pixels."""
-    images = _draw_frames(film)
+    """Encode a film as GIF with one palette.
+
+    Each frame contains only the pixels that differ from the frame before.
+    """
+    images = _yield_frames(film)
     first_frame = next(images)
     palette = _make_palette(first_frame)
     first_image = _apply_palette(first_frame, palette)
@@ -137,7 +147,10 @@ def _encode_gif(film: MovieFrames) -> bytes:
 
 
 def _find_ffmpeg(target: Path) -> str:
-    """Return the path of ffmpeg, installed or from the extra `films`.  Raises MissingExtraError without either."""
+    """Return the path of ffmpeg, installed or from the extra `films`.
+
+    Raises MissingExtraError without either.
+    """
     program = shutil.which("ffmpeg")
     if program is not None:
         return program
@@ -148,7 +161,12 @@ def _find_ffmpeg(target: Path) -> str:
 
 
 def _encode_mp4(film: MovieFrames, program: str) -> bytes:
-    """Encode a film as MP4 with ffmpeg, which reads raw pixels.  Raises OSError with ffmpeg's last line if it fails."""
+    """Encode a film as MP4 with ffmpeg.
+
+    Raises OSError with the last line of ffmpeg's output if ffmpeg fails.
+
+    program: path of ffmpeg.
+    """
     frames = film.frames()
     first_frame = next(frames)
     height, width = first_frame.shape[:2]

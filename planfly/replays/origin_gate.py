@@ -59,7 +59,10 @@ def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
 
 
 def _header_text(values: list[str]) -> str:
-    """Format the values of a header for a terminal, without control characters."""
+    """Return the values of a header as text for a terminal, without control characters.
+
+    Without values the text is "no host".
+    """
     return ascii(", ".join(values))[1:-1][:_MAX_REPORTED_LENGTH] or "no host"
 
 

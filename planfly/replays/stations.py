@@ -72,7 +72,7 @@ def play_to_stations(
 
 
 class _Player:
-    """Telemetry of a log, without a vehicle behind it."""
+    """Sender of a log's telemetry to ground stations, in place of a vehicle."""
 
     def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
         self._link, self._status, self._on_message = link, status, on_message
@@ -101,7 +101,7 @@ class _Player:
             self.step(0.02)
 
     def step(self, pause: float) -> None:
-        """Handle messages from the ground stations, send the messages that are due, and sleep for `pause` seconds."""
+        """Handle messages from the stations, send the messages that are due, and sleep for `pause` seconds."""
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._start_time, time.time()
         self._link.receive()

@@ -32,12 +32,12 @@ _SLOPE_DELAY_S = 3.0
 
 
 class NearestApproaches(NamedTuple):
-    """Nearest approaches of a path to ground and missiles.
+    """Closest points of a path to the ground and to missiles.
 
     clearance: minimum height above ground, m; NaN if unknown.
     lowest_position: position of this minimum, (3,), m.
-    outside: minimum distance outside a kill sphere, m; inf without missiles.
-    threat: index of this threat, -1 without missiles.
+    outside: minimum distance from the surface of a kill sphere, negative inside, m; inf without missiles.
+    threat: index of the threat with this sphere, -1 without missiles.
     """
 
     clearance: float
@@ -47,7 +47,9 @@ class NearestApproaches(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Simulate a return in JSBSim; return its minimum height above ground and minimum distance from kill spheres, m.
+    """Simulate a return in JSBSim.
+
+    Returns its minimum height above ground and its minimum distance from kill spheres, m.
 
     The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  Returns None for a
     return that cannot be flown.
@@ -62,14 +64,16 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     position = positions_from_start(flight.track, start)
     if position is None:
         return None
-    approach = nearest_approaches(world, position)
+    approach = find_nearest_approaches(world, position)
     return (min(0.0, approach.clearance) if flight.ended == "ground contact" else approach.clearance), approach.outside
 
 
 def return_setup(
     world: ReturnWorld, start: Record, landing: LandingStart | None = None
 ) -> tuple[FlightSetup, Airframe]:
-    """Make setup and airframe of a return by the simulated ArduPlane, in the mean wind, with a lead-in to its start.
+    """Make setup and airframe of a return, with a lead-in, flown by the simulated ArduPlane.
+
+    The flight is in the mean wind, without turbulence and navigation error.
 
     landing: the landing sequence that ends the return, or None.
     Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_airframe`.
@@ -80,7 +84,7 @@ def return_setup(
 
 
 def positions_from_start(track: Track, start: Record) -> Floats | None:
-    """Return the positions of a flight from the start of the return to the end, (t, 3), m.
+    """Return the positions (t, 3) of a flight from the start of the return to the end, m.
 
     Returns None if the flight does not reach the start of the return.
     """
@@ -92,8 +96,11 @@ def positions_from_start(track: Track, start: Record) -> Floats | None:
     return None if abs(float(positions[0, 2]) - float(start["up"])) > _MAX_START_HEIGHT_ERROR_M else positions
 
 
-def nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproaches:
-    """Find the points of a path that are closest to the ground and to missiles.  positions: path points, (t, 3), m."""
+def find_nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproaches:
+    """Find the points of a path that are closest to the ground and to missiles.
+
+    positions: path points, (t, 3) m.
+    """
     clearance, lowest_position = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
         heights = positions[:, 2] - world.scenario.terrain.height(positions[:, 0], positions[:, 1])
@@ -112,7 +119,10 @@ def nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproach
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """Make a mission that flies through the start of a return, on the same course and slope, and then commands RTL."""
+    """Make a mission that flies through the start of a return and then commands RTL.
+
+    It passes the start on the course and slope of the flight there.
+    """
     east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     ground_speed = max(1.0, math.hypot(velocity_east, velocity_north))

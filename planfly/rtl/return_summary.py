@@ -13,7 +13,9 @@ from world.errors import PlanflyError
 
 
 def return_starts(setup: FlightSetup, track: Track | None, interval: float) -> ReturnStarts:
-    """Return the states from which returns start, on the track, or on the planned path if nothing was flown.
+    """Return the states from which returns start, on the track or on the planned path.
+
+    The planned path is used if nothing was flown.
 
     interval: time between two returns, s.
     """
@@ -40,20 +42,26 @@ class ReturnSummary:
     returns: Returns | None = None
 
     def data_for_pictures(self) -> DrawnReturns | None:
-        """Return the data for pictures of returns and glides, in a few seconds, or None without judged returns."""
+        """Return the data for pictures of returns and glides, or None without judged returns.
+
+        The computation of the glides takes a few seconds.
+        """
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
     def drawn_returns_without_glides(self) -> DrawnReturns | None:
-        """Return the data for pictures of returns only, in well under a second, or None without judged returns."""
+        """Return the data for pictures of returns without glides, or None without judged returns."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns_without_glides(self.world, self.starts, self.returns)
 
 
 def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
-    """Judge returns from a few points of a flight or planned path; the summary is empty without home or terrain."""
+    """Judge returns from a few points of a flight or planned path.
+
+    The summary is empty without home or terrain.
+    """
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnSummary()
     try:

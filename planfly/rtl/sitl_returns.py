@@ -36,7 +36,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import measured_text
-from planfly.rtl.jsbsim_returns import LEAD_IN_LENGTH_M, nearest_approaches, positions_from_start, return_setup
+from planfly.rtl.jsbsim_returns import LEAD_IN_LENGTH_M, find_nearest_approaches, positions_from_start, return_setup
 from planfly.runtime.stages import stage
 from planfly.workflow.pipeline import fly_and_judge
 from world.arrays import Floats
@@ -118,7 +118,10 @@ class ProgramReturns:
         return f"by {self.program} itself: {len(self.flown_pairs)} of the worst returns flown, {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
-        """Return a line for each return: its start, the simulated outcome, the program's outcome, and which applies."""
+        """Return a line for each return.
+
+        It names the start, the simulated outcome, the program's outcome, and which of them applies.
+        """
         texts = []
         for pair in self.pairs:
             east, north, _ = pair.simulated.start
@@ -139,7 +142,7 @@ class ProgramReturns:
         return texts
 
     def with_worse_results(self, returns: Returns) -> Returns:
-        """Return the returns with each simulated result replaced by the program's result where that is worse."""
+        """Return the returns with the program's result wherever it is worse than the simulated result."""
         worse_result_by_id = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
             returns,
@@ -157,13 +160,15 @@ def check_is_arduplane(program: Path) -> None:
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 
-def worst_separated_returns(
+def choose_worst_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[SimulatedReturn, int]]:
-    """Choose the worst returns for the program to fly, the worst first, at most `points`, with the index of each start.
+    """Choose at most `points` returns for the program to fly.
 
-    Starts closer to a chosen start than half the path length divided by `points` are skipped, because returns from
-    neighbouring starts are alike, and so are starts that the program cannot reach safely.
+    Returns each with the index of its start, worst first.
+
+    Skipped are starts closer to a chosen start than half the path length divided by `points`, because returns from
+    neighbouring starts are alike, and starts that the program cannot reach safely.
     """
     start_rows = starts.rows
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
@@ -190,12 +195,20 @@ def worst_separated_returns(
 
 
 def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
-    """Return a sort key that puts the worst outcome first, and safe returns last, the closest to a limit first."""
+    """Return a sort key that puts the worst outcome first.
+
+    Safe returns come last, the closest to a limit first.
+    """
     return (KINDS.index("safe"), limit_ratio(candidate)) if candidate.safe else worst_first_key(candidate)
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
-    """Return True if the straight lead-in to a start stays above the ground."""
+    """Return True if the straight lead-in to a start stays high enough above the ground.
+
+    The minimum is `_MIN_LEAD_IN_HEIGHT_M`.
+
+    row: a row of `ReturnStarts.rows`.
+    """
     if world.scenario.terrain is None:
         return True
     velocity = np.array([float(row[f"velocity_{name}"]) for name in ("east", "north", "up")])
@@ -208,15 +221,15 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
 def fly_by_program(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `points` of the worst returns with the ArduPlane program, in the mean wind, with exact navigation.
+    """Fly at most `points` of the worst returns with the ArduPlane program.
+
+    The wind is the mean wind, and the navigation is exact.
 
     folder: folder for the flight logs of planfly and of the program; None writes no logs.
     Raises FlightError if the program does not start or stops during the flight.
     """
     program_returns, version = [], ""
-    for number, (simulated_return, start_index) in enumerate(
-        worst_separated_returns(world, starts, returns, points), 1
-    ):
+    for number, (simulated_return, start_index) in enumerate(choose_worst_returns(world, starts, returns, points), 1):
         log = None if folder is None else folder / f"worst-return-{number}.mcap"
         with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:
             try:
@@ -249,7 +262,7 @@ def _judge_flown_return(
     start_row = len(track) - len(path)
     position = _cut_at_landing(simulated_return.target, path)
     target = _flown_target(world, simulated_return.target, position)
-    approach = nearest_approaches(world, position)
+    approach = find_nearest_approaches(world, position)
     hits_ground = end_reason == "ground contact" and len(position) == len(path)
     has_arrived = hits_ground or bool(
         np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M
@@ -260,7 +273,9 @@ def _judge_flown_return(
         clearance = min(0.0, clearance)
     elif 0.0 < clearance < simulated_return.required_height and target.landing and target.landing.next_stops:
         # As in `judge_returns`, the required height applies up to the first item of the landing sequence.
-        clearance, lowest_position, *_ = nearest_approaches(world, _cut_at(target.landing.position, position))
+        clearance, lowest_position, *_ = find_nearest_approaches(
+            world, _cut_at_nearest_point(target.landing.position, position)
+        )
     record["outcome"] = (
         RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     )
@@ -285,30 +300,40 @@ def _judge_flown_return(
 
 
 def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
-    """Return the position where the judgement of a return ends: loiter center, or last waypoint before the landing."""
+    """Return the position where the judgement of a return ends.
+
+    This is the loiter centre, or the last waypoint before the landing.
+    """
     if target.landing is None:
         return target.position
     return (target.landing, *target.landing.next_stops)[-1].position
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
-    """Cut a path to a landing sequence at the last waypoint before the landing.  position: path points, (t, 3), m."""
+    """Cut a path to a landing sequence after its last waypoint before the landing.
+
+    Returns other paths unchanged.
+
+    position: path points, (t, 3) m.
+    """
     if target.landing is None:
         return position
-    return _cut_at(_end_position(target), position)
+    return _cut_at_nearest_point(_end_position(target), position)
 
 
-def _cut_at(point: tuple[float, float, float], position: Floats) -> Floats:
-    """Cut a path where it is nearest to a point.  position: path points, (t, 3), m."""
+def _cut_at_nearest_point(point: tuple[float, float, float], position: Floats) -> Floats:
+    """Return the part of a path up to its nearest point to `point`.  position: path points, (t, 3) m."""
     return position[: int(np.argmin(np.linalg.norm(position - np.array(point), axis=1))) + 1]
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target of a return from its path: the target where the path ends, or to which it leads.
+    """Identify the target of a flown return.
+
+    This is the target at which the path ends, or for which its last course heads.
 
     All possible targets of a return are tried.  If none fits, the target of the simulated ArduPlane is returned.
 
-    position: path points, (t, 3), m.
+    position: path points, (t, 3) m.
     """
     end_point, earlier_point = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))

@@ -30,9 +30,13 @@ _END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Compile the kernels of units in several processes; return when each unit is compiled or has failed.
+    """Compile the kernels of `planfly.kernel_units` in several processes.
 
-    units: names of units, the longest first.  on_ready: called with the number of kernels that are ready.
+    Returns when each unit is ready or has failed.
+
+    units: names of units, the unit that takes longest first.
+    folder: cache folder of the kernels.
+    on_ready: called with the number of kernels that are ready.
     The processes end with this call, even if it raises an error, and with this process.
     """
     remaining_units, lines = deque(units), queue.SimpleQueue[str]()
@@ -63,7 +67,10 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
 
 
 def _start_process(folder: Path) -> "subprocess.Popen[str]":
-    """Start a process that compiles units named on its standard input.  folder: cache folder of the kernels."""
+    """Start a process that compiles units named on its standard input.
+
+    folder: cache folder of the kernels.
+    """
     home = str(Path(__file__).parents[2])
     path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
     return subprocess.Popen(
@@ -80,7 +87,7 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
 def _feed_process(
     process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
 ) -> None:
-    """Send a process one unit after another, and queue the lines that it prints.
+    """Send a process the names of units, one after another, and queue the lines that the process prints.
 
     `_END_OF_OUTPUT` is queued when no unit remains or the process has died.
     """
@@ -120,10 +127,11 @@ _compiled_units: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels of some units at the first call of a kernel that is not cached, within a ``with`` block.
+    """Compile all kernels that the ``with`` block needs when it first calls a kernel that is not cached.
 
-    units: units of `planfly.kernel_units` that the code will call, longest first. They are compiled in two processes
-    before the code continues; if the cache cannot be written, each kernel is compiled when it is called.
+    The kernels are compiled in two processes before the code continues; if the cache cannot be written, each kernel is
+    compiled when it is called.
+    units: units of `planfly.kernel_units` with these kernels, the unit that takes longest first.
     """
     has_reported = False
 
@@ -141,7 +149,7 @@ def warm_up(*units: str) -> Iterator[None]:
 def with_warm_up(*units: str) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
     """Return a decorator with which a function of the public API runs inside `warm_up`.
 
-    units: names of the groups of compiled kernels that the function calls.
+    units: see `warm_up`.
     """
 
     def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:

@@ -18,7 +18,9 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Set rare garbage collection, and limit linear algebra to one thread; call this before NumPy is imported.
+    """Set rare garbage collection, and limit linear algebra to one thread.
+
+    Call this function before NumPy is imported.
 
     Garbage collection during imports took a quarter of the start-up time, and spinning threads a tenth; no matrix in
     planfly is large enough for a second thread.
@@ -40,7 +42,10 @@ def prepare_child() -> None:
 
 
 def watch_address_space() -> None:
-    """Let imports fail early if a module does not fit into a limited address space; without a limit do nothing."""
+    """Let imports fail early if a module does not fit into a limited address space.
+
+    Without a limit nothing is changed.
+    """
     limit = address_space_limit()
     if limit is None:
         return
@@ -66,7 +71,9 @@ def address_space_limit() -> int | None:
 
 
 def with_large_stack(function: Callable[[], _Result]) -> _Result:
-    """Call a function with all frames in one large piece of memory, and return its result.
+    """Call a function with the frames of all inner calls in one large piece of memory.
+
+    Returns the result of the function.
 
     CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty. Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating

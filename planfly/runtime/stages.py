@@ -32,7 +32,7 @@ _receiver: ContextVar[Receiver | None] = ContextVar("receiver", default=None)
 
 @contextmanager
 def send_progress_to(receiver: Receiver) -> Iterator[None]:
-    """Send the progress of the code inside to a receiver."""
+    """Send the progress of the code in the ``with`` block to a receiver."""
     token = _receiver.set(receiver)
     try:
         yield
@@ -41,7 +41,9 @@ def send_progress_to(receiver: Receiver) -> Iterator[None]:
 
 
 def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
-    """Return the context of a stage of work, which yields a function to report units done, total and a remark.
+    """Return the context of a stage of work.
+
+    It yields a function to report the units done, the total and a remark.
 
     kind: common name of stages with the same pace, if the title is more specific ("planning" for any scenario).
 
@@ -65,14 +67,14 @@ def report_line(line: str) -> None:
 
 
 def report_replaced(*files: Path) -> None:
-    """Report each existing file that will be replaced; for example, a program's log may replace a simulated flight."""
+    """Report each of the files that exists, and that the caller is about to replace."""
     for file in files:
         if file.exists():
             report_line(f"{file} exists and is replaced")
 
 
 def has_receiver() -> bool:
-    """Return True if somebody receives the progress of stages.
+    """Return True if the progress of stages has a receiver.
 
     >>> has_receiver()
     False

@@ -19,7 +19,7 @@ FILES = (
 
 
 def page_files() -> dict[str, tuple[bytes, str]]:
-    """Return the bytes and the media type of each page file, by address.
+    """Return the content and the media type of each page file, by its path in the address.
 
     >>> page_files()["/"][1]
     'text/html; charset=utf-8'

@@ -13,9 +13,9 @@ from typing import Any
 from flight.mission.items import MAX_BYTES, Home, Mission, MissionItem, item_problem
 from planfly.studio.documents import Document, planned_mission
 from planfly.studio.edit_context import EditContext
-from planfly.studio.pilot import INTERNAL
-from planfly.studio.settings import SetParameters
+from planfly.studio.settings import ChangedParameters
 from planfly.studio.view_model import Json
+from planfly.studio.worker_process import INTERNAL
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import PlanflyError
 from world.files import read_small_file, utf8_text
@@ -31,9 +31,10 @@ _SAVED_TABLES = ("wind", "flight", "limits", "area")
 def autosave_text(
     context: EditContext, document: Document, mission: Mission, plan: Plan | None, *, is_in_file: bool
 ) -> str:
-    """Write the state of a session as the JSON text of its autosave file.
+    """Encode the state of a session as the JSON text of its autosave file.
 
-    context, document: settings of the session, and the opened document.
+    context: editing context with the settings of the session.
+    document: the opened document.
     mission: the edited mission.
     plan: the plan of the mission, or None if the mission was changed after planning.
     is_in_file: True if the file of the document contains the edited mission.
@@ -62,9 +63,10 @@ def _file_digest(document: Document) -> str:
 
 
 def read_autosave(file: Path, context: EditContext, document: Document) -> tuple[Mission, EditContext] | None:
-    """Return the saved mission and its editing context, or None if there is no autosave of this document.
+    """Return the saved mission and its editing context, or None if nothing is to be restored.
 
-    The autosave of another mission is ignored.
+    Nothing is restored without a file, from the autosave of another mission, and from an autosave that equals the
+    opened document.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
     if not file.exists():
@@ -97,11 +99,14 @@ def sibling_autosave_path(file: Path, first: Mission) -> Path:
 
 
 def _restore_settings(context: EditContext, data: Json) -> EditContext:
-    """Return the editing context with the saved settings, or `context` itself if the settings do not differ."""
+    """Return the editing context with the saved settings.
+
+    Returns `context` itself if the settings do not differ.
+    """
     scenario: Scenario = context.scenario
     spec, saved = json.loads(json.dumps(scenario.to_json())), data.get("settings", {})
-    saved_parameters = data.get("parameters") or asdict(SetParameters())
-    parameters = SetParameters(
+    saved_parameters = data.get("parameters") or asdict(ChangedParameters())
+    parameters = ChangedParameters(
         dict(saved_parameters["values"]), saved_parameters["file"], tuple(saved_parameters["unused"])
     )
     new_spec = spec | {table: value for table, value in saved.items() if table in _SAVED_TABLES}
@@ -130,7 +135,10 @@ def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[M
 
 
 def mission_data(mission: Mission) -> Json:
-    """Convert a mission to plain data, from which `mission_from_data` makes the same mission; NaN becomes None."""
+    """Convert a mission to plain data, from which `mission_from_data` makes the same mission.
+
+    NaN becomes None.
+    """
 
     def item_data(item: MissionItem) -> list[Any]:
         """Return the fields of an item, with None for NaN."""
@@ -145,7 +153,9 @@ def mission_data(mission: Mission) -> Json:
 
 
 def mission_from_data(data: Json, first: Mission) -> Mission:
-    """Make a mission from the data of `mission_data`; fields that are not in the data are taken from `first`.
+    """Make a mission from the data of `mission_data`.
+
+    Fields that are not in the data are taken from `first`.
 
     Raises ValueError, LookupError or TypeError for other data.
     """

@@ -64,7 +64,10 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect the worst result of each rule at each place of a flight.  seconds: duration of the flight, s."""
+    """Collect the worst result of each rule at each place of a flight.
+
+    seconds: duration of the flight, s.
+    """
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
     results: _Results = {}
@@ -86,7 +89,7 @@ def _severity_key(result: PlaceResult) -> tuple[int, float]:
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return a key for a place that does not depend on item numbers, and a description with item numbers.
+    """Return a key for a place, by positions in the mission, and a description with item numbers.
 
     route_items: item number of each waypoint.
     order: position of each item number in the mission.
@@ -108,7 +111,9 @@ def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) 
 
 
 def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tuple[float, ...]]) -> dict[int, int]:
-    """Map the position of each item in an old mission to its position in a new mission; removed items are omitted.
+    """Map the position of each item in an old mission to its position in a new mission.
+
+    Removed items are omitted.
 
     >>> a, b, c, d = [(16.0, 46.0, 8.0 + k, 100.0) for k in range(4)]
     >>> match_items([a, b, c], [a, d, b, c]), match_items([a, b, c], [a, c]), match_items([a, b, c], [a, d, c])
@@ -163,7 +168,7 @@ _REMOVED_POSITION = -1
 
 
 def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
-    """Return the previous results, keyed by the current positions of the items.
+    """Return the previous results, keyed by the positions of their items in the current mission.
 
     Results at a removed item get a key that no current result has.
     """
@@ -178,7 +183,7 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe each place that fails now, or that failed before and no longer fails; new failures come first."""
+    """Return a line for each new failure, and then for each earlier failure that is gone."""
     worse, better = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
@@ -209,7 +214,10 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe the failures whose values changed, and then the rules whose smallest margins changed."""
+    """Return lines for continued failures with another value, then for rules with another smallest margin.
+
+    Of both kinds at most `_MAX_VALUE_CHANGES` are returned, the largest changes of margin first.
+    """
     failures = [
         (rule, old_results[rule, key], result)
         for (rule, key), result in new_results.items()

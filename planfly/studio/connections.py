@@ -21,7 +21,9 @@ _numbers = itertools.count()
 
 
 class _UnknownConnection:
-    """Connection that has not given a token; if there are more than `MAX_UNKNOWN_CONNECTIONS`, the oldest is closed.
+    """Connection that has not given a token.
+
+    If there are more than `MAX_UNKNOWN_CONNECTIONS`, the oldest is closed.
 
     number: position in the order of connections, or None if the connection has given a token or is ending.
     """
@@ -31,7 +33,7 @@ class _UnknownConnection:
     number: int | None = None
 
     def _register(self) -> None:
-        """Count this connection as unknown; if there are too many unknown connections, close the oldest."""
+        """Register this connection as unknown; if there are too many unknown connections, close the oldest."""
         self.number = next(_numbers)
         unknown = [connection for connection in self.connections if getattr(connection, "number", None) is not None]
         if len(unknown) > MAX_UNKNOWN_CONNECTIONS:
@@ -44,7 +46,10 @@ class _UnknownConnection:
 
 
 class ShortLived(_UnknownConnection, H11Protocol):
-    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`, so that idle connections do not accumulate."""
+    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`.
+
+    Otherwise idle connections would accumulate.
+    """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Register the connection, and schedule its closing, unless a websocket replaces HTTP before."""
@@ -59,7 +64,10 @@ class ShortLived(_UnknownConnection, H11Protocol):
 
 
 class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
-    """Websocket protocol that refuses messages above `MAX_FIRST_MESSAGE_CHARACTERS` until the token is given."""
+    """Websocket protocol that limits the size of messages until the token is given.
+
+    The limit is `MAX_FIRST_MESSAGE_CHARACTERS`.
+    """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

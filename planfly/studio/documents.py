@@ -135,7 +135,10 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
 
 
 def _check_log_names_no_files(name: str, file: Path) -> None:
-    """Raise PlanflyError if the scenario in a log, or the scenario of its plan, names files of this machine."""
+    """Raise PlanflyError if a log names files of this machine.
+
+    Such a name may be in its scenario or in the scenario of its plan.
+    """
     container = Container()
     with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
         stream.seek(len(MAGIC))
@@ -148,7 +151,10 @@ def _check_log_names_no_files(name: str, file: Path) -> None:
 
 
 def _check_plan_names_no_files(name: str, data: bytes) -> None:
-    """Raise PlanflyError if the scenario of a plan names files of this machine, because a page must not read these."""
+    """Raise PlanflyError if the scenario of a plan names files of this machine.
+
+    A page must not read these files.
+    """
     try:
         scenario = json.loads(data)["scenario"]
         named_files = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
@@ -168,7 +174,7 @@ def _aircraft_folder(aircraft: Any) -> str | None:
 
 
 def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
-    """Return the flight setup for a plan, a mission, or the mission in a log."""
+    """Return the flight setup of a plan file, a mission file, or the mission in a log."""
     if path.is_file() and is_imported_log(path):
         setup = _read_imported_log(path, options).setup
         return _log_mission_setup(setup.scenario, setup.mission, setup.seed)
@@ -199,7 +205,7 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
-    """Return the setup to fly the mission of a log again."""
+    """Return the flight setup of the mission in a log, with the airframe of `scenario`."""
     return make_setup(scenario, load_airframe(scenario), mission, seed)
 
 
@@ -238,7 +244,9 @@ class SavedFile:
 
 
 def save_document(document: Document, context: EditContext, judged_mission: JudgedMission, kind: str) -> SavedFile:
-    """Return the edited mission as a file; an unchanged mission in its original format is saved as the original bytes.
+    """Return the edited mission as a file.
+
+    An unchanged mission in its original format is saved as the original bytes.
 
     kind: one of `SAVED_SUFFIXES`.
 
@@ -270,7 +278,10 @@ def _to_bytes(text: str | bytes) -> bytes:
 
 
 def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """Describe the contents of a mission and its scenario that a ground station's file cannot store."""
+    """Return a line for each content that a ground station's file cannot store.
+
+    text: the mission as text of this file.
+    """
     parsed, losses = parse_mission(text, name), []
     lost_counts: Mapping[str, tuple[int, str]] = {
         "fence items": (len(mission.fences) - len(parsed.fences), "a .plan contains them"),
@@ -293,7 +304,10 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
 
 
 def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str, ...]:
-    """Describe the settings changed in the studio, which a ground station's file cannot store."""
+    """Return lines on settings and parameters that a ground station's file cannot store.
+
+    They are those changed in the studio.
+    """
     scenario = context.scenario
     differences = {
         "wind": opened_scenario.spec.wind != scenario.spec.wind,
@@ -306,13 +320,16 @@ def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str
 
 
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
-    """Describe the autopilot parameters set in the studio, which only a parameter file can store."""
+    """Return a line on the autopilot parameters set in the studio, which only a parameter file can store."""
     count = len(context.parameters.values)
     return (f"{count} parameter{('s' if count != 1 else '')} set here: a .parm contains them",) if count else ()
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:
-    """Return a parameter file with the parameters set in the studio. Raises PlanflyError if no parameter was set."""
+    """Return a parameter file with the parameters set in the studio.
+
+    Raises PlanflyError if no parameter was set.
+    """
     if not context.parameters.values:
         raise PlanflyError("no parameter was set in the studio: set one under Settings", field="form")
     return SavedFile(
@@ -338,7 +355,10 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
 
 
 def _check_plain_waypoints(mission: Mission) -> None:
-    """Raise MissionError for the first item that a plan cannot store: take-off, landing or a speed change en route."""
+    """Raise MissionError for the first item that a plan cannot store.
+
+    These are a take-off, a landing, and a change of speed along the path.
+    """
     first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
     for index, item in enumerate(mission.items):
         lost_content = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
@@ -353,7 +373,7 @@ def _check_plain_waypoints(mission: Mission) -> None:
 
 
 def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> Plan:
-    """Make a plan from the waypoints of an edited route, scored and certified like the plans of the planner.
+    """Make a plan from the waypoints of an edited route, certified like the planner's plans.
 
     Raises MissionError for a mission without a scenario, and for items that a plan cannot store.
     """
@@ -381,12 +401,14 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
 
 
 def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
-    """Return a certified plan with the given waypoints, (w, 3) m, in the scenario of the page."""
+    """Return a plan with the given waypoints (w, 3), m, certified in the scenario of the editing context."""
     return certify_waypoints(context.scenario, context.airframe.limits.with_margin(), waypoints, seed=context.seed)
 
 
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
-    """Return the edited plan with its unchanged departure and approach, or None if the opened plan has neither.
+    """Return a plan of the edited waypoints with the opened plan's departure and approach.
+
+    Returns None if the opened plan has neither.
 
     Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
     MissionError if these legs were changed.
@@ -423,7 +445,7 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
 
 
 def _have_same_items(mission_a: Mission, mission_b: Mission) -> bool:
-    """Return True if two missions have the same commands at the same positions."""
+    """Return True if two missions have the same commands, at positions that differ only by rounding."""
     commands = [
         [(item.command, item.has_position or item.params) for item in mission.items]
         for mission in (mission_a, mission_b)

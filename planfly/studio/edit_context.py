@@ -8,7 +8,7 @@ from flight.mission.items import Mission
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
 from planfly.named_fences import NamedFences
-from planfly.studio.settings import SetParameters
+from planfly.studio.settings import ChangedParameters
 from planfly.workflow.airframe import Airframe, airframe_for_setup
 from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.open_flight import make_setup, with_landing_parameters
@@ -18,12 +18,12 @@ from world.scenario import Scenario
 # Distance from the edge of its scenario, m, at which a mission without a given scenario gets a new scenario around it.
 _EDGE_DISTANCE_M = 500.0
 _NO_FENCES = NamedFences()
-_DEFAULT_PARAMETERS = SetParameters()
+_DEFAULT_PARAMETERS = ChangedParameters()
 
 
 @dataclass(frozen=True, slots=True)
 class EditContext(MissionContext):
-    """Settings in which an edited mission is judged.
+    """Scenario, airframe and settings with which an edited mission is judged.
 
     terrain: elevation file that the user named for a mission without a scenario, or None.
     fences: fences that the user named; their zones are added to every scenario that is made around the mission.
@@ -32,7 +32,7 @@ class EditContext(MissionContext):
 
     terrain: str | None = None
     fences: NamedFences = _NO_FENCES
-    parameters: SetParameters = _DEFAULT_PARAMETERS
+    parameters: ChangedParameters = _DEFAULT_PARAMETERS
 
     @classmethod
     def from_setup(
@@ -49,12 +49,12 @@ class EditContext(MissionContext):
             fences=fences,
         )
 
-    def with_settings(self, scenario: Scenario, parameters: SetParameters) -> "EditContext":
+    def with_settings(self, scenario: Scenario, parameters: ChangedParameters) -> "EditContext":
         """Return the context of the opened mission in another scenario and with other autopilot parameters.
 
         The new context has no plan, because the certificate of a plan applies only to the scenario it was made for.
         """
-        airframe = parameters.airframe(scenario)
+        airframe = parameters.load_airframe(scenario)
         setup = make_setup(scenario, airframe, self.opened_setup.mission, self.seed)
         return replace(self, scenario=scenario, airframe=airframe, opened_setup=setup, parameters=parameters)
 
@@ -63,11 +63,11 @@ class EditContext(MissionContext):
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
         return replace(self, opened_setup=setup, planned=True)
 
-    def around_mission(self, mission: Mission) -> "EditContext":
-        """Return a context whose area contains the mission.
+    def with_area_around_mission(self, mission: Mission) -> "EditContext":
+        """Return a context whose scenario has an area that contains the mission.
 
-        A scenario that planfly made around a mission is made again if the mission comes close to its edges; a named
-        scenario, and an area that is large enough, are kept.
+        If the mission comes close to the edges of a scenario that planfly made around it, a larger scenario is made.
+        A named scenario is kept.
         """
         if not self.scenario.external:
             return self
@@ -91,20 +91,20 @@ class EditContext(MissionContext):
     # ------------------------------------------------------------------
     # Verdicts while a mission is dragged.
 
-    def airframe_for(self, mission: Mission) -> Airframe:
-        """Return the airframe with the autopilot that flies a mission, as `make_setup` chooses it."""
+    def airframe_for_mission(self, mission: Mission) -> Airframe:
+        """Return the airframe with the autopilot's landing parameters for a mission, as in `make_setup`."""
         return replace(self.airframe, autopilot=with_landing_parameters(self.airframe.autopilot, mission))
 
     def route(self, mission: Mission) -> Route:
         """Return the route that the autopilot flies in a mission, without notes for the user."""
-        frame, fly_over = self.airframe_for(mission), self.scenario.flight.fly_over
+        frame, fly_over = self.airframe_for_mission(mission), self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
         route = route_through_stops(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(route, self.scenario, frame.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
-        """Return a setup for judging a route, which may be a part of the mission's route."""
-        frame = self.airframe_for(mission)
+        """Return a setup for judging a route, which may be only a part of the mission's route."""
+        frame = self.airframe_for_mission(mission)
         return FlightSetup(
             scenario=self.scenario,
             mission=mission,

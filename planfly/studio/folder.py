@@ -37,7 +37,7 @@ def folder_message(folder: Path | None) -> Json:
 
 
 def home_relative_text(path: Path) -> str:
-    """Return the full path, with ~ for the user's home folder.
+    """Return the full path as text, with ~ for the user's home folder.
 
     >>> home_relative_text(Path.home() / "missions"), home_relative_text(Path("/srv"))
     ('~/missions', '/srv')

@@ -34,9 +34,10 @@ _WEBP_QUALITY = 82
 
 @dataclass(frozen=True, slots=True)
 class GroundGrid:
-    """Heights for the page, m, in rows from south to north; NaN if unknown.
+    """Terrain altitudes that the page shows at the pointer.
 
     east, north: ranges of the grid, m.
+    heights: altitudes in rows from south to north, m AMSL; NaN if unknown.
     """
 
     east: Range
@@ -45,7 +46,7 @@ class GroundGrid:
 
 
 def sample_ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
-    """Return a coarse grid of terrain altitudes.
+    """Return a coarse grid of terrain altitudes for the page.
 
     east, north: ranges of the map, m.
     """
@@ -66,17 +67,20 @@ def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> b
         picture = np.broadcast_to(unknown, (*heights.shape, 3))
         return _to_webp(picture)
     min_height, max_height = float(heights[is_known].min()), float(heights[is_known].max())
-    pitch = (north[1] - north[0]) / (heights.shape[0] - 1)
+    pixel_size = (north[1] - north[0]) / (heights.shape[0] - 1)
     picture = _tint_by_height(heights, min_height, max(max_height, min_height + 1.0), dark=dark)
     if max_height - min_height >= 1.0:
-        picture *= relief(heights, pitch, max_height - min_height)[..., None]
+        picture *= relief(heights, pixel_size, max_height - min_height)[..., None]
         picture = _draw_contours(picture, heights, nice_step(max_height - min_height, _MAX_CONTOURS), dark=dark)
     picture[~is_known] = unknown
     return _to_webp(picture)
 
 
 def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
-    """Return terrain altitudes, m AMSL, (rows, columns); the longer side has `pixels` values, rows go north."""
+    """Return terrain altitudes (rows, columns), m AMSL, with the southern row first.
+
+    pixels: number of values along the longer side.
+    """
     width, height = east[1] - east[0], north[1] - north[0]
     longer_side = max(width, height)
     columns, rows = (max(2, round(pixels * length / longer_side)) for length in (width, height))
@@ -84,14 +88,18 @@ def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) ->
 
 
 def _tint_by_height(heights: Floats, min_height: float, max_height: float, *, dark: bool) -> Floats:
-    """Return the colour of each height, red, green and blue from 0 to 1, (rows, columns, 3)."""
+    """Return the colour for each altitude (rows, columns, 3): red, green and blue from 0 to 1."""
     ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
     ramp_position = np.nan_to_num((heights - min_height) / (max_height - min_height)) * (len(ramp) - 1)
     return np.stack([np.interp(ramp_position, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
 
 
 def _draw_contours(picture: Floats, heights: Floats, step: float, *, dark: bool) -> Floats:
-    """Return a picture with contours drawn over it, bold at every fifth level."""
+    """Return the picture (rows, columns, 3) with contours drawn over it, every fifth contour bold.
+
+    heights: altitudes of the pixels (rows, columns), m AMSL.
+    step: altitude between two contours, m.
+    """
     filled_heights = np.nan_to_num(heights, nan=float(np.nanmean(heights)))
     slope = np.hypot(*np.gradient(filled_heights))
     ink = np.array(theme.rgba("contour", dark=dark)[:3])

@@ -33,11 +33,13 @@ HEADERS = (
 )
 
 
-def check_request(scope: Scope, port: int) -> tuple[int, str]:
-    """Return the status and the text of a refusal, or (0, "") if the request is accepted.
+def request_refusal(scope: Scope, port: int) -> tuple[int, str]:
+    """Return the HTTP status and text with which a request is refused.
+
+    Returns (0, "") if the request is accepted.
 
     >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
-    >>> check_request(asked, 80)
+    >>> request_refusal(asked, 80)
     (421, 'this host is not served here')
     """
     headers = [(name.lower(), value.decode("latin-1").strip().lower()) for name, value in scope["headers"]]
@@ -61,7 +63,10 @@ def check_request(scope: Scope, port: int) -> tuple[int, str]:
 
 
 def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Return True if a browser opens the page itself, which shows no data until it has the token."""
+    """Return True if a browser opens the page itself.
+
+    This is allowed from any site, because the page has no data without a token.
+    """
     header_values = dict(headers)
     is_document = (
         header_values.get(b"sec-fetch-mode") == "navigate" and header_values.get(b"sec-fetch-dest") == "document"
@@ -70,18 +75,18 @@ def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
 
 
 class Guard:
-    """ASGI application that refuses requests, or forwards them and adds the headers."""
+    """ASGI application that refuses requests, or forwards them to another application and adds `HEADERS`."""
 
     def __init__(self, app: App, port: int) -> None:
         """Guard an application that listens on `port`."""
         self._app, self._port = app, port
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request or websocket, or refuse it with the reason of `check_request`."""
+        """Serve one request or websocket, or refuse it with the reason of `request_refusal`."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        status, reason = check_request(scope, self._port)
+        status, reason = request_refusal(scope, self._port)
         if status and scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008})

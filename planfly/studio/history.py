@@ -42,7 +42,7 @@ class History:
         return self.steps[self.position][1] if self.position < len(self.steps) else ""
 
     def add(self, mission: Mission, text: str) -> None:
-        """Record an edit, and drop undone edits; if there are too many steps, drop the oldest."""
+        """Record an edit, and discard undone edits; if there are too many steps, discard the oldest."""
         self.steps = [*self.steps[: self.position], (mission, text)][-MAX_STEPS:]
         self.position = len(self.steps)
 

@@ -22,9 +22,9 @@ from world.geometry import leg_runs
 
 # Distance along the legs within which the move of an item can change the verdict, m.  The route is judged for twice
 # this distance, and the outer half is discarded, because the end of the judged part is not the end of the route.
-REACH = 450.0
+MOVE_REACH_M = 450.0
 # Minimum number of legs within which a move can change the verdict.
-LEGS = 4
+MOVE_REACH_LEGS = 4
 # Maximum number of times that a route may pass an item; if it passes more often, the whole route is judged.
 _MAX_PASSES = 6
 # Length of the legs appended beyond the end of a part, m.
@@ -33,7 +33,7 @@ _APPENDED_LEG_LENGTH_M = 3_000.0
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """A judged part of a route.
+    """A judged part of a route, near a moved item.
 
     first, last: first and last waypoint of the judged legs and corners.
     start: waypoint of the whole route at which the judged part starts.
@@ -50,7 +50,9 @@ class Window:
 def judge_windows(
     context: EditContext, mission: Mission, index: int, previous_setup: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge the parts of a mission's route near a moved item, and return the route and the judged parts (windows).
+    """Judge the parts of a mission's route near a moved item.
+
+    Returns the route and the judged parts (windows).
 
     The whole route is judged as one part if it may contain surveys, or if the parts together would be as long.
 
@@ -61,7 +63,11 @@ def judge_windows(
     route = None
     if previous_setup is not None:
         route = update_moved_route(
-            previous_setup.route, previous_setup.mission, mission, context.scenario, context.airframe_for(mission)
+            previous_setup.route,
+            previous_setup.mission,
+            mission,
+            context.scenario,
+            context.airframe_for_mission(mission),
         )
     if route is None:
         route = context.route(mission)
@@ -88,9 +94,9 @@ def _may_contain_survey(context: EditContext, mission: Mission, route: Route) ->
 
 
 def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before_part: bool) -> tuple[Route, int]:
-    """Add the fastest legs of the whole route to a part of it.
+    """Extend a part of a route by the fastest legs and the windiest altitude of the whole route.
 
-    Returns the extended part, and the number of legs added before the part.
+    Returns the extended part, and the number of waypoints added before the part.
 
     The duration of a change of slope is computed from the highest airspeeds and the strongest wind of a whole route.
     Therefore legs with these values are added, in a straight line, at the end of the part that is inside the route.
@@ -137,7 +143,7 @@ def _speed_factor(context: EditContext, altitude: float) -> float:
 
 
 def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Window:
-    """Judge the waypoints `first` to `last` of a route.
+    """Judge the legs and corners between the waypoints `first` and `last` of a route.
 
     setup: setup of a part of the route that contains these waypoints.
     start: number of the part's first waypoint in the whole route.
@@ -150,7 +156,10 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _is_in_window(finding: Finding, first: int, last: int) -> bool:
-    """Return True for a finding on a leg or corner between two waypoints, and for any violated threat or zone."""
+    """Return True if a finding is on a leg or corner between two waypoints.
+
+    The result is also True for any violated threat or zone.
+    """
     place = finding.place
     if finding.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
         return True
@@ -160,7 +169,9 @@ def _is_in_window(finding: Finding, first: int, last: int) -> bool:
 
 
 def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
-    """Return the first and last waypoint of each span that a move of an item may change; None for the whole route.
+    """Return the first and last waypoint of each span that a move of an item may change.
+
+    Returns None if the move may change the whole route.
 
     seq: number of the moved item.
     Overlapping spans are merged. Landing sequences and returns depend on the whole route.
@@ -171,10 +182,10 @@ def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None
     spans: list[tuple[int, int]] = []
     for first, last in _consecutive_runs(rows):
         span = _extend_span(route, first, last)
-        if spans and span[0] <= spans[-1][1] + 2 * LEGS:
+        if spans and span[0] <= spans[-1][1] + 2 * MOVE_REACH_LEGS:
             span = spans.pop()[0], span[1]
         spans.append(span)
-    judged_legs = sum(last - first + 2 * LEGS for first, last in spans)
+    judged_legs = sum(last - first + 2 * MOVE_REACH_LEGS for first, last in spans)
     return None if len(spans) > _MAX_PASSES or judged_legs >= route.legs else spans
 
 
@@ -185,10 +196,15 @@ def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
-    """Return a span extended by at least `REACH` and `LEGS` on both sides, without cutting a loiter."""
+    """Return a span extended on both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
+
+    Loiters are not cut.
+    """
     distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.positions))])
-    start = min(first - LEGS, int(np.searchsorted(distance, distance[first] - REACH, side="right")) - 1)
-    end = max(last + LEGS, int(np.searchsorted(distance, distance[last] + REACH)))
+    start = min(
+        first - MOVE_REACH_LEGS, int(np.searchsorted(distance, distance[first] - MOVE_REACH_M, side="right")) - 1
+    )
+    end = max(last + MOVE_REACH_LEGS, int(np.searchsorted(distance, distance[last] + MOVE_REACH_M)))
     start, end = max(0, start), min(route.legs, end)
     while start and (route.stops[start] == route.stops[start - 1] or route.arc_radii[start]):
         start -= 1

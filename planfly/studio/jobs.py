@@ -10,9 +10,9 @@ from aircraft.catalog import aircraft_names
 from planfly.arguments import CHOICES
 from planfly.studio import messages
 from planfly.studio.changes import FlightResults, describe_changes
-from planfly.studio.pilot import Answer, Task, WorkerProcess
 from planfly.studio.session import Session
 from planfly.studio.view_model import Json, round_to_json
+from planfly.studio.worker_process import Answer, Task, WorkerProcess
 from planfly.studio.worker_tasks import PlanRequest
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_front import FrontPlan
@@ -47,7 +47,10 @@ class _ActiveTask:
 
     @property
     def message(self) -> Json:
-        """Progress message to the pages; its number distinguishes the task from earlier tasks of the same name."""
+        """Progress message to the pages.
+
+        Its number distinguishes the task from earlier tasks of the same name.
+        """
         return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.fraction}
 
 
@@ -93,7 +96,7 @@ class Jobs:
             worker.close()
 
     def choices(self) -> Json:
-        """Return page data of the aircraft, autopilots, turbulence levels and algorithms to choose from."""
+        """Return the page data of aircraft, autopilots, turbulence levels and algorithms to choose from."""
         return {
             "aircraft": aircraft_names(),
             "autopilots": list(CHOICES["autopilot"]),
@@ -110,11 +113,14 @@ class Jobs:
         return [task.message for task in self._active.values()]
 
     def is_planning_first_path(self, session: Session) -> bool:
-        """Return True while a path is planned for an opened scenario, whose mission is a placeholder until then."""
+        """Return True while a path is planned for an opened scenario.
+
+        Until then the mission of the scenario is a placeholder.
+        """
         return self._uses_first_path and not session.is_changed
 
-    def drop_results(self) -> None:
-        """Cancel all tasks and drop all results, because another mission was opened."""
+    def discard_results(self) -> None:
+        """Cancel all tasks and discard all results, because another mission was opened."""
         self.stop()
         self._flight_message = self._last_results = None
         self._other_messages = []
@@ -208,9 +214,9 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages that the pages get after an answer of a worker.
+        """Return the messages to the pages that an answer of a worker causes.
 
-        For a task that was replaced by another task, this is only the message that it has stopped.
+        For a task that another task has replaced, this is only the message that the task has stopped.
         """
         task = self._active.get(worker)
         if task is None or task.number != answer.number:
@@ -236,13 +242,19 @@ class Jobs:
         return [self._result_message(task, answer.value, session)]
 
     def _stopped_message(self, name: str) -> Json:
-        """Return the message that a task has ended without a result."""
+        """Return the message that a task has ended without a result.
+
+        name: kind of the task, as in `_ActiveTask`.
+        """
         if name == "plan":
             self._uses_first_path = False
         return {"kind": "stopped", "job": name}
 
     def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
-        """Store the result of a task, and return the message that shows it; after a failed flight, try suggestions."""
+        """Store the result of a task, and return the message that shows the result on the pages.
+
+        After a failed flight of the current mission, a trial of its suggestions is started.
+        """
         if task.name == "fly":
             previous_results, self._last_results = self._last_results, value.pop("figures")
             judged_mission = value.pop("judged")
@@ -273,7 +285,7 @@ class Jobs:
         self._other_messages = [*(message for message in self._other_messages if message["kind"] != task.name), message]
         return message
 
-    def pop_initial_plan(self, session: Session) -> bool:
+    def has_new_initial_plan(self, session: Session) -> bool:
         """Return True once: at the first call after the path planned for the opened scenario has arrived."""
         has_path = self._uses_first_path and bool(session.plans[0])
         if has_path:
@@ -300,7 +312,10 @@ def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
 
 
 def _path_json(front_plan: FrontPlan) -> Json:
-    """Return page data of a planned path: length (m), radar exposure (s), minimum height (m), time (s), energy (Wh)."""
+    """Return page data of a planned path.
+
+    They include length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh).
+    """
     plan, (length, exposure, clearance, seconds, energy) = (
         front_plan.plan,
         round_to_json(

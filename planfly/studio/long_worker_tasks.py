@@ -12,7 +12,7 @@ from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
 from planfly.rtl.return_summary import return_starts
 from planfly.studio.edit_context import EditContext
-from planfly.studio.pilot import Advance
+from planfly.studio.worker_process import Advance
 from planfly.workflow.pipeline import fly_and_judge
 from world.errors import MissionError
 from world.extras import require_extra
@@ -26,7 +26,9 @@ FLIGHT_COUNT = 24
 
 
 def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission, judge returns to launch from points along the flight, and return the outcome as page data.
+    """Fly a mission, and judge returns to launch from points along the flight.
+
+    Returns the results of the returns as page data.
 
     payload: editing context, and mission.
     """
@@ -58,7 +60,7 @@ def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> 
 
 
 def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission `FLIGHT_COUNT` times with varied conditions, and return the outcome as page data.
+    """Fly a mission `FLIGHT_COUNT` times with varied conditions, and return the results as page data.
 
     Wind, aircraft, terrain error and start position vary.
 

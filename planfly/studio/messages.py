@@ -121,7 +121,9 @@ class Apply(_Message):
 
 
 class Settings(_Message):
-    """Change of settings; fields that are not given stay unchanged. Values are checked like the values of a scenario.
+    """Change of settings; fields that are not given stay unchanged.
+
+    Values are checked like the values of a scenario.
 
     limits: entries of [limits]; null removes an entry.  ceiling: m AMSL.
     parameter: one autopilot parameter, as NAME=VALUE.  without: names of the parameters to reset.
@@ -215,7 +217,9 @@ def read_message(text: str | bytes) -> Message:
 
 
 def describe_error(error: ValidationError) -> str:
-    """Describe the invalid field of a message in one line; return "" if the kind of the message is unknown.
+    """Return a line that describes the first invalid field of a message.
+
+    Returns "" if the kind of message is unknown.
 
     >>> try:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')
@@ -228,5 +232,5 @@ def describe_error(error: ValidationError) -> str:
 
 
 def message_schema() -> dict[str, Any]:
-    """Return the messages as a JSON schema, for tests that generate messages."""
+    """Return the JSON schema of all messages, for tests that generate messages."""
     return _ADAPTER.json_schema()

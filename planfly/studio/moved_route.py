@@ -32,7 +32,9 @@ _IRREGULAR_COMMANDS = frozenset(
 def update_moved_route(
     route: Route, previous_mission: Mission, mission: Mission, scenario: Scenario, airframe: Airframe
 ) -> Route | None:
-    """Return the route after a few waypoints were moved, or None if the whole route must be computed again.
+    """Return the route after a few waypoints were moved.
+
+    Returns None if the whole route must be computed again.
 
     The whole route must be computed again if a move may change more than the waypoint itself: next to loiters, merged
     waypoints and kept altitudes, and with jumps, gates, RTL, landings and courses at the ends.
@@ -93,7 +95,10 @@ def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
 
 
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
-    """Return True if each position item is one stop of the route, with an altitude independent of other items."""
+    """Return True if each position item is one stop of the route.
+
+    The altitude of each stop must also be independent of other items.
+    """
     if any(value is not None for value in (route.rtl_start, route.direct_landing_start, route.landing_ground)):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:
@@ -107,7 +112,10 @@ def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -
 
 
 def _map_position(item: MissionItem, mission: Mission, scenario: Scenario) -> tuple[float, float, float] | None:
-    """Return east, north and altitude of a waypoint, m, or None if it depends on other items or is off the map."""
+    """Return east, north and altitude of a waypoint, m.
+
+    Returns None if the position depends on other items or is off the map.
+    """
     x, y = to_map(scenario.origin, [item.lat_deg], [item.lon_deg])
     east, north, home, altitude = float(x[0]), float(y[0]), mission.home, math.nan
     if item.frame in AMSL:

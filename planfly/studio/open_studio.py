@@ -68,7 +68,7 @@ def open_studio(
     listener = _open_listener(port)
     with contextlib.closing(listener):
         target = str(what)
-        autosave_file = Path(keep) / f"{_stem(target)}.json"
+        autosave_file = Path(keep) / f"{_autosave_stem(target)}.json"
         session, restored = open_session(target, options, autosave_file)
         if restored:
             undo_hint = "; undo reverts this" if session.undo_text else ""
@@ -86,13 +86,15 @@ def open_studio(
         address = f"http://{HOST}:{listener.getsockname()[1]}/#t={token}"
         with _open_page(address) if browser else contextlib.nullcontext():
             on_message(f"studio  {address}")
-            asyncio.run(_serve(server, listener, stop))
+            asyncio.run(_run_web_server(server, listener, stop))
 
 
-def _stem(target: str) -> str:
-    """Return a file name stem for an opened target; files with equal names in different folders get different stems.
+def _autosave_stem(target: str) -> str:
+    """Return the stem of the autosave file for a target.
 
-    >>> _stem("jacksboro")
+    Equal file names in different folders get different stems.
+
+    >>> _autosave_stem("jacksboro")
     'jacksboro'
     """
     path = Path(target)
@@ -102,7 +104,10 @@ def _stem(target: str) -> str:
 
 
 def _open_listener(port: int | None) -> socket.socket:
-    """Return the socket to which pages connect. Raises PlanflyError if the port is taken."""
+    """Return a listening socket for the pages.  Raises PlanflyError if the requested port is taken.
+
+    port: requested port; None for the default port, or any free port if the default port is taken.
+    """
     for candidate in (DEFAULT_PORT, 0) if port is None else (port,):
         try:
             return socket.create_server((HOST, candidate))
@@ -113,7 +118,10 @@ def _open_listener(port: int | None) -> socket.socket:
 
 @contextlib.contextmanager
 def _open_page(address: str) -> Iterator[None]:
-    """Open an address in the browser through a temporary file, so that no list of processes shows the token."""
+    """Open an address in the browser through a temporary file.
+
+    Otherwise the list of processes would show the token.
+    """
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"
         file.touch(0o600)
@@ -128,7 +136,7 @@ def _open_page(address: str) -> Iterator[None]:
         yield
 
 
-async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
+async def _run_web_server(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
     """Serve pages on a socket until `stop` returns True."""
     import uvicorn
 

@@ -30,10 +30,10 @@ from planfly.studio.folder import find_file_in_folder, folder_message, home_rela
 from planfly.studio.ground_picture import draw_ground, sample_ground_grid
 from planfly.studio.jobs import Jobs
 from planfly.studio.messages import read_message
-from planfly.studio.pilot import INTERNAL, Answer, Task, internal_text
 from planfly.studio.session import Session, StaleEdit
 from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.view_model import Json
+from planfly.studio.worker_process import INTERNAL, Answer, Task, internal_text
 from world.errors import MissionError, PlanflyError
 from world.files import read_small_file, utf8_text
 
@@ -94,7 +94,10 @@ class Page:
 
 
 class Server:
-    """The server, without the listening sockets."""
+    """Server of the studio, which connects pages, session and worker processes.
+
+    The sockets are left to uvicorn.
+    """
 
     def __init__(self, session: Session, token: str, autosave_file: Path | None, folder: Path | None) -> None:
         """Prepare the server.
@@ -125,10 +128,10 @@ class Server:
         self.jobs.start_first_task(self.session)
         while True:
             await asyncio.sleep(AUTOSAVE_INTERVAL_S)
-            await self._autosave()
+            await self._autosave_session()
 
-    async def _autosave(self) -> None:
-        """Save changed edits; an error is reported to the pages once."""
+    async def _autosave_session(self) -> None:
+        """Autosave the session if it has changed; report an error to the pages once."""
         if self._autosave_file is not None and (self.session.needs_autosave or self.session.autosaved_rev):
             # On a full disk the studio goes on without autosave, and reports the error once.
             try:
@@ -142,7 +145,7 @@ class Server:
 
     async def close(self) -> None:
         """Autosave, and end the processes."""
-        await self._autosave()
+        await self._autosave_session()
         self.jobs.close()
         self._judge_thread.shutdown(wait=False, cancel_futures=True)
         self._draw_thread.shutdown(wait=False, cancel_futures=True)
@@ -159,9 +162,9 @@ class Server:
     # One page.
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve a page until it disconnects."""
+        """Accept a websocket; if it sends the token, serve its page until the page disconnects or is too slow."""
         await socket.accept()
-        page = await self._welcome(socket)
+        page = await self._authenticate(socket)
         if page is None:
             return
         self._pages.add(page)
@@ -197,12 +200,18 @@ class Server:
             await asyncio.sleep(MESSAGE_PAUSE_S)
 
     async def _wait_for_free_slot(self) -> None:
-        """Wait until fewer than `MAX_PAGES` pages are connected."""
+        """Wait until fewer than `MAX_PAGES` pages are connected.
+
+        The server polls, because pages may disconnect without notice.
+        """
         while len(self._pages) >= MAX_PAGES:
             await asyncio.sleep(_SLOT_CHECK_INTERVAL_S)
 
-    async def _welcome(self, socket: WebSocket) -> Page | None:
-        """Return the page if its first message has the token; otherwise close the websocket and return None."""
+    async def _authenticate(self, socket: WebSocket) -> Page | None:
+        """Return the page if its first message has the token; otherwise close the websocket and return None.
+
+        The websocket is also closed if `MAX_PAGES` pages stay connected.
+        """
         code = NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
             text = await asyncio.wait_for(_receive_text(socket), TOKEN_TIMEOUT_S)
@@ -223,7 +232,10 @@ class Server:
         return None
 
     async def _write_frames(self, page: Page) -> None:
-        """Send the queued frames of a page; errors of a page that has disconnected are ignored."""
+        """Send the queued frames of a page, until cancelled.
+
+        Errors of a page that has disconnected are ignored.
+        """
         while True:
             frame = await page.frames.get()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
@@ -238,7 +250,7 @@ class Server:
             if drag is None:
                 continue
             try:
-                result = await self._run_judging(functools.partial(self.session.preview, drag))
+                result = await self._run_judging(functools.partial(self.session.judge_drag, drag))
             except StaleEdit:
                 # The page waits for an answer before it sends another drag.
                 page.send({"kind": "preview", "n": drag.n, "stale": True})
@@ -255,13 +267,13 @@ class Server:
         """Send choices, world, mission, tasks, results and terrain to a page that has just connected."""
         page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
         page.send(self.session.world_message())
-        for message in (*self.jobs.progress_messages(), self._sheet_message(), *self.jobs.result_messages()):
+        for message in (*self.jobs.progress_messages(), self._mission_message_for_page(), *self.jobs.result_messages()):
             page.send(message)
         await self._send_ground(page)
 
-    def _sheet_message(self) -> Json:
+    def _mission_message_for_page(self) -> Json:
         """Return the message with the mission; "planning" is true while its first path is being planned."""
-        return {**self.session.sheet(), "planning": self.jobs.is_planning_first_path(self.session)}
+        return {**self.session.mission_message(), "planning": self.jobs.is_planning_first_path(self.session)}
 
     async def _send_ground(self, page: Page) -> None:
         """Send the terrain of the current world to a page, once for each world and each color scheme."""
@@ -310,14 +322,14 @@ class Server:
             await self._dispatch(page, message)
         except StaleEdit:
             page.send({"kind": "stale"})
-            page.send(self._sheet_message())
+            page.send(self._mission_message_for_page())
         except PlanflyError as error:
             page.send({"kind": "fault", "text": str(error)})
         except INTERNAL as error:
             page.send({"kind": "fault", "text": internal_text(error)})
 
     async def _dispatch(self, page: Page, message: messages.Message) -> None:
-        """Handle a message from a page.
+        """Perform the action that a message from a page requests.
 
         Raises StaleEdit if the page edited an outdated mission, and PlanflyError if the action fails.
         """
@@ -356,10 +368,10 @@ class Server:
             await self._run_judging(lambda: self._apply_change(message))
             if session.rev == rev:
                 return
-            sheet_message = await self._run_judging(self._sheet_message)
+            mission_message = await self._run_judging(self._mission_message_for_page)
         if session.world_rev != world_rev:
             self._broadcast(session.world_message())
-        self._broadcast(sheet_message)
+        self._broadcast(mission_message)
         self.jobs.fly(session)
         if session.world_rev != world_rev:
             for page in list(self._pages):
@@ -375,7 +387,7 @@ class Server:
                 previous_history = session.history
                 session.step_history(message.kind)
                 if session.history is not previous_history:
-                    self.jobs.drop_results()
+                    self.jobs.discard_results()
             case messages.Settings():
                 session.change_settings(message)
             case messages.Choose():
@@ -391,7 +403,7 @@ class Server:
                 session.open(document)
                 if self._autosave_file is not None:
                     session.restore(session.autosave_path(self._autosave_file))
-                self.jobs.drop_results()
+                self.jobs.discard_results()
 
     def _open_file(self, message: messages.Open) -> Any:
         """Return the document of a dropped file, or of a file in the folder if the message has no data."""
@@ -417,18 +429,24 @@ class Server:
         """Forward an answer of a worker from its thread to the event loop."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._handle_answer, worker, answer)
+                self._loop.call_soon_threadsafe(self._send_messages_of_answer, worker, answer)
 
-    def _handle_answer(self, worker: str, answer: Answer) -> None:
-        """Send the result of a worker's answer to the pages, and use the first planned path."""
+    def _send_messages_of_answer(self, worker: str, answer: Answer) -> None:
+        """Send the messages that a worker's answer causes to the pages.
+
+        If it is the first planned path, the path becomes the mission.
+        """
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)
-        if self.jobs.pop_initial_plan(self.session):
+        if self.jobs.has_new_initial_plan(self.session):
             choice = messages.Choose(kind="choose", rev=self.session.rev, which=0)
             self._initial_plan_task = asyncio.ensure_future(self._apply_initial_plan(choice))
 
     async def _apply_initial_plan(self, message: messages.Choose) -> None:
-        """Use the path that was planned at the start of the studio, unless the mission was edited in the meantime."""
+        """Use the path that was planned at the start of the studio.
+
+        If the mission was edited in the meantime, this is reported instead.
+        """
         try:
             await self._change_session(message)
         except StaleEdit:
@@ -451,7 +469,10 @@ class Server:
 
 
 async def _receive_text(socket: WebSocket) -> str:
-    """Return the next text message. Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
+    """Return the next text message.
+
+    Raises ValueError for a binary message, and WebSocketDisconnect at the end.
+    """
     event = await socket.receive()
     if event["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(event.get("code", 1000))

@@ -21,9 +21,9 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
-from planfly.studio.pilot import INTERNAL
 from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, settings_json
-from planfly.studio.view_model import Json, sheet_json, window_json, world_json
+from planfly.studio.view_model import Json, mission_json, windows_json, world_json
+from planfly.studio.worker_process import INTERNAL
 from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.suggestion_trials import SuggestionTrials
@@ -110,7 +110,10 @@ class Session:
         return self.document, self.context, self.history
 
     def _restore_state(self, opened_state: _OpenedState) -> None:
-        """Show a document with its earlier context and history; if it cannot be judged, nothing is changed."""
+        """Make a document current, with its context and history.
+
+        If the mission cannot be judged, an error is raised and nothing is changed.
+        """
         _, context, history = opened_state
         judged_mission = context.judge(history.mission)
         self.document, self.context, self.history = opened_state
@@ -119,7 +122,7 @@ class Session:
         self.document_rev += 1
 
     def _add_to_history(self, mission: Mission, text: str) -> None:
-        """Record an edit, and forget undone documents.  text: description of the edit."""
+        """Record an edit, and discard undone documents.  text: description of the edit."""
         self.history.add(mission, text)
         self.undone_states = []
 
@@ -152,7 +155,7 @@ class Session:
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Apply an edit.
+        """Apply an edit to the mission, judge the mission, and record the edit for undo.
 
         Raises StaleEdit for an edit of an older revision, and MissionError if the edited mission would be invalid; in
         both cases nothing is changed.
@@ -164,7 +167,10 @@ class Session:
         self._add_to_history(mission, text)
 
     def step_history(self, kind: str) -> None:
-        """Undo, redo, or revert to the opened mission, if there is anything to undo, redo or revert."""
+        """Undo, redo, or revert to the opened mission; do nothing if there is nothing to undo, redo or revert.
+
+        kind: "undo", "redo" or "revert".
+        """
         if kind == "revert":
             if self.is_changed:
                 self._set_mission(self.history.first)
@@ -189,7 +195,7 @@ class Session:
             self.history.position = previous_position
             raise
 
-    def preview(self, message: Drag) -> Json:
+    def judge_drag(self, message: Drag) -> Json:
         """Judge the mission with an item dragged to another position, without changing the mission.
 
         Returns page data of the route near the item, or of the whole mission on request.  Raises StaleEdit if the
@@ -199,9 +205,9 @@ class Session:
             raise StaleEdit
         mission = self._move_item(message.k, message.east, message.north, message.up)
         if not message.whole:
-            return window_json(mission, *judge_windows(self.context, mission, message.k, self.judged.setup))
+            return windows_json(mission, *judge_windows(self.context, mission, message.k, self.judged.setup))
         judged_mission = self.context.judge(mission)
-        return {"sheet": sheet_json(self.context, judged_mission)}
+        return {"sheet": mission_json(self.context, judged_mission)}
 
     def replace_plan(self, message: Choose) -> None:
         """Replace the mission, or its items between two items, by a planned path.
@@ -217,16 +223,18 @@ class Session:
         if item_range is None:
             self._show_plan(plan)
             return
-        mission = self._replace_part(plan, *item_range)
+        mission = self._replace_items_between(plan, *item_range)
         self._set_mission(mission)
         self._add_to_history(mission, "plan a part")
 
     def _set_mission(self, mission: Mission, context: EditContext | None = None) -> None:
-        """Judge a mission, make it the current mission, and drop planned paths; change nothing if it is invalid.
+        """Judge a mission, make it the current mission, and discard planned paths.
+
+        An invalid mission changes nothing.
 
         context: the editing context to judge the mission with; None for the current context.
         """
-        context = (self.context if context is None else context).around_mission(mission)
+        context = (self.context if context is None else context).with_area_around_mission(mission)
         judged_mission = context.judge(mission)
         if context is not self.context:
             self.world_rev += 1
@@ -235,7 +243,7 @@ class Session:
         self.rev += 1
 
     def _show_plan(self, plan: Plan) -> None:
-        """Replace the mission by the mission of a new plan, whose certificate applies until the mission is edited."""
+        """Replace the current mission by the mission of a plan, whose certificate applies until the next edit."""
         mission = planned_mission(plan, self.context.airframe)
         self._set_mission(mission, self.context.with_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
@@ -259,7 +267,7 @@ class Session:
                 )
                 return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
             case Apply():
-                return self._apply_suggestion(message)
+                return self._mission_with_suggestion(message)
 
     def _indices_to_raise(self, indices: list[int] | None) -> tuple[int, ...]:
         """Return the indices of the items to raise, without landings unless all of them are landings.
@@ -273,7 +281,10 @@ class Session:
         return airborne or requested
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
-        """Return the mission with an item at another position, m, or altitude, m AMSL; None keeps the old value."""
+        """Return the mission with an item at another position, m, or altitude, m AMSL.
+
+        A value of None keeps the old value.
+        """
         mission = self.mission
         edits.movable_item(mission, index)
         if east is not None and north is not None:
@@ -317,13 +328,13 @@ class Session:
             mission = self.context.with_updated_radii(mission, nearest_index)
         return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
 
-    def _apply_suggestion(self, message: Apply) -> tuple[Mission, str]:
+    def _mission_with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission changed by a suggestion, and a description of the edit.
 
         Raises MissionError for a suggestion that no longer exists or does not pass its trial.
         """
         if message.flown:
-            return self._apply_flown_suggestion(message)
+            return self._mission_with_flown_suggestion(message)
         findings = self.judged.verdict.findings
         if not message.finding < len(findings):
             raise MissionError(f"{self.document.name}: that finding no longer exists", field="finding")
@@ -342,7 +353,7 @@ class Session:
         moves = [move for change in trial.suggestion for move in change.moves]
         return mission, f"apply a suggestion of {finding.rule}" + (f": move {moves_text(moves)}" if moves else "")
 
-    def _apply_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
+    def _mission_with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission as flown in the trial of a suggestion, and a description of the edit.
 
         Raises MissionError if the mission was changed after the trial.
@@ -353,8 +364,11 @@ class Session:
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
         return replace(flown_mission, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
 
-    def _replace_part(self, plan: Plan, first: int, last: int) -> Mission:
-        """Return the mission with the items between two items replaced by the waypoints of a planned path."""
+    def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
+        """Return the mission with a planned path in place of the items between two items.
+
+        first, last: indices of the two items.
+        """
         mission = self.mission
         for index in [index for index in edits.movable_indices(mission) if first < index < last][::-1]:
             mission = edits.delete_item(mission, index)
@@ -386,7 +400,10 @@ class Session:
     # The world.
 
     def change_settings(self, settings: Settings) -> None:
-        """Change the settings of the flight. Raises PlanflyError for a value that is not allowed in a scenario."""
+        """Change the settings of the flight.
+
+        Raises PlanflyError for a value that is not allowed in a scenario.
+        """
         scenario = apply_scenario_settings(self.context.scenario, settings)
         context = self.context.with_settings(
             scenario, apply_parameter_settings(self.context.parameters, scenario, settings)
@@ -403,7 +420,7 @@ class Session:
     # ------------------------------------------------------------------
     # Page data, and files.
 
-    def sheet(self) -> Json:
+    def mission_message(self) -> Json:
         """Return the message with the current mission and its verdict."""
         return {
             "kind": "sheet",
@@ -417,7 +434,7 @@ class Session:
             "over": self.document.kind if self.document.path is not None else "",
             "planned": self.judged.setup.plan is not None,
             "notes": [*self.mission.warnings, *self.judged.setup.notes],
-            **sheet_json(self.context, self.judged),
+            **mission_json(self.context, self.judged),
         }
 
     def world_message(self) -> Json:
@@ -498,7 +515,7 @@ class Session:
             if autosave is None:
                 return False
             self._set_mission(*autosave)
-            json.dumps(self.sheet(), allow_nan=False)
+            json.dumps(self.mission_message(), allow_nan=False)
         except (*INTERNAL, PlanflyError):
             self.context, self.judged, self.plans = previous_state
             self.unreadable.append(file)

@@ -13,7 +13,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
@@ -25,8 +25,8 @@ _MAX_LISTED_NAMES = 8
 
 
 @dataclass(frozen=True, slots=True)
-class SetParameters:
-    """Parameters of the autopilot that were set in the studio.
+class ChangedParameters:
+    """Parameters of the autopilot that were changed in the studio.
 
     values: values by name, in the units of the autopilot.
     file: name of the file that was read last, or "".
@@ -38,10 +38,10 @@ class SetParameters:
     unused: tuple[str, ...] = ()
 
     def text(self, title: str) -> str:
-        """Return the text of a parameter file for ground stations."""
+        """Return the text of a parameter file for ground stations.  title: comment in its first line."""
         return parameters_text(self.values, title)
 
-    def airframe(self, scenario: Scenario) -> Airframe:
+    def load_airframe(self, scenario: Scenario) -> Airframe:
         """Load the airframe of a scenario with these parameters in its autopilot.
 
         Raises PlanflyError if the airframe cannot be loaded.
@@ -85,17 +85,17 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
     return scenario_from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
 
 
-def apply_parameter_settings(current: SetParameters, scenario: Scenario, settings: Settings) -> SetParameters:
-    """Return the parameters after a change of settings, for the autopilot of a scenario.
+def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, settings: Settings) -> ChangedParameters:
+    """Return the changed parameters after a change of settings, for the autopilot of a scenario.
 
     A change of the autopilot discards all parameters. A file replaces all parameters; a single parameter replaces only
     its own value.
     Raises PlanflyError for a name that the simulated autopilot does not have, and for a value that is not allowed.
     """
     if settings.autopilot is not None:
-        current = SetParameters()
+        current = ChangedParameters()
     values = {name: value for name, value in current.values.items() if name not in (settings.without or ())}
-    result = SetParameters(values, current.file if values else "", current.unused if values else ())
+    result = ChangedParameters(values, current.file if values else "", current.unused if values else ())
     if settings.parameter_file is not None:
         return read_parameters(scenario, settings.parameter_text or "", settings.parameter_file)
     if settings.parameter is not None:
@@ -107,12 +107,14 @@ def apply_parameter_settings(current: SetParameters, scenario: Scenario, setting
             )
             allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known_names)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
-        result = SetParameters(values | single.values, result.file, result.unused)
+        result = ChangedParameters(values | single.values, result.file, result.unused)
     return result
 
 
-def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
-    """Parse the text of a parameter file for the autopilot of a scenario; the scenario's own parameters are left out.
+def read_parameters(scenario: Scenario, text: str, name: str) -> ChangedParameters:
+    """Parse the text of a parameter file for the autopilot of a scenario.
+
+    The scenario's own parameters are left out.
 
     name: file name for messages.
 
@@ -133,23 +135,23 @@ def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
         for parameter, value in file_values.items()
         if parameter not in scenario_values or parameter in parse_parameters(text, name)
     }
-    return SetParameters(own_values, name, parameters.unused)
+    return ChangedParameters(own_values, name, parameters.unused)
 
 
 def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
     """Return the autopilot parameters of a scenario. Raises PlanflyError if its autopilot has none."""
-    autopilot = load_autopilot(scenario, find_airframe(scenario)[0])
+    autopilot = load_autopilot(scenario, find_aircraft_and_energy(scenario)[0])
     if autopilot.parameters is None:
         raise PlanflyError(f"{autopilot.title} has no parameters: choose another autopilot", field="parameter")
     return autopilot.parameters
 
 
-def settings_json(scenario: Scenario, airframe: Airframe, set_parameters: SetParameters) -> dict[str, Any]:
+def settings_json(scenario: Scenario, airframe: Airframe, changed_parameters: ChangedParameters) -> dict[str, Any]:
     """Return the current settings as page data."""
     limits, parameters = scenario.to_json().get("limits", {}), airframe.autopilot.parameters
     remainder_text = (
-        f" and {len(set_parameters.unused) - _MAX_LISTED_NAMES} more"
-        if len(set_parameters.unused) > _MAX_LISTED_NAMES
+        f" and {len(changed_parameters.unused) - _MAX_LISTED_NAMES} more"
+        if len(changed_parameters.unused) > _MAX_LISTED_NAMES
         else ""
     )
     return {
@@ -162,8 +164,8 @@ def settings_json(scenario: Scenario, airframe: Airframe, set_parameters: SetPar
         "turbulence": scenario.wind.turbulence,
         "limits": {name: limits.get(name) for name in LIMITS} | {"min_clearance_m": scenario.limits.min_clearance_m},
         "ceiling": None if scenario.external else float(scenario.ceiling),
-        "parameters": dict(set_parameters.values),
-        "parameter_file": set_parameters.file,
-        "unused": ", ".join(set_parameters.unused[:_MAX_LISTED_NAMES]) + remainder_text,
+        "parameters": dict(changed_parameters.values),
+        "parameter_file": changed_parameters.file,
+        "unused": ", ".join(changed_parameters.unused[:_MAX_LISTED_NAMES]) + remainder_text,
         "known": {} if parameters is None else {name: value for name, value, _ in parameters.values},
     }

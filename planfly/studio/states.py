@@ -73,7 +73,7 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
 
 
 def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
-    """Set the state of some legs or corners, unless their present state is worse."""
+    """Set the state of the legs or corners with the given numbers, unless their present state is worse."""
     for number in numbers:
         previous = states.get(number)
         if previous is None or (_SEVERITY_ORDER[state.state], state.closeness) < (
@@ -84,7 +84,9 @@ def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: St
 
 
 def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
-    """Return the state according to one finding, or None for a finding that does not affect the state.
+    """Return the state of a place according to one finding.
+
+    Returns None if the finding does not affect the state.
 
     unjudged: True if the verdict is withheld because of this finding.
 
@@ -114,7 +116,7 @@ def _rule_name(finding: Finding) -> str:
 
 
 def _closeness(finding: Finding) -> float:
-    """Return the margin of a finding as a multiple of the margin at which it is shown as close to its limit."""
+    """Return the margin of a finding, relative to the margin below which it is shown as near its limit."""
     scale, margin = RULE_WORDS[finding.rule].scale, finding.margin or 0.0
     if scale is None:
         if finding.limit is None or not finding.limit:

@@ -48,7 +48,7 @@ _MIN_HEIGHT_RATIO = 0.9
 
 
 def round_to_json(values: Any, digits: int = 1) -> Any:
-    """Return an array as lists of rounded numbers; numbers that are not finite become None."""
+    """Return an array as (nested) lists of rounded numbers; numbers that are not finite become None."""
     array = np.round(np.asarray(values, dtype=np.float64), digits)
     if np.isfinite(array).all():
         return array.tolist()
@@ -80,7 +80,7 @@ def world_json(context: EditContext, setup: FlightSetup) -> Json:
 
 
 def _widen_extent(extent: Floats) -> Floats:
-    """Return a larger map extent, so that the terrain also fills windows of other shapes.
+    """Return a larger map extent, so that the terrain also fills browser windows of other shapes.
 
     extent: minimum and maximum of east, then of north, (2, 2), m.
     """
@@ -113,7 +113,10 @@ def _threats_json(threats: Threats) -> list[Json]:
 
 
 def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> list[Json]:
-    """Return page data of the scenario's zones, then of the mission's fence zones, in the order that findings use."""
+    """Return page data of the scenario's zones and then of the mission's fence zones.
+
+    Findings number the zones in this order.
+    """
     zones = judged_airspace(setup).zones if mission.fences else scenario.zones
     return [
         {
@@ -129,8 +132,11 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # Data of the mission.
 
 
-def sheet_json(context: EditContext, judged_mission: JudgedMission) -> Json:
-    """Return page data of a mission and its geometric verdict: items, route, path, states, findings and profile."""
+def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
+    """Return page data of a mission and its geometric verdict.
+
+    They include items, route, path, states, findings and profile.
+    """
     verdict, setup = judged_mission.verdict, judged_mission.setup
     states = place_states(judged_mission.requirements, verdict.findings)
     path = judged_mission.requirements.path
@@ -150,7 +156,7 @@ def sheet_json(context: EditContext, judged_mission: JudgedMission) -> Json:
     }
 
 
-def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
+def windows_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Json:
     """Return page data of the legs and corners that were judged near a moved item."""
     return {"total_legs": route.legs, "windows": [_window_json(mission, route, window) for window in windows]}
 
@@ -192,7 +198,10 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Return page data of the waypoints `first` to `last`, each with the index of its item, or -1 without an item."""
+    """Return page data of the waypoints `first` to `last`: their positions and the indices of their items.
+
+    The index is -1 for a waypoint without an item.
+    """
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
     return {"route": round_to_json(route.positions[first : last + 1]), "of": items}
@@ -223,7 +232,7 @@ def _state_pair(state: State) -> list[str]:
 
 
 def verdict_json(verdict: Verdict) -> Json:
-    """Return page data of a verdict's answer and its lines."""
+    """Return page data of a verdict: state, answer, headline, lines, level and count of failures."""
     presentation = verdict.present()
     return {
         "state": presentation.state,
@@ -236,7 +245,10 @@ def verdict_json(verdict: Verdict) -> Json:
 
 
 def findings_json(verdict: Verdict) -> list[Json]:
-    """Return page data of the failed and undecided findings, then of the finding closest to its limit for each rule."""
+    """Return page data of the findings to list.
+
+    These are the failed and undecided findings, then the finding closest to its limit for each rule.
+    """
     return [
         _finding_json(number, finding) for number, finding in verdict.present().findings_to_list(_MAX_LISTED_FINDINGS)
     ]
@@ -263,7 +275,10 @@ def _finding_json(number: int, finding: Finding) -> Json:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return page data of the profile along the route: terrain, waypoints, and sections of threats and zones."""
+    """Return page data of the profile along the route.
+
+    They include terrain, waypoints, and sections of threats and zones.
+    """
     route = setup.route.positions
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))

@@ -21,9 +21,9 @@ from logs.views.failures import track_distance
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.studio.changes import flight_results
 from planfly.studio.edit_context import EditContext
-from planfly.studio.pilot import Advance
 from planfly.studio.states import place_states
 from planfly.studio.view_model import findings_json, round_to_json, states_json, verdict_json
+from planfly.studio.worker_process import Advance
 from planfly.workflow.airframe import Airframe
 from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.make_plan import make_plan
@@ -83,11 +83,11 @@ def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dic
     context, pickled = payload
     judged_mission: JudgedMission = pickle.loads(pickled)
 
-    def report() -> bool:
+    def report_and_continue() -> bool:
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
         return False
 
-    passed_trials = SuggestionTrials(context, judged_mission, report).find_passing()
+    passed_trials = SuggestionTrials(context, judged_mission, report_and_continue).find_passing()
     findings = with_passing_suggestions(judged_mission.verdict.findings, tried_suggestions(passed_trials))
     missions = {
         (number, which): trial.setup.mission
@@ -100,7 +100,7 @@ def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dic
 
 
 def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
-    """Return a flown track for the map, and its distance along the route for the profile.
+    """Return page data of a flown track: positions, distances along the route for the profile, and times.
 
     leg_ends: time at which each leg except the last ended according to the verdict, s; these times replace the recorded
     leg numbers.
@@ -141,7 +141,10 @@ class PlanRequest:
 
 
 def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
-    """Plan one or several paths, and return them with the shortest first; if no path is safe, return the best path."""
+    """Plan one or several paths, and return them with the shortest first.
+
+    If no path is safe, the best path is returned.
+    """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
     airframe, seed, stop = request.airframe, request.seed, partial(_stop_reason, time.monotonic() + seconds)
@@ -163,7 +166,10 @@ def _stop_reason(deadline: float) -> str:
 
 
 def with_ends(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
-    """Return a scenario with another start and destination, both in the air and without a course, (3,), m."""
+    """Return a scenario with another start and destination, both in the air and without a course.
+
+    start, destination: east, north and altitude AMSL, (3,) m.
+    """
     spec = scenario.to_json()
     for key, (east, north, altitude) in (("start", start), ("destination", destination)):
         spec[key] = {"east_m": east, "north_m": north, "amsl_m": altitude}

@@ -26,7 +26,7 @@ from world.scenario import with_flight
 
 RemedyKind = Literal["side", "turn-around", "every", "course", "parameter", "airspeed"]
 
-# Turn-arounds that are tried, m.
+# Turn-around distances that are tried, m.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
 # Interleave strides n that are tried, with which every n-th line is flown first.
 INTERLEAVE_STRIDES = (2, 3, 4)
@@ -41,14 +41,14 @@ class SurveyRemedy:
     """Change with which a survey was flown and passed.
 
     kind: kind of the change.  name: name of the changed parameter; "" for other kinds.
-    current, value: turn-around in m, interleave stride (fly every n-th line), course in degrees, value of the
+    current, value: turn-around distance in m, interleave stride (fly every n-th line), course in degrees, value of the
     parameter, or airspeed in m/s.
-    unit: unit of both.
+    unit: unit of `current` and `value`.
     verdict: verdict on the flight.
     mission: the mission as it was flown.
     length: length of its route, m.
-    turn_around: turn-around of the layout, or flown in addition to a parameter or an airspeed, m; NaN if unchanged.
-    lead_in: distance before the first line, if longer than the turn-around, m.
+    turn_around: turn-around distance of the layout, also with a changed parameter or airspeed, m; NaN if unchanged.
+    lead_in: distance before the first line, if longer than the turn-around distance, m.
     """
 
     kind: RemedyKind
@@ -65,7 +65,7 @@ class SurveyRemedy:
 
 @dataclass(frozen=True, slots=True)
 class NearMiss:
-    """Change that was flown and did not pass, with the most usable lines.
+    """Change that was flown and did not pass, but came closest to passing.
 
     what: description of the change.
     usable, lines: usable photo lines and all photo lines.
@@ -97,15 +97,18 @@ class TriedRemedies:
     kept: str = ""
 
 
-def survey_remedies(
+def find_survey_remedies(
     setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
 ) -> TriedRemedies:
-    """Find changes with which all photo lines of a survey can be used, the smallest of each kind, by trial flights.
+    """Find changes with which all photo lines of a survey can be used, by trial flights.
 
-    If no single change is enough, longer turn-arounds are combined with another parameter value or a lower airspeed: at
-    most four flights for each of about five changes.
+    Of each kind of change, the smallest change that passes is returned.
 
-    verdict: verdict on the flight of the setup.  on_trial: called before each flight with a description of the change.
+    If no single change is enough, longer turn-around distances are combined with another parameter value or a lower
+    airspeed.  There are at most four flights for each of about five changes.
+
+    verdict: verdict on the flight of the setup.
+    on_trial: called before each flight with a description of the change.
     A change passes if no photo line fails, and no other rule fails that did not fail before.
     """
     if _all_lines_usable(verdict) or not judged_surveys(setup):
@@ -137,7 +140,7 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
 
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
-    """Return the number of usable photo lines according to a verdict, and the number of all photo lines."""
+    """Return the number of usable photo lines and the number of all photo lines, according to a verdict."""
     lines = [finding.ok for finding in verdict.findings if finding.rule == "survey" and not finding.check]
     return sum(is_usable is True for is_usable in lines), len(lines)
 
@@ -151,18 +154,18 @@ def _usable_parts(verdict: Verdict) -> list[float]:
     ]
 
 
-def _closeness(verdict: Verdict) -> tuple[int, float, int]:
-    """Return a key that is larger for a flight closer to success.
+def _success_key(verdict: Verdict) -> tuple[int, float, int]:
+    """Return a sort key that is larger for a flight closer to success.
 
-    It consists of the number of usable lines, the usable part of all lines in whole %, and the negative number of
-    failures.
+    Its parts are the number of usable lines, the mean usable part of the lines in whole %, and the negative number of
+    failed findings.
     """
     parts = _usable_parts(verdict)
     return _count_usable(verdict)[0], round(sum(parts) / max(1, len(parts))), -len(verdict.failed)
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
-    """Return True if all photo lines are usable and their photos overlap."""
+    """Return True if all photo lines are usable, no finding on a survey fails, and there is a photo line."""
     usable, lines = _count_usable(verdict)
     return 0 < lines == usable and not any(
         finding.rule == "survey" and finding.ok is False for finding in verdict.findings
@@ -221,7 +224,7 @@ class _Trials:
         except PlanflyError:
             return None
         best_verdict = self._verdict if self.nearest is None else self.nearest.verdict
-        if _closeness(trial.flight_verdict) > _closeness(best_verdict):
+        if _success_key(trial.flight_verdict) > _success_key(best_verdict):
             self.nearest = NearMiss(description, *_count_usable(trial.flight_verdict), trial.flight_verdict)
         return trial.flight_verdict, mission, trial.setup.path.length
 
@@ -245,7 +248,10 @@ class _Trials:
         return self._fly_trial(mission, self._airframe, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
-        """Return True if all lines are usable, no further rule fails, and no rule fails noticeably more than before."""
+        """Return True if all lines are usable in a flight, and no other rule fails more than before.
+
+        A rule may fail by up to one noticeable difference (`scale`) more than before.
+        """
         return (
             flight is not None
             and _all_lines_usable(flight[0])
@@ -260,15 +266,21 @@ class _Trials:
     # The remedies, one change each.
 
     def find_turn_around(self) -> SurveyRemedy | None:
-        """Find the shortest turn-around that passes, among the turn-arounds longer than the current one."""
+        """Find the shortest turn-around distance that passes, or None.
+
+        Only distances longer than the current distance are tried.
+        """
         return self._find_shortest_turn_around(1, self._longer_turn_arounds(), 0.0)
 
     def _longer_turn_arounds(self) -> list[float]:
-        """Return the turn-arounds to try that are longer than the current one, m."""
+        """Return the turn-around distances to try that are longer than the current distance, m."""
         return [length for length in TURN_AROUNDS if length > self._current_turn_around + 1.0]
 
     def try_other_side(self) -> SurveyRemedy | None:
-        """Try the lines in the opposite order, with turns into the wind; return None in calm air or on failure."""
+        """Try the lines in the opposite order, which turns into the wind.
+
+        Returns None in calm air, or if the flight does not pass.
+        """
         if self._setup.scenario.wind.speed <= 0.0:
             return None
         flight = self._fly_layout(
@@ -281,9 +293,10 @@ class _Trials:
         )
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
-        """Find the smallest interleave stride that passes, with turn-arounds shorter than `max_turn_around`, m.
+        """Find the smallest interleave stride that passes, with turn-around distances below `max_turn_around`.
 
-        The lead-in to the first line is `max_turn_around`, the turn-around that passes without interleaving.
+        max_turn_around: turn-around distance that passes without interleaving, which is also the lead-in to the first
+        line, m; infinity if no distance passes.
         """
         lead_in = max_turn_around if math.isfinite(max_turn_around) else 0.0
         turn_arounds = [
@@ -301,9 +314,12 @@ class _Trials:
     def _find_shortest_turn_around(
         self, stride: int, turn_arounds: Sequence[float], lead_in: float
     ) -> SurveyRemedy | None:
-        """Find the shortest of increasing turn-arounds, m, with which all lines are usable; return it if it passes.
+        """Find the shortest turn-around distance with which all lines are usable.
 
-        The search is a bisection.  A turn-around is too long if the flight runs out of energy before its end.
+        Returns None if the flight with this distance does not pass.
+
+        The search is a bisection.  A distance is too long if the flight runs out of energy before its end.
+        turn_arounds: distances to try, in increasing order, m.
         """
         order_text = "" if stride == 1 else f"every {ordinal_text(stride)} line, "
         flights: dict[float, _TrialFlight | None] = {}
@@ -346,7 +362,7 @@ class _Trials:
         return min(remedies, key=lambda remedy: remedy.length, default=None)
 
     def find_parameter(self) -> SurveyRemedy | None:
-        """Find an autopilot parameter that makes the flight pass with another value; return None if there is none."""
+        """Find an autopilot parameter of which another value makes the flight pass; return None without one."""
         passed_flights: list[_TrialFlight] = []
 
         def passes_with(autopilot: Autopilot) -> bool:
@@ -364,7 +380,10 @@ class _Trials:
         )
 
     def find_airspeed(self) -> SurveyRemedy | None:
-        """Find the highest reduced airspeed that passes; None if the mission sets its own airspeed."""
+        """Find the highest of the reduced airspeeds that passes, or None.
+
+        Nothing is tried if the mission sets an airspeed.
+        """
         for speed, airframe in self._slower_airspeeds():
             flight = self._fly_trial(self._setup.mission, airframe, f"{speed:g} m/s")
             if self._is_remedy(flight):
@@ -377,11 +396,11 @@ class _Trials:
     def _find_turn_around_with(
         self, change: str, airframe: Airframe, turn_arounds: Sequence[float], mission: Mission | None = None
     ) -> SurveyRemedy | None:
-        """Find the shortest turn-around that passes in combination with another change.
+        """Find the shortest turn-around distance that passes in combination with another change.
 
         change: description of the other change.
         airframe, mission: changed airframe, and changed mission or None.
-        turn_arounds: turn-arounds to try, in increasing order, m.
+        turn_arounds: distances to try, in increasing order, m.
         """
         trials = copy(self)
         trials._airframe, trials._change_prefix = airframe, f"{change}, "
@@ -392,18 +411,25 @@ class _Trials:
         return remedy
 
     def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
-        """Try longer turn-arounds combined with one autopilot parameter; return the first pair that passes."""
+        """Try longer turn-around distances with another value of one autopilot parameter.
+
+        Returns the first pair that passes, or None.
+        """
         autopilot = self._airframe.autopilot
         if autopilot.parameters is None:
             return None
         values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
         pairs = (
-            self._find_pair(candidate, values[candidate.name]) for candidate in autopilot.deviations.track_candidates
+            self._find_turn_around_for_parameter(candidate, values[candidate.name])
+            for candidate in autopilot.deviations.track_candidates
         )
         return next((remedy for remedy in pairs if remedy is not None), None)
 
-    def _find_pair(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
-        """Find the shortest turn-around with the farthest value of a parameter, then the nearest value with it."""
+    def _find_turn_around_for_parameter(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
+        """Find the shortest turn-around distance that passes with the farthest value of a parameter.
+
+        Then the value nearest to the current value that passes with this distance is searched.
+        """
         remedies = list[SurveyRemedy]()
         # Do not suggest values below the documented range.
         start = max(current, candidate.least - candidate.step)
@@ -431,7 +457,7 @@ class _Trials:
         return remedies[-1]
 
     def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
-        """Try longer turn-arounds combined with the lowest of the reduced airspeeds."""
+        """Try longer turn-around distances with the lowest of the reduced airspeeds."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
             remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe, self._longer_turn_arounds())
             if remedy is not None:
@@ -439,7 +465,10 @@ class _Trials:
         return None
 
     def try_default_airspeed(self) -> SurveyRemedy | None:
-        """Try longer turn-arounds with the default airspeed, if the mission sets less than the minimum airspeed."""
+        """Try longer turn-around distances with the default airspeed, if the mission sets a too low airspeed.
+
+        Too low is an airspeed below the minimum airspeed of the aircraft.
+        """
         mission, default_airspeed = self._setup.mission, self._airframe.airspeed
         slow_items = [
             item for item in mission.items if 0.0 < _commanded_airspeed(item) < self._airframe.aircraft.airspeed_min
@@ -488,12 +517,18 @@ def ordinal_text(number: int) -> str:
 
 
 def _commanded_airspeed(item: MissionItem) -> float:
-    """Return the airspeed that an item sets, m/s; 0 for other items, NaN or negative if the item sets no airspeed."""
+    """Return the airspeed that an item sets, m/s.
+
+    The result is 0 for other items, and NaN or negative if the item sets no airspeed.
+    """
     return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0
 
 
 def _other_courses(course: float, wind: float) -> Iterator[float]:
-    """Yield the courses along and across the wind that differ by more than 15 degrees from the current course."""
+    """Yield the courses along and across the wind, unless they are close to the current course.
+
+    Courses within 15 degrees of the current course, in either direction, are left out.
+    """
     for new_course in (wind, wind + 0.5 * math.pi):
         if abs(math.sin(new_course - course)) > math.sin(math.radians(15.0)):
             yield new_course

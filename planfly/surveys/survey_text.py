@@ -12,7 +12,9 @@ from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 
 
 def is_line_usable(measure: LineMeasure | None) -> bool:
-    """Return True if enough of a photo line is usable.
+    """Return True if at least `PHOTO_COVERAGE_FRACTION` of a photo line is usable.
+
+    A line that was not flown is not usable.
 
     >>> is_line_usable(None)
     False
@@ -56,7 +58,7 @@ def survey_text(survey: Survey) -> str:
 
 
 def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
-    """Describe the overlap of photos along and across the lines, or state that it is unknown.
+    """Return texts on the photo overlap along and across the lines, or on why it is not judged.
 
     >>> overlap_lines(None)
     ('overlap not judged: the camera is unknown (--camera)',)
@@ -87,7 +89,10 @@ def has_required_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe how much of the lines is lost at their ends, which shows the turn-arounds that would be needed."""
+    """Describe the loss at the ends of the lines.
+
+    The loss shows the turn-around distance that would be needed.
+    """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (

@@ -85,7 +85,7 @@ class AircraftAnswer:
 
 
 def aircraft_entry(aircraft: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
-    """Return the answer's entry for an aircraft, with its metadata.
+    """Return the JSON entry of an aircraft, with its metadata.
 
     detail: quantities computed for the aircraft; None in a list of aircraft.
     """
@@ -106,7 +106,7 @@ def aircraft_entry(aircraft: Aircraft, detail: AircraftDetail | None) -> Aircraf
 
 
 def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
-    """Return the quantities computed for an aircraft, in the units of the answer."""
+    """Return the JSON entry of the quantities computed for an aircraft."""
     min_speed, max_speed = numbers.envelope.level_speeds(0.0)
     trims = [
         TrimEntry(

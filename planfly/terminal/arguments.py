@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_valid_position, is_wind
+from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_valid_camera, is_valid_position, is_valid_wind
 
 # ----------------------------------------------------------------------
 # Convert command line texts to values within the ranges of the API's keywords.
@@ -37,12 +37,12 @@ def number_parser(keyword: str) -> Callable[[str], Any]:
 
 
 def parse_wind(text: str) -> tuple[float, float]:
-    """Parse SPEED,FROM, the speed of a steady wind, m/s, and the direction it blows from, degrees."""
+    """Parse SPEED,FROM: speed (m/s) of a steady wind, and direction (degrees) from which the wind blows."""
     try:
         speed, from_deg = (float(part) for part in text.split(","))
     except ValueError:
         speed, from_deg = math.nan, 0.0
-    if not is_wind(speed, from_deg):
+    if not is_valid_wind(speed, from_deg):
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected SPEED,FROM: 0 to 40 m/s, and the degrees that the wind blows from (-360..360)"
         )
@@ -50,7 +50,9 @@ def parse_wind(text: str) -> tuple[float, float]:
 
 
 def parse_camera(text: str) -> tuple[float, ...]:
-    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE, with sensor size and focal length in mm, and overlaps in percent.
+    """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE.
+
+    They are the sensor size and the focal length (mm), and the photo overlaps (percent).
 
     >>> parse_camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
@@ -60,13 +62,13 @@ def parse_camera(text: str) -> tuple[float, ...]:
         numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *other_parts))
     except ValueError:
         numbers = ()
-    if not is_camera(numbers) or sensor.lower().count("x") != 1:
+    if not is_valid_camera(numbers) or sensor.lower().count("x") != 1:
         raise argparse.ArgumentTypeError(f"{text!r}: expected WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: {CAMERA_FORMAT}")
     return numbers
 
 
 def parse_position(text: str) -> tuple[float, float]:
-    """Parse LAT,LON of a position, degrees."""
+    """Parse LAT,LON: latitude and longitude of a position, degrees."""
     try:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
@@ -79,7 +81,7 @@ def parse_position(text: str) -> tuple[float, float]:
 
 
 def parse_area(text: str) -> tuple[float, ...]:
-    """Parse S,W,N,E, the edges of an area, degrees; the API checks the order of the edges."""
+    """Parse S,W,N,E: edges of an area, degrees; the API checks the order of the edges."""
     try:
         edges = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -90,7 +92,7 @@ def parse_area(text: str) -> tuple[float, ...]:
 
 
 def parse_autopilots(text: str) -> list[str]:
-    """Parse names of autopilots separated by commas."""
+    """Parse the names of autopilots, separated by commas."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in CHOICES["autopilot"]:
@@ -99,14 +101,20 @@ def parse_autopilots(text: str) -> list[str]:
 
 
 def parse_time_or_stations(text: str) -> float | str:
-    """Parse a time of the flight, s; a text with a colon is returned unchanged, as addresses of ground stations."""
+    """Parse a time of the flight (s), or return the addresses of ground stations unchanged.
+
+    A text with a colon is taken for addresses.
+    """
     if ":" in text:
         return text
     return number_parser("end")(text)
 
 
 def parse_budget(text: str) -> tuple[int | None, float | None]:
-    """Parse a number of evaluations, or a number of seconds if the text ends in s; return (evaluations, seconds)."""
+    """Parse a number of evaluations, or a number of seconds if the text ends in s.
+
+    Returns (evaluations, seconds).
+    """
     try:
         if text.endswith("s"):
             return None, number_parser("seconds")(text[:-1])
@@ -118,20 +126,23 @@ def parse_budget(text: str) -> tuple[int | None, float | None]:
 
 
 def parse_threat(text: str) -> tuple[float, float, float, float]:
-    """Parse EAST,NORTH,KILL,DETECTION, position and radii of a pop-up threat, m."""
+    """Parse EAST,NORTH,KILL,DETECTION: position, kill radius and detection radius of a pop-up threat, m."""
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
         east = math.nan
     if not (math.isfinite(east) and math.isfinite(north) and kill >= 0.0 and detection >= 0.0):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: expected EAST,NORTH,KILL,DETECTION: four numbers in m, a radius of 0 for none"
+            f"{text!r}: expected EAST,NORTH,KILL,DETECTION: four numbers in m; a radius of 0 means no such range"
         )
     return east, north, kill, detection
 
 
 def parse_problems(text: str) -> tuple[int, ...]:
-    """Parse threat counts separated by commas, such as "7,15"; only the four counts of the paper are allowed."""
+    """Parse threat counts separated by commas, such as "7,15".
+
+    Only the four counts of the paper are allowed.
+    """
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
@@ -175,7 +186,7 @@ def file_completer(*suffixes: str) -> Completer:
 
 
 def complete_scenario(prefix: str, **_context: object) -> list[str]:
-    """Return the names of built-in scenarios, and the scenario files, that start with `prefix`.
+    """Return the names of the built-in scenarios and the scenario files that start with `prefix`.
 
     >>> complete_scenario("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
@@ -185,7 +196,7 @@ def complete_scenario(prefix: str, **_context: object) -> list[str]:
 
 
 def complete_aircraft(prefix: str, **_context: object) -> list[str]:
-    """Return the names of built-in aircraft, and the folders, that start with `prefix`.
+    """Return the names of the built-in aircraft and the folders that start with `prefix`.
 
     >>> complete_aircraft("aero")
     ['aerosonde']

@@ -12,7 +12,9 @@ _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return a table with a row for each rule and a column for each autopilot, then the main lines of each verdict.
+    """Return a table of verdicts, and then the main lines of each verdict.
+
+    The table has a row for each rule and a column for each autopilot.
 
     verdicts: verdict for each autopilot, keyed by name, in the order of the columns.
 
@@ -25,7 +27,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     ardupilot: flyable
     px4: not flyable: speed; NAV_ACC_RAD 10
     """
-    rows = [("", *verdicts), ("verdict", *(_answer_text(verdict) for verdict in verdicts.values()))]
+    rows = [("", *verdicts), ("verdict", *(_verdict_result_text(verdict) for verdict in verdicts.values()))]
     # Keyed by title: photo lines and their overlap are shown apart, and have the rule "survey" in common.
     rules_by_title = [{rule.words.title: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
     all_findings = [finding for verdict in verdicts.values() for finding in verdict.findings]
@@ -49,15 +51,18 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     return lines
 
 
-def _answer_text(verdict: Verdict) -> str:
-    """Return a verdict in one or two words, for a cell of the table."""
+def _verdict_result_text(verdict: Verdict) -> str:
+    """Return the result of a verdict as a short text for a cell of the table, such as "not flyable"."""
     if verdict.undecided:
         return verdict.answer
     return "flyable" if verdict.flyable else "not flyable"
 
 
 def _rule_summary(rule: RuleFindings | None) -> str:
-    """Return the number of failed findings of a rule, or the number of judged findings if none failed."""
+    """Return how many findings of a rule failed or passed, as text for a cell.
+
+    Returns "" if the rule has no findings.
+    """
     if rule is None or not rule.judged:
         return "not judged" if rule else ""
     return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

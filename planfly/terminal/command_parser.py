@@ -106,17 +106,22 @@ class CommandParser(argparse.ArgumentParser):
         return colour_help(text) if wants_colour(sys.stdout) else text
 
     def add_group(self, title: str, description: str | None = None) -> OptionGroup:
-        """Add a group of options, which the help shows under a title, and return it."""
+        """Add a group of options, shown in the help under a title, and return the group."""
         return self.add_argument_group(title, description)
 
     def alias_keyword(self, keyword: str, option: str) -> None:
-        """Register an option under whose name error messages mention an API keyword with another name."""
+        """Name the option that error messages show in place of an API keyword.
+
+        This is needed for a keyword that differs from the option's dest.
+        """
         self._aliases[keyword] = option
 
     def take_late_arguments(self, parsed: argparse.Namespace, unknown_arguments: list[str]) -> bool:
-        """Store unknown arguments as the optional or last positional arguments, and return True if they fit there.
+        """Store positional arguments that argparse left over.
 
-        argparse itself takes these only directly behind the other positional arguments, not behind an option.
+        Returns True if a positional parameter takes them.
+
+        argparse itself accepts optional positional arguments only directly after the others, not after an option.
         """
         for action in self._actions:
             if action.option_strings or any(argument.startswith("-") for argument in unknown_arguments):
@@ -131,7 +136,7 @@ class CommandParser(argparse.ArgumentParser):
         return False
 
     def options_by_keyword(self) -> dict[str, str]:
-        """Return the option for each API keyword."""
+        """Return the option that sets each API keyword, by keyword."""
         options_by_dest = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return options_by_dest | self._aliases
 
@@ -165,7 +170,7 @@ class LineParser(CommandParser):
         self._positionals._group_actions.clear()
 
     def start_section(self, title: str) -> None:
-        """Start a section of the help under a title, for the commands added next."""
+        """Start a section of the help with a title; the commands added next are listed in this section."""
         self._section = title
 
     def add_command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
@@ -213,7 +218,7 @@ class LineParser(CommandParser):
                 "",
             ).partition("=")[0]
             if option:
-                parser.error(f"{option}: no such option{_similar_option(option, parser.long_options())}")
+                parser.error(f"{option}: no such option{_similar_option_hint(option, parser.long_options())}")
             parser.error(
                 f"{next((argument for argument in unknown_arguments if argument != '--'), unknown_arguments[0])}:"
                 " no such argument"
@@ -264,13 +269,17 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     return _KEYWORD.sub(lambda match: options.get(match[1] or match[2], match[0]), text)
 
 
-def _similar_option(option: str, options: Iterable[str]) -> str:
-    """Return the end of a message about an unknown option: the most similar option, or "".
+def _similar_option_hint(option: str, options: Iterable[str]) -> str:
+    """Return the end of a message about an unknown option, which suggests the most similar option.
+
+    Returns "" if no option is similar.
 
     The leading dashes, which all options share, are not compared.
 
-    >>> _similar_option("--terain", ["--terrain", "--overwrite"]), _similar_option("--terrain", ["--overwrite"])
-    (": did you mean '--terrain'?", '')
+    >>> _similar_option_hint("--terain", ["--terrain", "--overwrite"])
+    ": did you mean '--terrain'?"
+    >>> _similar_option_hint("--terrain", ["--overwrite"])
+    ''
     """
     text = did_you_mean(option.lstrip("-"), [name.lstrip("-") for name in options])
     return text.replace("did you mean '", "did you mean '--")

@@ -25,7 +25,10 @@ def escape_controls(text: str, *, colours: bool = False) -> str:
 
 
 def _escape(match: re.Match[str]) -> str:
-    """Return the escape for a matched control character; longer matches and other characters are returned unchanged."""
+    """Return the escape for a matched control character.
+
+    Longer matches and other characters are returned unchanged.
+    """
     text = match[0]
     is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS
     return text.encode("unicode_escape").decode() if is_control else text

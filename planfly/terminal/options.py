@@ -53,22 +53,23 @@ def add_result_options(
 
     out: help text of --out, or "" for a command without this option.
     placeholder: placeholder for the value of --out.
-    junit: True if the answer of the command is a verdict.
+    json: True adds --json and --quiet.
+    junit: True adds --junit, for a command whose answer is a verdict.
     """
     group = parser.add_group("results")
     if out:
         group.add_argument("--out", metavar=placeholder, help=out)
     group.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
     if json:
-        add_json_option(group, parser.prog.split()[-1])
+        add_json_and_quiet_options(group, parser.prog.split()[-1])
     if junit:
         group.add_argument(
             "--junit", metavar="FILE", help="also write the verdict as JUnit XML, for continuous integration"
         )
 
 
-def add_json_option(group: OptionGroup, command: str) -> None:
-    """Add the options for an answer as JSON, and for no printed text."""
+def add_json_and_quiet_options(group: OptionGroup, command: str) -> None:
+    """Add the options --json and --quiet.  command: name of the command, for the help text."""
     group.add_argument(
         "--json",
         metavar="FILE",
@@ -270,7 +271,10 @@ def add_log_rate_option(group: OptionGroup) -> None:
 
 
 def add_imported_log_options(parser: CommandParser) -> None:
-    """Add the options for information that may be missing in a log of another program."""
+    """Add the options for information that another program's log may lack.
+
+    They state its mission, flight number and altitude datum.
+    """
     group = parser.add_group("an autopilot's log")
     option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
     with_completer(option, file_completer(*MISSION_SUFFIXES))
@@ -320,7 +324,10 @@ def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def watch_stop_signals() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after SIGINT or SIGTERM; neither signal interrupts the process itself."""
+    """Catch SIGINT and SIGTERM while the block runs.
+
+    Yields a function that returns True after either signal.
+    """
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 
 class _SafeStream(io.TextIOBase):
-    """Stream without control characters in its text.
+    """Text stream that escapes control characters before it writes to another stream.
 
-    plain: the underlying stream, for text that moves the cursor.
+    plain: the other stream, for text that moves the cursor.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -53,7 +53,7 @@ class _SafeStream(io.TextIOBase):
         return self.plain.fileno()
 
     def write(self, text: str, /) -> int:
-        """Write the text without control characters."""
+        """Write the text with its control characters escaped."""
         self.plain.write(escape_controls(text, colours=wants_colour(self.plain)))
         return len(text)
 
@@ -63,14 +63,14 @@ class _SafeStream(io.TextIOBase):
 
 
 class _TolerantStream(_SafeStream):
-    """Stream that writes until its reader has gone, and drops the rest."""
+    """Stream that discards all text after its reader has closed the pipe."""
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__(stream)
         self._is_reader_gone = False
 
     def write(self, text: str, /) -> int:
-        """Write the text, or drop it if the reader has gone."""
+        """Write the text, or discard it if the reader has closed the pipe."""
         if not self._is_reader_gone:
             try:
                 super().write(text)
@@ -81,7 +81,7 @@ class _TolerantStream(_SafeStream):
         return len(text)
 
     def flush(self) -> None:
-        """Flush the buffered text, or drop it if the reader has gone."""
+        """Flush the buffered text, or discard it if the reader has closed the pipe."""
         if not self._is_reader_gone:
             try:
                 super().flush()
@@ -93,7 +93,10 @@ class _TolerantStream(_SafeStream):
                 raise _with_stream_name(error) from error
 
     def _drop_output(self) -> None:
-        """Ignore all further text, and let the interpreter write buffered text to the null device when it ends."""
+        """Discard all further text.
+
+        The descriptor is redirected to the null device for the text that is still buffered.
+        """
         self._is_reader_gone = True
         # When the interpreter ends, it flushes the buffered text, which then goes to the null device.
         with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as null_file:
@@ -136,14 +139,17 @@ def printable(text: str) -> str:
 
 
 def plain_stream(stream: TextIO) -> TextIO:
-    """Return the stream that a safe stream wraps, for text that moves the cursor; other streams are returned as is."""
+    """Return the stream under a `_SafeStream`, for text that moves the cursor.
+
+    Returns other streams unchanged.
+    """
     plain: TextIO = getattr(stream, "plain", stream)
     return plain
 
 
 @contextlib.contextmanager
 def safe_streams() -> Iterator[None]:
-    """Keep control characters out of standard output and error, and tolerate a reader that closes standard output."""
+    """Escape control characters in standard output and error, and tolerate a closed pipe."""
     tolerant = _TolerantStream(sys.stdout)
     with contextlib.redirect_stdout(tolerant), contextlib.redirect_stderr(_SafeStream(sys.stderr)):
         try:
@@ -160,7 +166,7 @@ _MAX_BYTES = 20_000
 
 
 class _LastDuration(NamedTuple):
-    """Duration of the previous stage of a kind.
+    """Duration of the last stage of a kind that was run on this machine.
 
     per_unit: seconds per unit of work, 0 if its units are unknown.
     total: seconds for the whole stage.
@@ -179,7 +185,7 @@ def _durations_file() -> Path:
 
 
 def _last_durations() -> dict[str, _LastDuration]:
-    """Return the last duration by kind of stage; empty if the file is missing or invalid."""
+    """Read the duration of the last stage of each kind; empty if the file is missing or invalid."""
     durations = {}
     with contextlib.suppress(OSError, ValueError, RecursionError):
         stored_durations = json.loads(read_at_most(_durations_file(), _MAX_BYTES, "durations"))
@@ -190,8 +196,8 @@ def _last_durations() -> dict[str, _LastDuration]:
     return durations
 
 
-def _store_duration(kind: str, duration: _LastDuration) -> None:
-    """Store the duration of a stage of a kind; a file that cannot be written is ignored silently."""
+def _write_duration(kind: str, duration: _LastDuration) -> None:
+    """Store the duration of the last stage of a kind; ignore an error in writing the file."""
     text = json.dumps(_last_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
     with contextlib.suppress(OSError):
         _durations_file().parent.mkdir(parents=True, exist_ok=True)
@@ -203,6 +209,7 @@ def _store_duration(kind: str, duration: _LastDuration) -> None:
 
 
 def _print_line(line: str) -> None:
+    """Print a progress line on standard error."""
     print(line, file=sys.stderr, flush=True)
 
 
@@ -220,10 +227,10 @@ _stage_numbers = itertools.count()
 
 
 class _TimeLeft:
-    """Time left for a stage, extrapolated from its first report; known from its second report on.
+    """Estimate of the time left for a stage, extrapolated from the progress since its first report.
 
-    Until then, the duration of the previous stage of its kind is the estimate.
-    The time before the first report is ignored, because kernels may have been compiled in it.
+    Until the second report, the duration of the last stage of its kind is the estimate.  The time before the first
+    report is ignored, because kernels may have been compiled in it.
     """
 
     def __init__(self, kind: str) -> None:
@@ -245,7 +252,10 @@ class _TimeLeft:
         return f"{_duration_text(self._measured_time() * (total - done) / units_done)} left"
 
     def initial_estimate(self, remaining_units: float) -> str:
-        """Return an estimate as text before any progress is measured.  remaining_units: units of work, 0 if unknown."""
+        """Return an estimate as text before any progress is measured, from the last stage of this kind.
+
+        remaining_units: units of work still to be done, 0 if unknown.
+        """
         last_duration = _last_durations().get(self._kind)
         if last_duration is not None and remaining_units > 0.0 and last_duration.per_unit > 0.0:
             return f"about {_duration_text(last_duration.per_unit * remaining_units)}, at the pace of the last run here"
@@ -266,10 +276,13 @@ class _TimeLeft:
         return time.monotonic() - self._start_time
 
     def store_duration(self) -> None:
-        """Store the duration for the next run, unless the stage contained another stage, such as a compilation."""
+        """Store the duration of the stage for the next run.
+
+        A stage that contained another stage, such as a compilation, is not stored.
+        """
         if next(_stage_numbers) == self._number + 1:
             units = 0.0 if self._first_report is None else self._done - self._first_report[1]
-            _store_duration(
+            _write_duration(
                 self._kind, _LastDuration(self._measured_time() / units if units > 0.0 else 0.0, self.elapsed())
             )
 
@@ -306,7 +319,10 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
 
 @contextmanager
 def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
-    """Update the elapsed time of a stage at intervals from a thread, or not at all if no thread can start."""
+    """Refresh a display every second from a thread while the block runs.
+
+    If no thread can start, the display is not refreshed.
+    """
     stage_ended = threading.Event()
 
     def refresh() -> None:
@@ -325,6 +341,7 @@ def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
 
 
 def _join_nonempty(*parts: str) -> str:
+    """Join the parts that are not empty by commas."""
     return ", ".join(filter(None, parts))
 
 
@@ -445,16 +462,18 @@ class _Lines:
                 )
 
     def _print_first_line(self, estimate: str) -> None:
+        """Print the line that a stage begins, with an estimate of its duration."""
         self._has_started = True
         self._print_and_note_time(f"{self._title} ... ({estimate})")
 
     def _print_and_note_time(self, line: str) -> None:
+        """Print a line, and record the time at which it was printed."""
         self._last_print_time = self._time_left.elapsed()
         _print_line(line)
 
 
 def _ignore_progress(*_: object) -> None:
-    pass
+    """Ignore progress and lines, for a command with --quiet."""
 
 
 # Receiver that shows progress on standard error.
@@ -468,7 +487,7 @@ SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore_progress), _ignore_p
 
 
 def answer_text(answer: object) -> str:
-    """Return an answer as JSON text; NaN and infinity are null."""
+    """Return the answer of a command as JSON text; NaN and infinity become null."""
     # Imported here: only answers need schemas.
     from pydantic import TypeAdapter
 
@@ -483,9 +502,12 @@ _output: ContextVar[TextIO | None] = ContextVar("output", default=None)
 
 @contextlib.contextmanager
 def redirect_output(args: argparse.Namespace) -> Iterator[None]:
-    """Redirect printed lines: to nowhere with --quiet, to standard error if standard output gets the answer.
+    """Discard printed lines with --quiet, or keep them out of a JSON answer on standard output.
 
-    Raises PlanflyError if the file for the answer exists, or if the command reads this file.
+    With ``--json -`` the lines are printed on standard error.
+
+    Progress is not shown with --quiet.  Raises PlanflyError if the file for the JSON answer or the JUnit report is an
+    input of the command, or if it exists and is not to be overwritten.
     """
     answer_target, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
     for target in (answer_target, getattr(args, "junit", None)):
@@ -523,7 +545,10 @@ def write_json_if_requested(args: argparse.Namespace, make_answer: Callable[[], 
 
 
 def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
-    """Write verdicts as JUnit XML if requested.  verdicts: verdict of each judged mission or flight, keyed by name."""
+    """Write verdicts as JUnit XML if requested.
+
+    verdicts: verdict of each judged mission or flight, keyed by name.
+    """
     if args.junit is not None:
         from logs.verdict.junit import junit_text
 

@@ -77,7 +77,10 @@ PlanDocument = PlanAnswer | FrontAnswer
 
 
 def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
-    """Return the JSON answer for a Pareto front whose files are in a folder.  code: exit code of the command."""
+    """Return the JSON answer for a Pareto front whose files are in a folder.
+
+    code: exit code of the command.
+    """
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
 
@@ -116,12 +119,15 @@ def fewer_plans_line(front: "Front") -> str:
     return (
         f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other plan that was "
         f"found gains more than {min_fraction} in length or {front.fourth}, {min_exposure} in "
-        f"exposure or {min_height} in height"
+        f"exposure or {min_height} in height above ground"
     )
 
 
 def front_lines(front: "Front", folder: Path) -> list[str]:
-    """Return the lines that the terminal shows for a front: conditions, a table of the plans, and the written files."""
+    """Return the lines that the terminal shows for a front.
+
+    They are the conditions, a table of the plans, and the written files.
+    """
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
-    """Print the summary of a verdict, its failed rules, and the finding closest to its limit for each rule."""
+    """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule."""
     # Imported here because --help does not need it.
     from planfly.terminal.verdict_lines import verdict_lines
 

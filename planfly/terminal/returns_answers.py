@@ -209,13 +209,16 @@ class ReturnsAnswer:
     notes: list[str]
 
 
-def suggestion_entry(answer: ReturnsResult, trial: RemedyTrial) -> ReturnSuggestion:
-    """Return the JSON entry of a suggested remedy, with the numbers of safe and unsafe returns that it gives."""
+def suggestion_entry(result: ReturnsResult, trial: RemedyTrial) -> ReturnSuggestion:
+    """Return the JSON entry of a suggested remedy.
+
+    It has the numbers of safe and unsafe returns with this remedy.
+    """
     rally = None
     if trial.remedy.rally is not None:
         rally = []
         for point in trial.remedy.rally:
-            lat, lon = (float(value) for value in to_geo(answer.setup.scenario.origin, point.east, point.north))
+            lat, lon = (float(value) for value in to_geo(result.setup.scenario.origin, point.east, point.north))
             rally.append(
                 RallyEntry(lat_deg=round(lat, 7), lon_deg=round(lon, 7), over_home_m=round(point.up - point.base, 1))
             )
@@ -228,11 +231,14 @@ def suggestion_entry(answer: ReturnsResult, trial: RemedyTrial) -> ReturnSuggest
     )
 
 
-def program_entry(answer: ReturnsResult) -> ByProgram | None:
-    """Return the JSON entry of the returns that the ArduPlane program flew, or None if the program was not used."""
-    if answer.by_program is None:
+def program_returns_entry(result: ReturnsResult) -> ByProgram | None:
+    """Return the JSON entry of the returns that the ArduPlane program flew.
+
+    Returns None if the program was not used.
+    """
+    if result.by_program is None:
         return None
-    log_path_by_name = {log.name: str(log) for log in answer.files}
+    log_path_by_name = {log.name: str(log) for log in result.files}
     entries = [
         ProgramReturnEntry(
             at_s=round(pair.simulated.time, 2),
@@ -245,9 +251,9 @@ def program_entry(answer: ReturnsResult) -> ByProgram | None:
             reason=pair.reason,
             log=None if pair.log is None else log_path_by_name.get(pair.log.name),
         )
-        for pair in answer.by_program.pairs
+        for pair in result.by_program.pairs
     ]
-    return ByProgram(version=answer.by_program.program, returns=entries)
+    return ByProgram(version=result.by_program.program, returns=entries)
 
 
 def _measured_return(simulated_return: SimulatedReturn) -> MeasuredReturn:
@@ -265,9 +271,12 @@ def _round_to_tenths(value: float) -> float | None:
     return round(value, 1) if math.isfinite(value) else None
 
 
-def glides_entry(answer: ReturnsResult) -> GlidesEntry:
-    """Return the JSON entry of the glides after an engine failure."""
-    glides = answer.glides
+def glides_entry(result: ReturnsResult) -> GlidesEntry:
+    """Return the JSON entry of all glides after an engine failure.
+
+    It names the place that can be reached from each second of the flight.
+    """
+    glides = result.glides
     entries = []
     for glide_range in glides.ranges:
         glide = glide_range.lowest_glide
@@ -309,10 +318,12 @@ def glides_entry(answer: ReturnsResult) -> GlidesEntry:
     )
 
 
-def return_entry(answer: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
-    """Return the JSON entry of consecutive returns with the same outcome; the numbers are from the worst return."""
-    worst_return, scenario, round_to_tenths = return_range.worst, answer.setup.scenario, _round_to_tenths
+def return_range_entry(result: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
+    """Return the JSON entry of consecutive returns with the same outcome.
 
+    Its numbers are those of the worst return.
+    """
+    worst_return, scenario, round_to_tenths = return_range.worst, result.setup.scenario, _round_to_tenths
     return ReturnEntry(
         first_s=round(return_range.first, 2),
         last_s=round(return_range.last, 2),
@@ -326,8 +337,8 @@ def return_entry(answer: ReturnsResult, return_range: ReturnRange) -> ReturnEntr
         clearance_north_m=round_to_tenths(worst_return.lowest_position[1]),
         outside_m=round_to_tenths(worst_return.sphere_distance),
         threat=scenario.threats.names[worst_return.threat] if worst_return.kind == "threat" else None,
-        zone=answer.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
+        zone=result.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
         energy_wh=round_to_tenths(worst_return.energy),
         left_wh=round_to_tenths(worst_return.energy_left),
-        text=range_text(return_range, answer.returns, scenario),
+        text=range_text(return_range, result.returns, scenario),
     )

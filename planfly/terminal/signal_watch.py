@@ -31,7 +31,9 @@ _COMPILER_PACKAGES = ("numba", "llvmlite")
 
 @contextlib.contextmanager
 def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
-    """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force ``grace`` seconds after a signal.
+    """Raise `Interrupted` for SIGINT and SIGTERM, and end a process that does not react.
+
+    The process is ended by force ``grace`` seconds after a signal.
 
     Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long. A thread
     therefore kills this process's children, removes its unfinished files and ends it with exit code 128 plus the number
@@ -82,7 +84,9 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
-    """Return True if Numba is in the call stack, compiling, reading a cached kernel or boxing a kernel's results.
+    """Return True if Numba is in the call stack.
+
+    Numba may be compiling, reading a cached kernel or boxing a kernel's results.
 
     If an exception interrupts Numba, compiled code continues with a null pointer, and the process crashes. A result
     that is a named tuple is made by a module named after its class.
@@ -96,7 +100,10 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """Return a function that reads signal numbers, and the non-blocking handle to which Python writes the numbers."""
+    """Return a function that reads signal numbers, and the handle to which Python writes them.
+
+    The handle does not block.
+    """
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
         os.set_blocking(write, False)
@@ -110,7 +117,10 @@ def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
 
 
 def _end_process_after_signal(read_number: Callable[[int], bytes], received: list[int], grace: float) -> None:
-    """Wait for the first signal, append its number to `received`, give the command time to end, and end the process."""
+    """Wait for the first signal, give the command time to end, and end the process.
+
+    The number of the signal is appended to `received`.
+    """
     while (number := read_number(1)[0]) not in ENDING_SIGNALS:
         pass
     # Append the number here, too, because a command may have its own signal handlers.

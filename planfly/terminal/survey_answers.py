@@ -15,7 +15,10 @@ from planfly.terminal.verdict_answers import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PhotoLineEntry:
-    """A photo line as flown; if not flown, all fields but its items are null. Shares are fractions of its length."""
+    """A photo line as flown; if not flown, all fields but its items are null.
+
+    Shares are fractions of its length.
+    """
 
     first_item: int
     last_item: int
@@ -99,7 +102,10 @@ class SurveyAnswer:
 
 
 def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure | None) -> PhotoLineEntry:
-    """Return the JSON entry of a photo line.  measure: measures of the flown line, or None if it was not flown."""
+    """Return the JSON entry of a photo line.
+
+    measure: measures of the flown line, or None if it was not flown.
+    """
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
     def round_to_1e4(value: float | None) -> float | None:

@@ -17,7 +17,10 @@ _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
-    """Return the lines of a verdict: summary, failures, the finding closest to its limit for each rule, and notes."""
+    """Return the lines of a verdict for a terminal.
+
+    They are the summary, the failures, the finding closest to its limit for each rule, and the notes.
+    """
     presentation = verdict.present()
     lines = [colour_text(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
     for rule in presentation.failed_rules:
@@ -38,7 +41,10 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Return lines on the worst failed finding of a rule, its suggestion, and the places of the other failures."""
+    """Return the lines for a failed rule.
+
+    They name the worst finding, its suggestion, and the places of the other failed findings.
+    """
     worst_finding, *other_findings = rule.failed
     rule_name = rule.words.word
     places_text = (
@@ -61,7 +67,10 @@ def _place_and_value(finding: Finding) -> str:
 
 
 def _rule_summary(rule: RuleFindings) -> str:
-    """Count the findings of a rule, and describe the finding closest to its limit."""
+    """Return the counts of a rule's findings and the finding closest to its limit.
+
+    For a rule without a judged finding the text gives the reason.
+    """
     if not rule.judged:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin

@@ -46,7 +46,7 @@ class Airframe:
 
 
 def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan | None = None) -> Plan:
-    """Return a plan with the departure and the approach that its scenario requires added.
+    """Return the plan with the departure and the approach that its scenario requires.
 
     If the scenario requires neither, the plan is returned unchanged.
 
@@ -63,26 +63,26 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
     True
     """
     autopilot, cruise = airframe.autopilot, airframe.airspeed
-    final_law = FinalModel(
+    final_model = FinalModel(
         airspeed=lambda tailwind, amsl: autopilot.ground.airspeed(cruise, tailwind, amsl),
         slope=lambda height, distance, tailwind, amsl: autopilot.ground.glide(height, distance, tailwind, amsl).slope,
     )
     flown_departure = None if flown_plan is None or flown_plan.ways is None else flown_plan.ways.climb
-    return add_departure_and_approach(plan, airframe.limits.with_margin(), final_law, flown_departure)
+    return add_departure_and_approach(plan, airframe.limits.with_margin(), final_model, flown_departure)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """Return the requested seed; if it is None, the seed of the scenario, or 1 if the scenario has no seed."""
+    """Return the requested seed, or else the seed of the scenario, or else 1."""
     if seed is not None:
         return seed
     return scenario.planner.seed if scenario.planner.seed is not None else 1
 
 
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
-    """Load the scenario's aircraft, its envelope and autopilot, and the limits that scenario and aircraft set.
+    """Load the aircraft of a scenario, its autopilot, and the limits that scenario and aircraft set.
 
     parameters: autopilot parameters that replace the file's parameters, by name and in the units of the autopilot.
-    Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
+    Raises ScenarioError for an unknown aircraft or autopilot, or an airspeed outside the range of the aircraft, and
     ParameterError for an unreadable parameter file, or values that are not allowed.
 
     >>> from world.scenario import load_scenario
@@ -91,7 +91,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     ('aerosonde', 25.0, 60.0)
     """
     table = scenario.flight
-    aircraft, battery = find_airframe(scenario)
+    aircraft, battery = find_aircraft_and_energy(scenario)
     autopilot = load_autopilot(scenario, aircraft)
     if parameters:
         # Parameters stored in a log are checked like those of a file.
@@ -99,11 +99,13 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot))
-    return Airframe(aircraft, with_tracking(limits, autopilot, scenario), battery, autopilot)
+    return Airframe(aircraft, with_tracking_error(limits, autopilot, scenario), battery, autopilot)
 
 
 def airframe_for_setup(setup: FlightSetup) -> Airframe:
-    """Return the airframe of a setup.  Raises FlightError if the catalog does not contain the aircraft.
+    """Return the airframe of a flight setup.
+
+    Raises FlightError if the catalog does not contain its aircraft.
 
     >>> from logs.recording.example_log import example_log
     >>> airframe_for_setup(example_log().setup).aircraft.name
@@ -118,8 +120,8 @@ def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
     return min(math.radians(scenario.flight.max_bank_deg), autopilot.turns.max_bank)
 
 
-def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Return limits that allow for the tracking error of an autopilot in a scenario."""
+def with_tracking_error(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
+    """Return limits with the tracking error of an autopilot in the wind and navigation of a scenario."""
     table = scenario.flight
     tracking = autopilot.deviations.tracking_error(
         limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
@@ -127,11 +129,13 @@ def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> L
     return replace(limits, tracking=tracking)
 
 
-def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
-    """Return the aircraft of a scenario and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
+def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
+    """Return the aircraft of a scenario and the energy carried (Wh).
+
+    Raises ScenarioError for an unknown aircraft.
 
     >>> from world.scenario import load_scenario
-    >>> find_airframe(load_scenario("tight"))[0].name
+    >>> find_aircraft_and_energy(load_scenario("tight"))[0].name
     'aerosonde'
     """
     table = scenario.flight
@@ -146,7 +150,7 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
 def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
     """Return the initial cruise airspeed, m/s, from (in order) scenario, parameter file, aircraft.
 
-    Raises ScenarioError for an airspeed that the aircraft cannot fly.
+    Raises ScenarioError for an airspeed outside the range of the aircraft.
     """
     cruise_parameter, parameters = autopilot.speeds.cruise_parameter, autopilot.parameters
     file_airspeed = autopilot.stated_value(cruise_parameter)
@@ -162,8 +166,11 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
     return airspeed
 
 
-def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """Return the airframe with the limits and the maximum bank of a tightened scenario."""
+def with_tightened_limits(airframe: Airframe, scenario: Scenario) -> Airframe:
+    """Return the airframe with the limits of a tightened scenario.
+
+    Envelope, airspeed and tracking error stay.
+    """
     old_limits = airframe.limits
     limits = make_limits(
         scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot)

@@ -50,7 +50,9 @@ def can_apply(suggestion: Suggestion) -> bool:
 def apply_suggestion(
     context: MissionContext, judged_mission: JudgedMission, finding: Finding, suggestion: Suggestion
 ) -> Mission:
-    """Return a mission changed as one suggestion of a finding proposes.
+    """Return the mission with one suggestion of a finding applied.
+
+    If a suggestion can be applied in several ways, the mission with the fewest failed findings is returned.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
     """
@@ -90,7 +92,9 @@ def apply_suggestion(
 
 
 def item_moves(context: MissionContext, before: Mission, after: Mission) -> tuple[ItemMove, ...]:
-    """Return the moves of the items between two missions; () if items were inserted, as for a change of airspeed.
+    """Return the moves of the items between two missions.
+
+    The result is empty if items were inserted, as for a change of airspeed.
 
     A change of altitude is 0 if the altitude is unknown.
     """
@@ -123,10 +127,10 @@ def _approach_indices(mission: Mission) -> frozenset[int]:
 
 @dataclass(frozen=True, slots=True)
 class _Choice:
-    """Choice between the moves that make one suggestion.
+    """Choice of the items to move for one suggestion.
 
-    max_moves, radially: greatest number of waypoints to move away from a missile, and True if each moves in its own
-        direction.
+    max_moves: greatest number of waypoints to move away from a missile; None for all.
+    radially: True if each of these waypoints moves in its own direction from the missile.
     end_fraction: share of a change of a leg's rise that is made at the leg's end; the rest is made at its start.
     """
 
@@ -153,11 +157,11 @@ class _EditedMission:
         return indices[0] if indices else None
 
     def waypoint_positions(self) -> Floats:
-        """Return the waypoints of the route before the change, (w, 3), m."""
+        """Return the waypoints of the unchanged route, (w, 3) m."""
         return np.asarray(self.route.positions)
 
     def current_position(self, waypoint: int) -> Floats:
-        """Return a waypoint of the route as moved so far, (3,) m."""
+        """Return the position (3,) of a waypoint with all moves so far, m."""
         index = self.item_index(waypoint)
         offset = np.zeros(3) if index is None else self.offsets.get(index, np.zeros(3))
         return np.asarray(self.route.positions[waypoint] + offset)
@@ -190,7 +194,7 @@ class _EditedMission:
             self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
     def end_waypoints(self, legs: Sequence[int]) -> list[int]:
-        """Return the indices of the waypoints at the ends of some legs.
+        """Return the indices of the waypoints at the ends of the legs.
 
         The first and last waypoint of the route are left out unless there are no other waypoints.
         """
@@ -200,7 +204,10 @@ class _EditedMission:
 
 
 def _changed_leg(change: Change, route: Route) -> int:
-    """Return the index of the leg that a change refers to.  Raises MissionError for a change of another kind."""
+    """Return the index of the leg that a change refers to.
+
+    Raises MissionError if it names no leg of the route.
+    """
     if change.place.kind != "leg" or change.place.index is None or change.place.index >= route.legs:
         raise MissionError("this suggestion names no leg of the route", field="suggestion")
     return change.place.index
@@ -279,7 +286,10 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Move waypoints that lie outside the area, or too close to its edges, floor or ceiling, into the area."""
+    """Move waypoints that are outside the area, or too close to its borders, into the area.
+
+    Borders are the edges, the floor and the ceiling.
+    """
     scenario, points = edited.context.scenario, edited.waypoint_positions()
     (west, east), (south, north) = scenario.bounds.tolist()
     min_position = np.array([west, south, scenario.floor]) + change.wanted
@@ -291,7 +301,7 @@ def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding)
 
 
 def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Move the waypoints near the sphere of a missile so that the nearest point of their legs moves away from it."""
+    """Move the waypoints near a missile so that the nearest point of their legs moves away from it."""
     missile = edited.context.scenario.threats.position[change.place.index or 0, :2]
     legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
     if not legs:
@@ -312,7 +322,7 @@ def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Fin
 
 
 def _nearest_point(position: Floats, points: Floats, legs: Sequence[int]) -> tuple[Floats, int, float]:
-    """Find the point of some legs that is nearest to a position (2,).
+    """Find the point on the legs that is nearest to a position (2,).
 
     points: waypoints of the route, (w, 2) m.
     Returns the direction from the position to this point (2,), a unit vector, the leg, and the fraction of the leg's

@@ -50,7 +50,9 @@ class FlightLimits:
 def predicted_seconds(setup: FlightSetup) -> float:
     """Return the predicted duration of a flight in still air, s.
 
-    The speed is the mean of the legs' airspeeds, weighted by time.
+    This is the path length divided by the mean demanded airspeed.
+
+    The mean of the legs' airspeeds is weighted by time.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -62,8 +64,11 @@ def predicted_seconds(setup: FlightSetup) -> float:
     return float(setup.path.length / speed)
 
 
-def flight_text(setup: FlightSetup) -> str:
-    """Describe the length and the predicted duration of a flight."""
+def length_and_duration_text(setup: FlightSetup) -> str:
+    """Return the length and the predicted duration of a flight as text.
+
+    An example is "12.3 km, about 500 s in the air".
+    """
     seconds = predicted_seconds(setup)
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:
@@ -71,8 +76,11 @@ def flight_text(setup: FlightSetup) -> str:
     return f"{setup.path.length / 1000.0:.1f} km, about {time} in the air"
 
 
-def flight_kind(setup: FlightSetup) -> str:
-    """Return the key under which durations of flights are stored; flights of one key take similar times per km."""
+def computing_time_key(setup: FlightSetup) -> str:
+    """Return the key under which the computing time of a flight is stored.
+
+    Simulations of flights with the same key take similar times per km.
+    """
     return f"flying by {setup.autopilot.name}"
 
 

@@ -70,7 +70,7 @@ _MIN_AIRSPEED_STALL_RATIO = 1.2
 
 
 def stated_parameters(file: Path) -> dict[str, float]:
-    """Read a parameter file; return the parameters that describe the aircraft and differ from their defaults.
+    """Return the parameters of a file that describe the aircraft and differ from their defaults.
 
     The keys are current names of ArduPlane's parameters.
 
@@ -171,7 +171,10 @@ def parse_sheet(
 
 
 def _parse_battery(text: str) -> tuple[float, float]:
-    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".  Raises FlightError for invalid text."""
+    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".
+
+    Raises FlightError for invalid text.
+    """
     match = _BATTERY_PATTERN.fullmatch(text.strip())
     volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
@@ -188,7 +191,10 @@ def _parse_battery(text: str) -> tuple[float, float]:
 
 
 def _parse_propeller(text: str) -> tuple[float, float]:
-    """Return diameter and pitch (m) of a propeller such as "12x6", inches.  Raises FlightError for invalid text."""
+    """Return diameter and pitch (m) of a propeller such as "12x6", inches.
+
+    Raises FlightError for invalid text.
+    """
     match = _PROPELLER_PATTERN.fullmatch(text.strip())
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
@@ -282,11 +288,13 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         max_speed_sd=top_speed_sd,
         climb_guessed="climb" in sized.guessed,
     )
-    return uncertainty, _draw_with_climb(uncertainty, balance, climb_sd / thrust_slopes[0])
+    return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
 
 
-def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
-    """Draw all factors; the factor on thrust compensates the effect of the other factors on the climb.
+def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
+    """Draw the factors of `DRAW_COUNT` aircraft.
+
+    The factor on thrust compensates the effect of the other factors on the climb.
 
     balance: change of the logarithm of the thrust per logarithm of each other factor.
     thrust_sd: standard deviation of the logarithm of the thrust that varies the climb.
@@ -304,7 +312,7 @@ def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thr
 
 
 def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
-    """Return the standard deviation of the logarithm of the power at cruise, as calibrated on real aircraft.
+    """Return the standard deviation of the log of the cruise power, calibrated on real aircraft.
 
     power: estimated power at cruise, W.
     min_drag_sd: standard deviation of the logarithm of the minimum drag.
@@ -317,10 +325,10 @@ def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float)
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
-    """Return climb and descent, rad, top speed, m/s, and the logarithm of the power, W, of an aircraft, (4,).
+    """Return (4,): climb angle (rad), descent angle (rad), top speed (m/s), log of cruise power (W).
 
-    Climb and descent are the steepest path angles at cruise speed, and the power is that of level flight at cruise; a
-    value is NaN if the aircraft cannot be trimmed.
+    The angles are the steepest flight path angles at cruise speed, negative in descent.  The cruise power is the power
+    in level flight at cruise speed.  A value is NaN if the aircraft cannot be trimmed there.
 
     properties: values of the model's properties by name.
     """
@@ -340,7 +348,7 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
 
 
 def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> Floats:
-    """Return the effect on `_performance_vector`, (4,), of a factor larger by one standard deviation.
+    """Return the change (4,) of `_performance_vector` for one standard deviation of a factor.
 
     estimated: values for the estimated aircraft, (4,).
     sd: standard deviation of the factor's logarithm.
@@ -352,13 +360,13 @@ def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: floa
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the signed effect of a factor on path angles and speeds, (n,): half the difference of two values.
+    """Return the signed effect (n,) of a factor on path angles and speeds: half of increased - decreased.
 
-    A value is NaN if the aircraft cannot be trimmed.  If one of the two is NaN, the difference between the other and
-    the estimated value is returned; if both are NaN, the magnitude of the estimated value.
+    A value is NaN if the aircraft cannot be trimmed.  If either `increased` or `decreased` is NaN, the effect is the
+    difference between the other value and the estimated value; if both are NaN, the magnitude of the estimated value.
 
-    increased, decreased: values with the factor increased and decreased, (n,).
-    estimated: estimated values, (n,).
+    increased, decreased: values (n,) with the factor increased and decreased.
+    estimated: values (n,) with the estimated factor.
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
     >>> factor_effect(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
@@ -383,7 +391,10 @@ _MAX_PITCH_DEG = 25.0
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """Trim points of the model at altitude `AMSL`: at cruise speed, and in its slowest and fastest level flight."""
+    """Trim points of the model at altitude `AMSL`.
+
+    They are at cruise speed, and in the slowest and fastest level flight.
+    """
 
     level: Trim
     climb: Trim
@@ -400,7 +411,9 @@ def make_data_sheet_folder(
     *,
     overwrite: bool = False,
 ) -> Aircraft:
-    """Make the folder of an aircraft from its data sheet, completely or not at all.
+    """Write the folder of an aircraft made from its data sheet, completely or not at all.
+
+    Returns the aircraft.
 
     parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
     sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
@@ -432,7 +445,7 @@ def _check_required_numbers(sheet: DataSheet) -> None:
 def _make_files(
     sized: SizedAircraft, name: str, draft_folder: Path, file_parameters: Mapping[str, float]
 ) -> dict[str, str]:
-    """Return the text of each file of the folder, by file name.
+    """Return the text of each file of the aircraft's folder, by file name.
 
     draft_folder: temporary folder for a draft of the aircraft, which trims and gains are computed from.
     """
@@ -463,7 +476,7 @@ def _make_files(
         f"{name}.xml": model,
         f"{name}.toml": metadata,
         "gains.toml": gains_text(gains_from_model(aircraft, fdm)),
-        "ardupilot.parm": arduplane_parameters(aircraft, performance, fdm, file_parameters),
+        "ardupilot.parm": arduplane_parameters_text(aircraft, performance, fdm, file_parameters),
         "ardupilot.toml": servo_text(aircraft, performance),
         "uncertainty.toml": uncertainty_text(uncertainty),
         DRAWS_FILE: draws_text(draws),
@@ -472,7 +485,10 @@ def _make_files(
 
 
 def _check_endurance(aircraft: Aircraft, power: float) -> None:
-    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.  power: W."""
+    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.
+
+    power: W.
+    """
     if not aircraft.battery_voltage or aircraft.battery_energy >= _MIN_ENDURANCE_S * power:
         return
     volts, watt_hours = aircraft.battery_voltage, aircraft.battery_energy / 3600.0
@@ -486,7 +502,7 @@ def _check_endurance(aircraft: Aircraft, power: float) -> None:
 def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
     """Trim an aircraft in all flight conditions of `Performance`.
 
-    Raises FlightError, with the value of the data sheet to change, if a condition has no trim point.
+    Raises FlightError if a condition has no trim point; the message names the value of the data sheet to change.
     """
     cruise = aircraft.airspeed
     level = steady_flight(fdm, cruise, AMSL)
@@ -549,10 +565,13 @@ motor_lag_s = {numbers.lag[1]:.6g}
 # Write ArduPlane parameters and servos.
 
 
-def arduplane_parameters(
+def arduplane_parameters_text(
     aircraft: Aircraft, performance: Performance, fdm: Fdm, file_parameters: Mapping[str, float]
 ) -> str:
-    """Return the text of ``ardupilot.parm``; the values of `file_parameters` replace computed values."""
+    """Return the text of ``ardupilot.parm``: ArduPlane parameters computed from the model's trim points.
+
+    file_parameters: values of a parameter file, which replace the computed values.
+    """
     a, b = linearise(fdm, performance.level)
     cruise, bank = aircraft.airspeed, aircraft.max_bank
     p, q, elevator, aileron = 3, 4, 0, 1
@@ -653,7 +672,10 @@ _README_ROWS = (
 
 
 def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Performance) -> list[str]:
-    """Return a line of ``README.md`` on the file's TRIM_THROTTLE if the model's throttle in level flight differs."""
+    """Return a line of ``README.md`` if the file's TRIM_THROTTLE differs from the model's throttle.
+
+    The throttle is that of level flight.
+    """
     throttle, stated = 100.0 * performance.level.throttle, file_parameters.get("TRIM_THROTTLE")
     if stated is None or round(throttle) == round(stated):
         return []

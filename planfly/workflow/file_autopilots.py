@@ -29,12 +29,12 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
     mission_autopilot = "" if mission is None else mission.autopilot
     is_named_by_user = table.autopilot is not None and table.autopilot_from is None
     if not is_named_by_user and table.params is not None and table.autopilot is None:
-        scenario = _with_parameter_file_autopilot(scenario, table.params)
+        scenario = _with_autopilot_from_parameters(scenario, table.params)
         table = scenario.flight
     if mission is None or not mission_autopilot:
         return scenario
     if table.autopilot is None:
-        return _set_autopilot(scenario, mission_autopilot, mission.source)
+        return _with_autopilot(scenario, mission_autopilot, mission.source)
     if mission_autopilot != table.autopilot and table.autopilot in TITLES:
         if table.autopilot_from is None:
             raise MissionError.from_error(
@@ -56,17 +56,26 @@ def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> S
 _FIRMWARE_TEXTS = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
 
 
-def _with_parameter_file_autopilot(scenario: Scenario, params: str) -> Scenario:
-    origin = read_origin(Path(params))
+def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Scenario:
+    """Return the scenario with the autopilot of its parameter file.
+
+    The scenario is unchanged if the file does not identify an autopilot.
+
+    Raises ParameterError for a file with parameters of both autopilots.
+    """
+    origin = read_origin(Path(params_path))
     if origin.mixed:
-        allowed = "--autopilot names the autopilot that is to fly"
-        message = f"{params}: {origin.evidence}: {allowed}"
-        raise ParameterError(message, file=params, field="autopilot", value=origin.evidence, allowed=allowed)
-    return _set_autopilot(scenario, origin.autopilot, params) if origin.autopilot else scenario
+        remedy = "--autopilot names the autopilot that is to fly"
+        message = f"{params_path}: {origin.evidence}: {remedy}"
+        raise ParameterError(message, file=params_path, field="autopilot", value=origin.evidence, allowed=remedy)
+    return _with_autopilot(scenario, origin.autopilot, params_path) if origin.autopilot else scenario
 
 
-def _set_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Set the autopilot of a scenario, and the file that names it, even if it is the default autopilot."""
+def _with_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
+    """Return the scenario with `autopilot`, and with `file` as the file that names this autopilot.
+
+    The autopilot is set even if it is the default autopilot.
+    """
     params = scenario.flight.params
     new_scenario = with_flight(scenario, autopilot=autopilot, params=params)
     table = new_scenario.flight.model_copy(update={"autopilot_from": file})

@@ -36,7 +36,7 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import LogOptions, apply_options, flight_entries
 from planfly.named_fences import read_named_fences
-from planfly.workflow.airframe import find_airframe, load_airframe, max_turn_bank
+from planfly.workflow.airframe import find_aircraft_and_energy, load_airframe, max_turn_bank
 from planfly.workflow.file_autopilots import with_file_autopilot
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
@@ -89,15 +89,15 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     """
     plan, fences = options.get("plan"), read_named_fences(options.get("fence") or ())
     flight = make_flight(open_log(path), options.get("flight"))
-    mission, mission_origin, planned_in = _planned_mission(path, flight, options)
+    mission, mission_origin, plan_scenario = _read_mission(path, flight, options)
     mission = fences.add_to_mission(mission)
     has_plan_heights = plan is not None or flight.mission is None or flight.mission.with_heights
     if not has_plan_heights:
         mission = with_flown_altitudes(mission, flight.lat, flight.lon, flight.up)
     _check_plan_autopilot(path, mission, flight.raw.program)
-    scenario, placed = _choose_scenario_and_place_mission(mission, options, planned_in)
+    scenario, placed = _choose_scenario_and_place_mission(mission, options, plan_scenario)
     scenario, wind_source = _with_wind_of_log(fences.add_to_scenario(apply_options(scenario, options)), flight, options)
-    aircraft_options = (options.get("aircraft"), options.get("scenario"), planned_in)
+    aircraft_options = (options.get("aircraft"), options.get("scenario"), plan_scenario)
     aircraft_known = any(option is not None for option in aircraft_options)
     logged_autopilot = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
     # A flight by an unknown autopilot is judged with planfly's guidance, which shows what the aircraft can fly.
@@ -154,8 +154,10 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
-def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the planned mission, a text on its source, and the scenario of its plan (None for a mission file or log).
+def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
+    """Return the planned mission, a description of its source, and the scenario of its plan.
+
+    The scenario is None without a plan.json.
 
     Raises LogError if neither the options nor the log contain the mission.
     """
@@ -179,10 +181,13 @@ def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> t
 
 
 def _choose_scenario_and_place_mission(
-    mission: Mission, options: LogOptions, planned_in: Scenario | None
+    mission: Mission, options: LogOptions, plan_scenario: Scenario | None
 ) -> tuple[Scenario, PlacedMission]:
-    """Return the scenario for judging a flight, and the mission placed in this scenario."""
-    scenario, named_scenario = planned_in, options.get("scenario")
+    """Return the scenario for judging a flight, and the mission placed in this scenario.
+
+    The scenario is (in order) the named scenario, the scenario of the plan, or a scenario implied by the mission.
+    """
+    scenario, named_scenario = plan_scenario, options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options["terrain"])
     if named_scenario is not None:
         scenario = load_scenario(str(named_scenario), terrain)
@@ -196,7 +201,10 @@ def _choose_scenario_and_place_mission(
 
 
 def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
-    """Return the scenario with the mean wind of the flight, and a description of the wind's source."""
+    """Return the scenario with the log's mean wind, and a description of the source of the wind.
+
+    The wind of the scenario stays if the options state a wind or the log contains none.
+    """
     if options.get("wind") is not None:
         return scenario, "as given"
     wind = mean_wind(flight)
@@ -214,8 +222,11 @@ def _flight_setup(
     autopilot: Autopilot,
     flight: LoggedFlight,
 ) -> FlightSetup:
-    """Return the setup for judging an imported flight.  placed: the mission placed on the map of the scenario."""
-    aircraft, battery = find_airframe(scenario)
+    """Return the setup for judging an imported flight.
+
+    placed: the mission placed on the map of the scenario.
+    """
+    aircraft, battery = find_aircraft_and_energy(scenario)
     limits = _path_limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
         scenario=scenario,
@@ -232,14 +243,14 @@ def _flight_setup(
 
 
 def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
-    """Return the limits on path and speed at the cruise airspeed that the autopilot or else the scenario states.
+    """Return the limits on path and speed at the cruise airspeed of the autopilot or the scenario.
 
     If neither states an airspeed, the median airspeed of the log is used.  If the log does not state the autopilot's
     bank limit, the lower limit of scenario and autopilot applies.
 
     default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed.
     """
-    aircraft, _ = find_airframe(scenario)
+    aircraft, _ = find_aircraft_and_energy(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed = scenario.flight.airspeed_mps or default_airspeed
     stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
@@ -262,7 +273,7 @@ def _sha256(path: Path) -> str:
 
 
 def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe the parts of the flight that are missing in the log: before its start, after its end, between rows."""
+    """Note a log that begins or ends in flight, or has too few positions; empty for a complete log."""
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -275,7 +286,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
-    """Describe a throttle that has the same value in all rows, as in the log of a glider."""
+    """Note a throttle that has the same value in all rows, as in the log of a glider; empty otherwise."""
     throttle = flight.raw.series.get("throttle")
     if throttle is None or len(throttle.values) < 2 or np.ptp(throttle.values) > 0.0:
         return ()
@@ -283,7 +294,7 @@ def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Return a line on the other flights in the log; empty if there are no other flights."""
+    """Note the other flights in the log; empty if there are no other flights."""
     if flight.count == 1:
         return ()
     other_flights = ", ".join(
@@ -293,7 +304,10 @@ def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: LogOptions) -> tuple[str, ...]:
-    """Return a line on the difference between the log's mission and the plan; empty if they agree."""
+    """Note the difference between the log's mission and the named plan.
+
+    The result is empty if they agree or no plan is named.
+    """
     if options.get("plan") is None or flight.mission is None:
         return ()
     logged_items = flight.mission.mission.items
@@ -314,7 +328,10 @@ def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: Lo
 
 
 def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
-    """Return the vehicle's messages and mode changes during the flight, in order of time."""
+    """Return the vehicle's messages and mode changes of the flight and the 60 s before, in order of time.
+
+    Events before the first row get the time of the first row.
+    """
     if not len(flight.time):
         return ()
     start_time, end_time = float(flight.time[0]), float(flight.time[-1])
@@ -351,7 +368,9 @@ def fly_again(
     advance: Advance,
     max_stretches: int = 9,
 ) -> tuple[Reflight, ...]:
-    """Fly each sequence of followed legs again in the wind of the log, and return the comparisons, longest first.
+    """Simulate each sequence of followed legs in the wind of the log.
+
+    Returns the comparisons, longest first.
 
     setup: setup of the imported flight, with its source.
     aircraft: aircraft of the simulated flight; None for the setup's aircraft.
@@ -368,13 +387,15 @@ def fly_again(
 
 @dataclass(frozen=True, slots=True)
 class DrawnFlight:
-    """Differences of one flight from what is stated.
+    """Sampled deviations of one simulated flight.
 
-    variation: differences of the aircraft from its model.
-    wind: north and east, in which the air moves faster than the log's mean wind, m/s.
+    They are deviations from the nominal aircraft, the log's wind and the logged positions.
+
+    variation: deviation of the aircraft from its model.
+    wind: velocity added to the log's mean wind, towards north and east, m/s.
     turbulence: level of the turbulence.
     seed: seed of the turbulence.
-    offset: error of the logged positions, east, north and up, m.
+    offset: offset added to the simulated positions, east, north and up, m.
     """
 
     variation: Variation
@@ -387,10 +408,12 @@ class DrawnFlight:
 def fly_draws(
     setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
 ) -> tuple[Reflight, ...]:
-    """Fly the longest sequence of followed legs once for each draw, and return the comparisons.
+    """Simulate the longest sequence of followed legs once for each draw.
 
-    A draw with which the aircraft cannot start, or flies none of the legs, is left out.  A draw is a sampled variant of
-    the aircraft in a sampled wind.
+    Returns the comparisons with the log.
+
+    A draw is a sampled variant of the aircraft in a sampled wind.  A draw with which the aircraft cannot start, or
+    flies none of the legs, is left out.
 
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
@@ -410,7 +433,9 @@ def fly_draws(
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Return a setup whose mission begins where the first segment of the flight reached the take-off's altitude.
+    """Return a setup whose mission begins in flight, at the take-off's altitude.
+
+    It begins where the first segment of the flight reached this altitude.
 
     The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  A mission without
     a take-off, and a segment that never reached this altitude, are returned unchanged.
@@ -450,7 +475,7 @@ def _refly_followed_legs(
     advance: Advance | None,
     draw: DrawnFlight | None = None,
 ) -> Reflight:
-    """Simulate followed legs with the model of an aircraft, and compare the simulated with the logged flight.
+    """Simulate followed legs with the model of an aircraft, and compare the flight with the log.
 
     aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.
     draw: variations of aircraft, wind and start of one sampled flight, or None.
@@ -464,7 +489,7 @@ def _refly_followed_legs(
             -wind.speed * math.sin(wind.from_course) + draw.wind[1],
         )
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
-    model, battery = find_airframe(scenario)
+    model, battery = find_aircraft_and_energy(scenario)
     limits = setup.limits
     if model.name != setup.aircraft:
         envelope = load_envelope(model, motor_braking=scenario.flight.motor_braking)
@@ -499,7 +524,7 @@ def _refly_followed_legs(
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
-    """Return the legs followed in each segment of a flight, the longest sequence first.
+    """Return the sequence of legs followed in each segment of a flight, most legs first.
 
     Raises LogError if the flight followed no leg of its mission.
     """

@@ -24,7 +24,7 @@ Advance = Callable[[float, float, str], None]
 
 
 def planning_conditions(scenario: Scenario, airframe: Airframe) -> Conditions:
-    """Return the conditions for which a scenario is planned."""
+    """Return the conditions for which a path is planned: scenario, aircraft, airspeed and autopilot."""
     return plan_conditions(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
@@ -39,7 +39,7 @@ def make_plan(
     flown_plan_and_leg: tuple[Plan, int] | None = None,
     continues: bool = False,
 ) -> Plan:
-    """Plan a path within the limits of scenario and aircraft, less the uncertainty of the aircraft's limits.
+    """Plan a path within the limits of scenario and aircraft, less the uncertainty of the limits.
 
     All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
     waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`).  If gusts change the
@@ -88,7 +88,10 @@ def make_plan(
 
 
 def make_given_plan(scenario: Scenario, airframe: Airframe, seed: int, waypoints: Floats) -> Plan:
-    """Return the plan of given waypoints (w, 3), m, certified by all checks of `make_plan`, without a search."""
+    """Return the plan of given waypoints (w, 3), m, without a search.
+
+    It is certified by all checks of `make_plan`.
+    """
     return finish_plan(
         certify_waypoints(scenario, airframe.limits.with_margin(), waypoints, seed=seed), airframe, keeps_waypoints=True
     )
@@ -104,7 +107,9 @@ def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keep
 
 
 def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
-    """Add departure and approach to a plan, and the hazards near its final loiter to its certificate.
+    """Return a plan with departure and approach.
+
+    The certificate of the plan also names the hazards near its final loiter.
 
     old_plan: the plan being flown, or None.
     """

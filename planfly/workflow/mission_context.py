@@ -69,25 +69,30 @@ class MissionContext:
         return place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets)
 
     def item_positions(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
-        """Return east, north and altitude AMSL of each item of `flight.mission.edits.movable_indices`, (n, 3) m.
+        """Return the positions (n, 3) of the movable items: east, north and altitude AMSL, m.
+
+        Movable items are those of `flight.mission.edits.movable_indices`.
 
         The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
         that it states, NaN if unknown.
         """
         placed = self.place_mission(mission) if placed is None else placed
-        heights = {stop.item: stop.map_position[2] for stop in reversed(placed.stops)}
+        reached_altitudes = {stop.item: stop.map_position[2] for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in movable_indices(mission)]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [
             self._stated_altitude(mission, item, x, y)
-            if item.command in LANDINGS or item.seq not in heights
-            else heights[item.seq]
+            if item.command in LANDINGS or item.seq not in reached_altitudes
+            else reached_altitudes[item.seq]
             for item, x, y in zip(items, np.asarray(east).tolist(), np.asarray(north).tolist(), strict=True)
         ]
         return np.stack([east, north, altitudes], axis=1)
 
     def _stated_altitude(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
-        """Return the altitude AMSL that an item states, m; NaN if it states none, or over unknown ground."""
+        """Return the altitude AMSL that an item states, m; NaN if home or the ground below is unknown.
+
+        east, north: map position of the item, m.
+        """
         if item.frame in AMSL:
             return item.alt
         terrain, home = self.scenario.terrain, mission.home
@@ -101,7 +106,7 @@ class MissionContext:
         return math.nan if terrain is None else float(terrain.height(east, north)) + item.alt
 
     def reached_items(self, mission: Mission) -> frozenset[int]:
-        """Return the numbers of the items that a flight reaches."""
+        """Return the sequence numbers of the items that a flight reaches."""
         return frozenset(stop.item for stop in self.place_mission(mission).stops)
 
     def to_geographic(self, east: float, north: float) -> tuple[float, float]:
@@ -110,7 +115,10 @@ class MissionContext:
         return float(lat), float(lon)
 
     def with_updated_radii(self, mission: Mission, index: int) -> Mission:
-        """Adapt the acceptance radii of a planned mission to its turns near an item."""
+        """Return the mission with the acceptance radii near a moved item adapted to its turns.
+
+        A mission that planfly did not plan keeps its radii.  index: index of the moved item.
+        """
         if not self.planned:
             return mission
         item_indices = movable_indices(mission)
@@ -129,7 +137,10 @@ class MissionContext:
         return replace(mission, items=tuple(items))
 
     def _planned_positions(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
-        """Return the positions of planned items, (n, 3) m AMSL; a landing has the altitude of the item before it."""
+        """Return the positions of planned items, (n, 3) m AMSL.
+
+        A landing has the altitude of the item before it.
+        """
         items = [mission.items[k] for k in indices]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [item.alt for item in items]
@@ -149,7 +160,7 @@ class MissionContext:
         return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.place_mission(mission))
 
     def judge(self, mission: Mission) -> JudgedMission:
-        """Judge the whole geometry of a mission."""
+        """Judge a mission by its geometry, without a flight."""
         setup = self.setup(mission)
         requirements = route_requirements(setup)
         return JudgedMission(mission, setup, requirements, judge_geometry(setup, requirements))

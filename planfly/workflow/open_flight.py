@@ -29,7 +29,7 @@ PLAN_FILE = "plan.json"
 
 
 def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
-    """Return a setup with another flight model; a setup with this model is returned as it is, without a copy."""
+    """Return the setup with the chosen flight model, the same object if the setup already has this model."""
     return setup if setup.engine == engine else replace(setup, engine=engine)
 
 
@@ -68,7 +68,7 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
 
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of the plan's mission in the scenario named by the options."""
+    """Make the setup of a plan in its own scenario, or of its mission in a named scenario."""
     fences, named_world, terrain = (
         read_named_fences(options.get("fence") or ()),
         options.get("scenario"),
@@ -93,12 +93,16 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
 
 
 def _terrain_option(options: MissionOptions) -> str | None:
+    """Return the option `terrain` as text, or None if it is not given."""
     terrain = options.get("terrain")
     return None if terrain is None else str(terrain)
 
 
 def check_mission_exists(path: Path) -> Path:
-    """Return the path.  Raises MissionError if it does not exist, with the most similar name as a suggestion."""
+    """Return the path.
+
+    Raises MissionError if it does not exist, with the most similar name as a suggestion.
+    """
     if not path.is_file():
         hint = did_you_mean(path.name, _mission_file_names(path.parent))
         raise MissionError(f"{path}: no such file; expected a plan.json, .waypoints or .plan file{hint}", file=path)
@@ -132,7 +136,10 @@ def check_fixed_wing(mission: Mission) -> Mission:
 
 
 def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
-    """Make a mission without fences from the waypoints of a plan.  source: the plan's file name, for messages."""
+    """Make a mission without fences from the waypoints of a plan.
+
+    source: the plan's file name, for messages.
+    """
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
 
 
@@ -142,7 +149,10 @@ _STORED_ITEMS = {"ardupilot": (724, "a Pixhawk with ArduPlane"), "px4": (500, "a
 
 
 def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, ...]:
-    """Note a mission of more items than a common board of the autopilot stores; such a board refuses the upload."""
+    """Note a mission with more items than a common flight controller of the autopilot stores.
+
+    The result is empty otherwise.
+    """
     limit, board = _STORED_ITEMS.get(dialect, (len(mission.items), ""))
     if len(mission.items) <= limit:
         return ()
@@ -204,7 +214,12 @@ def make_setup(
 
 
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
-    """Return an autopilot that arms with a mission's landing sequence, unless a file or the scenario says otherwise."""
+    """Return the autopilot with an RTL that uses the mission's landing sequence.
+
+    Without a landing sequence the autopilot is unchanged.
+
+    The parameters for this are assumed: values from a parameter file or the scenario stay.
+    """
     if all(item.command != Command.DO_LAND_START for item in mission.items):
         return autopilot
     values = autopilot.returns.parameters_of(RtlSettings(lands=True))
@@ -212,7 +227,9 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
-    """Return a note on each commanded airspeed that the autopilot ignores, or replaces with its nearest limit.
+    """Return a note on each commanded airspeed beyond the autopilot's limits.
+
+    The autopilot ignores this airspeed, or flies the nearest limit.
 
     ArduPlane takes DO_CHANGE_SPEED as an airspeed only if its speed type is 0, and ignores values beyond its limits.
     PX4 takes it as an airspeed whatever the type, and flies the nearest limit.

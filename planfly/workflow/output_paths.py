@@ -79,7 +79,10 @@ PREDICT_FILES = ("predict.html", "predict.png")
 
 
 def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -> None:
-    """Raise PlanflyError if the target file is the input, is a folder, has no folder, or exists without `overwrite`.
+    """Raise PlanflyError if an output file cannot or must not be written.
+
+    This is the case if the path is the input file, is a folder, lies in a missing folder, or exists without
+    `overwrite`.
 
     source: the input file, or None.
     """
@@ -94,7 +97,10 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
 
 
 def check_output_folder(folder: Path, overwrite: bool) -> None:
-    """Raise PlanflyError if a folder is or lies in a file, cannot be made, or is not empty without `overwrite`."""
+    """Raise PlanflyError if an output folder cannot or must not be written.
+
+    This is the case if it is or lies in a file, cannot be made, or is not empty without `overwrite`.
+    """
     existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not existing.is_dir():
         where = folder if existing == folder.absolute() else existing
@@ -121,17 +127,20 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
 
 
 def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) -> Path:
-    """Check a target folder with `check_output_folder`, make it, remove old results of planfly, and return its path."""
+    """Check a folder with `check_output_folder`, make it, and remove old results of planfly from it.
+
+    Returns the path of the folder.
+    """
     folder = Path(out)
     check_output_folder(folder, overwrite)
     prepare_folder(folder, files)
     return folder
 
 
-def is_pattern(target: str | Path) -> bool:
+def has_placeholder(target: str | Path) -> bool:
     """Return True if a path contains a placeholder for the name or the seed.
 
-    >>> is_pattern("runs/{name}-seed{seed}/flight.mcap"), is_pattern("flight.mcap")
+    >>> has_placeholder("runs/{name}-seed{seed}/flight.mcap"), has_placeholder("flight.mcap")
     (True, False)
     """
     return "{name}" in str(target) or "{seed}" in str(target)
@@ -154,15 +163,15 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
 def file_target(
     target: str | Path, name: str, seed: int, *, suffix: str, overwrite: bool, source: Path | None = None
 ) -> Path:
-    """Return the file to write, after the checks of `check_output_file`.
+    """Return the path of the output file, with placeholders replaced, after `check_output_file`.
 
-    A pattern whose folder does not exist is not checked; the caller makes the folder.
+    A path with placeholders in a missing folder is not checked; the caller makes the folder.
     suffix: suffix that the file must have, because its format does not depend on its name.
     """
     path = expand_path_pattern(target, name, seed)
     if path.suffix.lower() != suffix:
         allowed = f"expected a {suffix} file; planfly.export writes other formats"
         raise PlanflyError(f"{path}: {allowed}", file=path, field="suffix", value=path.suffix, allowed=allowed)
-    if path.parent.exists() or not is_pattern(target):
+    if path.parent.exists() or not has_placeholder(target):
         check_output_file(path, overwrite, source)
     return path

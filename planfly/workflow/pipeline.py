@@ -184,6 +184,10 @@ class _FlightOptions:
 
 
 def _fly_with_program(task: _FlightOptions, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+    """Fly a setup with an autopilot program, keep the program's own log, and judge the flight.
+
+    Raises FlightError, after removing the flight log, if the program does not fly the mission to its end.
+    """
     with program.start(setup, task.airframe.aircraft) as flight:
         flight.prepare()
         try:
@@ -197,10 +201,10 @@ def _fly_with_program(task: _FlightOptions, setup: FlightSetup, program: Program
     return judged_flight
 
 
-def autopilot_log(log: Path, program: Path) -> Path:
+def autopilot_log_path(log: Path, program: Path) -> Path:
     """Return the path of the autopilot program's own log, next to the flight log of planfly.
 
-    >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
+    >>> autopilot_log_path(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
     """
     return log.with_suffix(program_class_for(program).log_suffix)
@@ -225,7 +229,10 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
 
 
 def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
-    """Fly to the end or until the log is full, recording each block; return the track and the reason for the end."""
+    """Fly to the end or until the log is full, recording each block.
+
+    Returns the track and the reason for the end.
+    """
     builder, end_reason, length = TrackBuilder(), "", flight.path.length
     # A recorded flight is written second by second, so that a crash of the process loses no more.
     for block in simulate(flight, LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S):
@@ -244,7 +251,7 @@ def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: Crash
 def _judge_unflown(
     requirements: RouteRequirements, log: Path | None, end_reason: str, reference: FlyReference
 ) -> JudgedFlight:
-    """Judge a flight without a row, and remove the log of an earlier flight."""
+    """Judge a flight that did not start, and remove the log of an earlier flight from `log`."""
     if log is not None:
         log.unlink(missing_ok=True)
     setup, track = requirements.setup, join_tracks([])
@@ -257,6 +264,7 @@ def _judge_unflown(
 def _judge_rows(
     task: _FlightOptions, requirements: RouteRequirements, track: Track, end_reason: str, engine: str
 ) -> JudgedFlight:
+    """Judge the recorded rows of a flight, with reference flights unless only findings are requested."""
     end_time = float(track.time[-1]) if len(track) else 0.0
     events = (
         LogEvent(0.0, f"flight model: {engine}", "info"),

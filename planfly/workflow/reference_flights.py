@@ -38,7 +38,9 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Find the first parameter with which the flight passes at another value, and its nearest passing value, or None.
+    """Find the first parameter of which another value makes the flight pass.
+
+    Returns it with its nearest passing value, or None.
 
     findings: findings of the flight that failed.
     passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
@@ -86,7 +88,10 @@ def find_passing_parameter(
 def _nearest_passing_value(
     current: float, step: float, farthest: float, passes: Callable[[float], bool]
 ) -> float | None:
-    """Return the passing value nearest to the current value, in steps to `farthest`; None if `farthest` fails."""
+    """Return the passing value nearest to the current value, in steps to `farthest`.
+
+    Returns None if `farthest` fails.
+    """
     step_count = int(abs(farthest - current) / step + 1e-6)
     sign = 1.0 if farthest > current else -1.0
     values = [round(current + sign * k * step, 6) for k in range(1, step_count + 1)]
@@ -112,7 +117,9 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
 def judge_airframe_flight(
     setup: FlightSetup, aircraft: Aircraft, should_abort: AbortCheck = never_abort
 ) -> AirframeAnswer:
-    """Fly a setup with planfly's guidance and the exact position, and judge that flight.
+    """Fly a setup with planfly's guidance and no navigation error, and judge the flight.
+
+    It shows whether the airframe, without its autopilot, can fly the mission.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -135,7 +142,7 @@ def judge_airframe_flight(
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find a parameter with which a failed flight passes at another value, or return None.
+    """Find an autopilot parameter of which another value makes a failed flight pass, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
     should_abort: see `judge_with_reference_flights`.
@@ -207,7 +214,9 @@ def judge_with_reference_flights(
     fly: FlyReference = "failed",
     should_abort: AbortCheck = never_abort,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight, with reference flights that explain the verdict but do not decide it, and tried suggestions.
+    """Judge a flight, with reference flights that explain the verdict, and tried suggestions.
+
+    The reference flights do not decide the verdict.
 
     requirements: the route requirements of the flown setup.
     track, end_reason: the flight, and the reason for its end.

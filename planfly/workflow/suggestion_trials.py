@@ -45,7 +45,10 @@ _GROWTH_M = 2.0
 
 
 def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
-    """Return the identity of a finding across changes: rule and place, without item numbers, which may shift."""
+    """Return rule and place of a finding, which identify it in the verdicts before and after a change.
+
+    Item numbers are not part of the key, because a change may shift them.
+    """
     return finding.rule, finding.place.kind, finding.place.index, finding.place.name
 
 
@@ -57,7 +60,10 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
 
 
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a change improves the verdict, and leaves neither the finding nor a passed finding undecided."""
+    """Return True if a change improves the verdict and makes no finding undecided.
+
+    The finding itself must be decided after the change, even if it was undecided before.
+    """
     open_before = {finding_key(item) for item in old_verdict.findings if item.ok is not True}
     undecided_after = set(map(finding_key, undecided_findings(new_verdict.findings)))
     is_decided = all(item.ok for item in new_verdict.findings if finding_key(item) == finding_key(finding))
@@ -66,7 +72,10 @@ def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> b
 
 @dataclass(frozen=True)
 class PassedTrial:
-    """A suggestion of a finding that passed its trial, enlarged if necessary, and the setup that it was tried with."""
+    """A suggestion of a finding that passed its trial, and the setup of this trial.
+
+    The suggestion was enlarged if necessary.
+    """
 
     finding: Finding
     suggestion: Suggestion
@@ -85,7 +94,10 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
 
 
 def judge_mission_geometry(setup: FlightSetup) -> Verdict:
-    """Judge the geometry of a mission without flying it; keep only suggestions that pass the same geometric check."""
+    """Judge the geometry of a mission without a flight.
+
+    The verdict has only those suggestions that pass a geometric trial.
+    """
     requirements = route_requirements(setup)
     verdict = judge_geometry(setup, requirements)
     return with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
@@ -121,7 +133,10 @@ class SuggestionTrials:
         self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)
 
     def find_passing(self) -> list[PassedTrial]:
-        """Try the first suggestion of each finding, then the second and so on, and return the suggestions that pass."""
+        """Try the first suggestion of each finding, then the second and so on.
+
+        Returns the suggestions that pass.
+        """
         requests = [
             (number, rank, finding)
             for rank, finding in enumerate(self._findings_to_try())
@@ -151,14 +166,18 @@ class SuggestionTrials:
     def try_suggestion(self, finding: Finding, number: int) -> PassedTrial | None:
         """Return a passing trial of a suggestion, enlarged if necessary, or None."""
         candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
-        passed_candidate = first_that_passes(candidates, lambda candidate: self._passes(finding, candidate[1]))
+        passed_candidate = first_that_passes(candidates, lambda candidate: self._passes_trial(finding, candidate[1]))
         if passed_candidate is None:
             return None
         (*first_changes, last_change), trial = passed_candidate
         moves = item_moves(self.context, self.judged.mission, trial.setup.mission)
         return PassedTrial(finding, (*first_changes, replace(last_change, moves=moves)), trial.setup)
 
-    def _passes(self, finding: Finding, trial: Trial) -> bool:
+    def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
+        """Return True if a trial passes by geometry, and by a flight if the judged verdict is flown.
+
+        A trial beyond the allowed number of flights fails.
+        """
         if self.judged.verdict.level != "flown":
             return is_passed(self._current_trial.geometry_verdict, trial.geometry_verdict, finding)
         if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
@@ -189,7 +208,7 @@ class SuggestionTrials:
             suggestion = larger_suggestion
 
     def _changed_flight(self, finding: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
-        """Apply a suggestion to mission and setup; a shorter duration is tried as a larger battery."""
+        """Return mission and setup with a suggestion applied; a shorter duration is tried as a larger battery."""
         setup = replace(self.judged.setup, autopilot=self.judged.setup.autopilot.model)
         match suggestion:
             case (Change(what="battery" | "tank") as change,):
@@ -201,10 +220,12 @@ class SuggestionTrials:
 
 
 def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
-    """Return a suggestion enlarged by what its finding still needs, or None if nothing is known to be missing.
+    """Return a suggestion enlarged by the further change that the verdict suggests.
 
-    verdict: verdict on the mission with the suggestion.
-    If the finding itself is gone, the steps that another leg needs for the same rule are added.
+    Returns None without such a change.
+
+    verdict: verdict on the mission with the suggestion applied.
+    If the finding itself is now ok, the steps that another leg needs for the same rule are added.
     """
     kinds = {change.what for change in suggestion}
     same_finding = [
@@ -230,7 +251,10 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
-    """Add the steps that are still needed, enlarged, to those of the same kind at the same place."""
+    """Return the steps of a suggestion, increased by the enlarged steps still needed.
+
+    Steps are added to the step of the same kind at the same place.
+    """
     further_steps = [replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_steps]
     steps: dict[object, Change] = {}
     for change in (*suggestion, *further_steps):
@@ -241,7 +265,10 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
 
 
 def _merge_lengths(suggestion: Suggestion, needed_lengths: Suggestion) -> Suggestion:
-    """Return the lengths of legs with those that are still needed; each keeps its present length as ``current``."""
+    """Return the suggested lengths of legs, replaced by the lengths still needed.
+
+    The present length in ``current`` stays as before.
+    """
     lengths = {change.place: change for change in suggestion}
     for change in needed_lengths:
         current = lengths[change.place].current if change.place in lengths else change.current
@@ -250,7 +277,7 @@ def _merge_lengths(suggestion: Suggestion, needed_lengths: Suggestion) -> Sugges
 
 
 def _merge_energy_changes(change: Change, needed_change: Change) -> Change:
-    """Return one change of the energy carried, or of the duration, for two changes after each other.
+    """Combine two successive changes of the energy carried, or of the duration, into one change.
 
     >>> from logs.verdict.places import FLIGHT
     >>> battery, duration = Change("battery", FLIGHT, None, 1.5, "1"), Change("duration", FLIGHT, None, 40.0, "%")

@@ -78,7 +78,10 @@ def tightening_text(change: Tightening) -> str:
 
 
 def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
-    """Return the scenario for the next round of planning, and its changes; empty if nothing can be tightened."""
+    """Return the scenario for the next round of planning, and the list of its changes.
+
+    If nothing can be tightened, the scenario is returned unchanged and the list is empty.
+    """
     spec = copy.deepcopy(scenario.to_json())
     failed_findings = [finding for finding in verdict.findings if finding.ok is False]
     changes = _tighten_slopes(spec, failed_findings) + _tighten_turns(spec, scenario, failed_findings)
@@ -95,10 +98,17 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
 
 
 def _limits_table(spec: Spec) -> Spec:
+    """Return the table of limits of a scenario's content, which is added if missing."""
     return spec.setdefault("limits", {})
 
 
 def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
+    """Tighten the climb and descent limits in `spec` if slopes failed.
+
+    The new limit is less than the flattest failed slope.
+
+    A limit of the scenario that exceeds the limit of the aircraft is first replaced by "aircraft".
+    """
     changes = []
     keys: tuple[tuple[TightenedKey, float], ...] = (("max_climb_deg", 1.0), ("max_dive_deg", -1.0))
     for key, sign in keys:
@@ -126,6 +136,10 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 
 
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
+    """Tighten the turns in `spec` if turns or corners failed.
+
+    They are limited to the limit of the aircraft; if they already are, the bank is lowered.
+    """
     if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
     current = _limits_table(spec).get("max_turn_deg", "aircraft")
@@ -142,6 +156,7 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
 
 
 def _raise_clearance(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
+    """Raise the minimum clearance in `spec` by the largest shortfall of the flight."""
     shortfalls = [
         -finding.margin for finding in failed_findings if finding.rule == "clearance" and finding.margin is not None
     ]
@@ -184,6 +199,7 @@ def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Fin
 
 
 def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
+    """Enlarge the kill radii in `spec` of missiles whose sphere the flight entered, but not the plan."""
     changes = []
     for finding in failed_findings:
         if finding.planned:
@@ -210,7 +226,9 @@ FlyRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(
     scenario: Scenario, max_rounds: int, fly_round: FlyRound, keep_results: Callable[[int], None]
 ) -> tuple[Verdict, Rounds]:
-    """Plan and fly in rounds, each with limits tightened after the previous round, until a round is flyable.
+    """Plan and fly in rounds with tightened limits, until a round is flyable.
+
+    Each round is tightened by the failures of the round before.
 
     max_rounds: maximum number of rounds after the first.
     fly_round: plans in a scenario and flies; returns the verdict, and True if the plan was flown.

@@ -10,7 +10,7 @@ from aircraft.identification.base_model import BaseModel
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import FlightRecord
 from logs.importers.motion import MotionLog
-from planfly.identification.base_numbers import base_model, scale_model
+from planfly.identification.base_numbers import base_model, scale_base_model
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.instrumented_flights import Truth, drawn_sensors, fly_identification, sensed
@@ -52,6 +52,6 @@ def _fly() -> Flown:
         track, changed = fly_identification(Path(folder), TRUTH, 3)
         log = sensed(track, changed, SENSORS, 3)
     prior = load_aircraft("aerosonde")
-    base = scale_model(base_model(prior), changed.mass, prior.wing_span, prior.wing_area)
+    base = scale_base_model(base_model(prior), changed.mass, prior.wing_span, prior.wing_area)
     records = flight_records(log, prior, read_servos(prior.folder / "ardupilot.toml"))
     return Flown(log, records, base, estimate_model(records, base))

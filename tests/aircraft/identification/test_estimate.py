@@ -16,7 +16,7 @@ from aircraft.identification.estimate import (
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_means
 from aircraft.identification.performance import performance
 from aircraft.identification.refinement import IS_MOMENT
-from planfly.identification.base_numbers import scale_model
+from planfly.identification.base_numbers import scale_base_model
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 
 TRUE = np.array([TRUTH.parameters()[name] for name in NAMES])
@@ -186,7 +186,7 @@ def test_moments_are_weighed_with_the_prior_by_the_whole_of_their_errors() -> No
 def test_a_mass_that_is_wrong_by_10_percent_leaves_the_climb() -> None:
     """Only thrust and drag over mass are seen: the angle stays, and the drag in newtons goes with the mass."""
     flown = flown_truth()
-    heavy = scale_model(flown.base, 1.1 * flown.base.mass, flown.base.span, flown.base.area)
+    heavy = scale_base_model(flown.base, 1.1 * flown.base.mass, flown.base.span, flown.base.area)
     changed = fit_parameters(aligned_signals(flown.records, flown.estimate.clocks, heavy), heavy)
     before = performance(flown.base, flown.estimate.values, 25.0, DENSITY)
     after = performance(heavy, changed.values, 25.0, DENSITY)

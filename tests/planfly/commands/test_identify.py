@@ -18,7 +18,7 @@ from logs.views.report import identification
 from planfly.api import identifying
 from planfly.api.identifying import slow_logs, without_current
 from planfly.cli import main
-from planfly.identification.records import MIN_HZ, slowest_rows
+from planfly.identification.records import MIN_HZ, slowest_log_rate
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_motion, write_px4
 from tests.soak import SOAK
@@ -122,7 +122,7 @@ def test_a_log_becomes_a_folder_that_flies(
         ),
         (
             ["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"],
-            "0 s are usable flight on the wing: at least 180 s are needed to identify an aircraft, and"
+            "0 s are usable wing-borne flight: at least 180 s are needed to identify an aircraft, and"
             " 30 s to check one",
         ),
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
@@ -180,7 +180,7 @@ def test_only_the_rows_before_until_are_used(
     # Rows are 0.02 s apart.
     assert end - 0.05 < last < end
     message = refused(["--identify", "a.BIN", *ARGUMENTS, "--until", "100", "--out", "./mine"], capsys)
-    assert "s before 100 s are usable flight on the wing: at least 180 s" in message
+    assert "s before 100 s are usable wing-borne flight: at least 180 s" in message
 
 
 @pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])
@@ -219,7 +219,7 @@ def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
     (slow,) = slow_logs([thin])
     assert slow.setting == "LOG_BITMASK 65535"
     assert slow.hertz == pytest.approx(6.25)
-    assert slowest_rows(thin) < MIN_HZ
+    assert slowest_log_rate(thin) < MIN_HZ
 
 
 @pytest.mark.parametrize(("hertz", "dynamics"), [(50.0, True), (10.0, True), (9.6, True), (9.4, False)])

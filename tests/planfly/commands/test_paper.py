@@ -10,7 +10,7 @@ import pytest
 from logs.views import drawing
 from logs.views.drawing import write_png
 from planfly.cli import main
-from planfly.planning.paper import file_names
+from planfly.planning.paper import paper_file_names
 from planfly.workflow.output_paths import prepare_folder
 from tests.soak import SOAK, only_in_soak
 
@@ -29,7 +29,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_file_is_there_and_the_table_agrees_with_the_runs(folder: Path) -> None:
-    assert sorted(path.name for path in folder.iterdir()) == sorted(file_names([7]))
+    assert sorted(path.name for path in folder.iterdir()) == sorted(paper_file_names([7]))
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in folder.glob("*.png"))
     data = json.loads((folder / "runs.json").read_text(encoding="utf-8"))
     assert [row["algorithm"] for row in data["table"]] == ROWS
@@ -73,7 +73,7 @@ def test_a_named_folder_that_holds_anything_is_refused(folder: Path, capsys: pyt
 def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
     for name in ("mine.txt", "paths-60.png", "table.csv"):
         (tmp_path / name).write_text("old", encoding="utf-8")
-    prepare_folder(tmp_path, tuple(file_names([7, 60])))
+    prepare_folder(tmp_path, tuple(paper_file_names([7, 60])))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 

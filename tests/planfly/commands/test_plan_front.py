@@ -50,7 +50,7 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
     assert text.startswith("front of 1 safe plan\n")
     assert (
         "  note    1 of the 10 requested: no other plan that was found gains more than 0.1% in length or energy, 1% in "
-        "exposure or 1 m in height\n"
+        "exposure or 1 m in height above ground\n"
     ) in text
     assert [file.name for file in folder.glob("plan-*")] == ["plan-1.json"]
     for written in (answer, folder / "front.json"):

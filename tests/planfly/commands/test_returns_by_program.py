@@ -14,7 +14,7 @@ from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
 from planfly.rtl import jsbsim_returns as return_flights
 from planfly.rtl import sitl_returns as program_returns
-from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, worst_separated_returns
+from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, choose_worst_returns
 from planfly.workflow.open_flight import open_flight
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
@@ -102,7 +102,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     setup = hill_setup(tmp_path)
     world, starts = make_return_world(setup), planned_starts(setup, 2.0)
     returns = judge_returns(world, starts, 2.0)
-    chosen = worst_separated_returns(world, starts, returns, 4)
+    chosen = choose_worst_returns(world, starts, returns, 4)
     assert len(chosen) == 4
     assert chosen[0][0] == min(returns.each, key=worst_first_key)
     east = [one.start[0] for one, _ in chosen]
@@ -112,7 +112,7 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     # 20 m over the ground all the way in, or none begins there.
     buried = replace(starts, rows=starts.rows.copy())
     buried.rows["up"] = 15.0
-    assert worst_separated_returns(world, buried, returns, 4) == []
+    assert choose_worst_returns(world, buried, returns, 4) == []
     safe, ground = (next(one for one in returns.each if one.kind == kind) for kind in ("safe", "ground"))
     hit = replace(safe, kind="ground", clearance=-3.0)
     both = ProgramReturns("it", (ProgramReturn(safe, hit), ProgramReturn(ground, replace(ground, kind="safe"))))

@@ -97,7 +97,7 @@ def test_a_parameter_that_would_help_is_written_beside_ones_own(
         of = SurveyRemedy("parameter", "ROLL_LIMIT_DEG", 35.0, 47.0, "deg", verdict, laid, 5000.0, 150.0)
         return TriedRemedies((of,))
 
-    monkeypatch.setattr(surveying, "survey_remedies", found)
+    monkeypatch.setattr(surveying, "find_survey_remedies", found)
     monkeypatch.chdir(tmp_path)
     # With all parameters of the file, flown or not.
     Path("own.param").write_text("# mine\nNAVL1_PERIOD,15.5\nSERVO1_TRIM,1500\n", encoding="ascii")
@@ -119,7 +119,7 @@ def test_a_layout_for_a_plan_is_a_plan_with_all_that_it_holds(
         laid = replace(setup.mission, items=setup.mission.items[:-1])
         return TriedRemedies((SurveyRemedy("turn-around", "", 0.0, 150.0, "m", verdict, laid, 5000.0, 150.0),))
 
-    monkeypatch.setattr(surveying, "survey_remedies", found)
+    monkeypatch.setattr(surveying, "find_survey_remedies", found)
     monkeypatch.chdir(tmp_path)
     mission = read_mission(FIELD_SURVEY)
     lat, lon = next((item.lat_deg, item.lon_deg) for item in mission.items if item.has_position)

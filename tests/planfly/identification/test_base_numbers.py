@@ -15,7 +15,7 @@ from aircraft.identification.parameters import prior_means
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
-from planfly.identification.base_numbers import base_model, is_flying_wing, scale_model
+from planfly.identification.base_numbers import base_model, is_flying_wing, scale_base_model
 from planfly.identification.model_text import identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
 
@@ -71,7 +71,7 @@ def test_a_changed_aircraft_gives_changed_numbers(tmp_path: Path) -> None:
 
 def test_scaling_takes_mass_and_lengths() -> None:
     base = base_model(load_aircraft("aerosonde"))
-    made = scale_model(base, 22.0, 2.0 * base.span, 2.0 * base.area)
+    made = scale_base_model(base, 22.0, 2.0 * base.span, 2.0 * base.area)
     assert made.inertia[0] == pytest.approx(8.0 * base.inertia[0], rel=1e-6)
     assert made.chord == pytest.approx(base.chord)
 
@@ -80,9 +80,13 @@ def test_a_stubbier_wing_has_more_induced_drag() -> None:
     """Over pi e AR: twice the area at the same span is half the aspect ratio, and twice the drag; not at twice both."""
     base = base_model(load_aircraft("aerosonde"))
     own = base.coefficients.drag_induced
-    assert scale_model(base, 11.0, base.span, 2.0 * base.area).coefficients.drag_induced == pytest.approx(2.0 * own)
-    assert scale_model(base, 11.0, 2.0 * base.span, 4.0 * base.area).coefficients.drag_induced == pytest.approx(own)
-    assert scale_model(base, 11.0, base.span, base.area).coefficients == base.coefficients
+    assert scale_base_model(base, 11.0, base.span, 2.0 * base.area).coefficients.drag_induced == pytest.approx(
+        2.0 * own
+    )
+    assert scale_base_model(base, 11.0, 2.0 * base.span, 4.0 * base.area).coefficients.drag_induced == pytest.approx(
+        own
+    )
+    assert scale_base_model(base, 11.0, base.span, base.area).coefficients == base.coefficients
 
 
 @pytest.mark.parametrize("name", ["ultrastick25e", "c172x"])

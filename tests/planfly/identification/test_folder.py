@@ -17,7 +17,13 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import fastest_level_flight
 from logs.importers.motion import MotionLog
 from planfly.identification.base_numbers import base_model
-from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified, posterior_text
+from planfly.identification.folder import (
+    Identified,
+    flown_parameters,
+    folder_files,
+    make_identification,
+    posterior_text,
+)
 from planfly.identification.records import log_outputs
 from tests.instrumented_flights import PARAMETERS, Truth, changed_aerosonde, short_motion
 
@@ -40,7 +46,7 @@ def flown(parameters: Mapping[str, float], **fields: Any) -> MotionLog:
 def found(log: MotionLog) -> Identified:
     """As if its estimate were the prior, ten times as sure."""
     estimate = Estimate(prior_means(), np.diag(np.square(0.1 * prior_sds())), (), ())
-    return make_identified(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE))
+    return make_identification(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE))
 
 
 def files(log: MotionLog) -> dict[str, str]:
@@ -93,7 +99,7 @@ def test_power_is_as_uncertain_as_torque_and_drive(with_current: bool, power_sd:
     covariance = np.diag(np.square(sds))
     estimate = Estimate(prior_means(), covariance, (), (), with_current=with_current, airspeed=(1.02, 0.003))
     log = flown({})
-    found = make_identified(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE))
+    found = make_identification(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE))
     table = tomllib.loads(posterior_text(found))
     assert table["power_sd"] == pytest.approx(power_sd, rel=0.3 if with_current else 0.1)
     assert (table["airspeed_factor"], table["airspeed_factor_sd"]) == (1.02, 0.003)
@@ -118,6 +124,6 @@ def test_the_fastest_is_as_sure_as_the_drag(tmp_path: Path) -> None:
     estimate = Estimate(prior_means(), np.diag(np.square(sds)), (), ())
     log = flown({})
     table = tomllib.loads(
-        posterior_text(make_identified(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE)))
+        posterior_text(make_identification(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE)))
     )
     assert table["fastest_sd_mps"] == pytest.approx(0.5 * (tops[0] - tops[1]), rel=0.15)

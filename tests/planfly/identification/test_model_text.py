@@ -10,7 +10,7 @@ from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
 from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
-from planfly.identification.base_numbers import _Probe, base_model, scale_model
+from planfly.identification.base_numbers import _Probe, base_model, scale_base_model
 from planfly.identification.model_text import check_base, identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
 from tests.instrumented_wings import MASS, changed_wing
@@ -39,7 +39,7 @@ FACTORS = {
 def written(place: Path, values: np.ndarray, mass: float = 11.0, area: float = BASE.wing_area) -> Aircraft:
     folder = place / "mine"
     folder.mkdir()
-    numbers = scale_model(base_model(BASE), mass, BASE.wing_span, area)
+    numbers = scale_base_model(base_model(BASE), mass, BASE.wing_span, area)
     (folder / "mine.xml").write_text(identified_xml(BASE, "mine", numbers, values), encoding="utf-8")
     text = (BASE.folder / "aerosonde.toml").read_text(encoding="utf-8").replace("mass_kg = 11.0", f"mass_kg = {mass}")
     text = text.replace("wing_area_m2 = 0.55", f"wing_area_m2 = {area}")
@@ -107,7 +107,7 @@ def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
     for key, value in truth.items():
         if key != MASS:
             values[INDEX[key]] = value
-    numbers = scale_model(base_model(base), edited.mass, base.wing_span, base.wing_area)
+    numbers = scale_base_model(base_model(base), edited.mass, base.wing_span, base.wing_area)
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / "mine.xml").write_text(identified_xml(base, "mine", numbers, values), encoding="utf-8")

@@ -12,8 +12,8 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from planfly.planning.gust_altitude_margin import (
     ensure_altitude_margin,
     find_shortfalls,
+    limits_for_alternatives,
     limits_in_gusts,
-    limits_of_alternatives,
 )
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import finish_plan, make_plan
@@ -76,7 +76,7 @@ def test_who_keeps_it_otherwise_and_calm_air_are_left_as_they_were() -> None:
         airframe = load_airframe(scenario)
         plan = plan_path(scenario, airframe.limits, seed=SEED)
         assert ensure_altitude_margin(plan, airframe, lambda limits: pytest.fail("searched for another")) is plan
-        assert limits_of_alternatives(plan, airframe) == airframe.limits
+        assert limits_for_alternatives(plan, airframe) == airframe.limits
 
 
 def needed(airframe: Airframe, climbs: float = 0.0) -> float:
@@ -319,10 +319,10 @@ def test_plans_beside_one_that_leads_above_a_missile_keep_above_it_too() -> None
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, SEED)
     assert plan.safe
-    kept = limits_of_alternatives(plan, airframe)
+    kept = limits_for_alternatives(plan, airframe)
     assert kept.reserve_threats == kept.reserve_height > 30.0
     beside = replace(scenario, threats=scenario_of("moderate").threats)
-    assert limits_of_alternatives(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
+    assert limits_for_alternatives(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
 
 
 @pytest.mark.usefixtures("short_fronts")
@@ -333,7 +333,7 @@ def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
     airframe = load_airframe(scenario)
     front = planfly.plan_front(scenario, 4, seed=SEED)
     assert len(front.plans) >= 3
-    assert limits_of_alternatives(front.default.plan, airframe).reserve_height > 30.0
+    assert limits_for_alternatives(front.default.plan, airframe).reserve_height > 30.0
     for one in [*(found.plan for found in front.plans), planfly.plan(scenario, seed=SEED)]:
         assert one.safe
         assert ensure_altitude_margin(one, airframe) is one

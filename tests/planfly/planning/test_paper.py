@@ -19,11 +19,11 @@ from planfly.planning.paper import (
     STRIP_ALGORITHM,
     STRIP_HALF_WIDTHS_M,
     exposure_probability,
-    file_names,
-    make_table,
+    paper_file_names,
     plan_once,
     plan_section,
     problem_name,
+    summarise_plans,
     table_text,
     write_tables,
 )
@@ -34,7 +34,7 @@ from world.scenario import load_scenario
 
 
 def test_the_table_counts_plans_in_the_order_they_were_made() -> None:
-    rows = make_table(
+    rows = summarise_plans(
         [
             made_plan("a", 1, 1.2, 0.0),
             made_plan("a", 2, 1.1, 0.0),
@@ -93,7 +93,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 
 
 def test_the_text_has_a_line_for_each_row_of_the_table() -> None:
-    text = table_text(make_table(PLANS)).splitlines()
+    text = table_text(summarise_plans(PLANS)).splitlines()
     # One of a's two plans is safe, of length ratio 1.2; none of b's, so it has no length.
     assert text[1].split()[:6] == ["7", "a", "1/2", "1/2", "1.2000", "1.2000"]
     assert text[2].split()[:6] == ["7", "b", "0/1", "1/1", "-", "-"]
@@ -101,7 +101,7 @@ def test_the_text_has_a_line_for_each_row_of_the_table() -> None:
 
 
 def test_a_folder_has_two_pictures_for_each_problem_beside_the_tables() -> None:
-    names = file_names([7, 60])
+    names = paper_file_names([7, 60])
     assert len(names) == len(set(names))
     assert {"paths-07.png", "encodings-07.png", "paths-60.png", "encodings-60.png", "convergence.png"} == {
         name for name in names if name.endswith(".png")
@@ -109,7 +109,7 @@ def test_a_folder_has_two_pictures_for_each_problem_beside_the_tables() -> None:
 
 
 def test_tables_hold_the_plans_and_only_times_csv_their_time(tmp_path: Path) -> None:
-    write_tables(tmp_path, make_table(PLANS), PLANS)
+    write_tables(tmp_path, summarise_plans(PLANS), PLANS)
     rows = read_csv(tmp_path / "runs.csv")
     assert [(row["algorithm"], row["seed"], row["safe"]) for row in rows] == [
         ("a", "1", "True"),
@@ -127,7 +127,7 @@ def test_tables_hold_the_plans_and_only_times_csv_their_time(tmp_path: Path) -> 
     kept = {}
     for folder, plans in (("x", PLANS[:1]), ("y", slower)):
         (tmp_path / folder).mkdir()
-        write_tables(tmp_path / folder, make_table(plans), plans)
+        write_tables(tmp_path / folder, summarise_plans(plans), plans)
         kept[folder] = [(tmp_path / folder / name).read_bytes() for name in ("table.csv", "runs.csv", "runs.json")]
     assert kept["x"] == kept["y"]
 

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from planfly.studio.guard import check_request
+from planfly.studio.guard import request_refusal
 
 PORT = 8790
 OWN, ORIGIN = "127.0.0.1:8790", "http://127.0.0.1:8790"
@@ -15,7 +15,7 @@ def asked(kind: str = "http", method: str = "GET", path: str = "/", **headers: s
     for name, value in headers.items():
         values = [value] if isinstance(value, str) else value
         rows += [(name.replace("_", "-").encode(), one.encode("latin-1")) for one in values]
-    return check_request({"type": kind, "method": method, "path": path, "headers": rows}, PORT)[0]
+    return request_refusal({"type": kind, "method": method, "path": path, "headers": rows}, PORT)[0]
 
 
 @pytest.mark.parametrize("host", [OWN, "localhost:8790", "[::1]:8790", "LOCALHOST:8790"])

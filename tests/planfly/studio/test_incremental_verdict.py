@@ -19,7 +19,7 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.moved_route import update_moved_route
 from planfly.studio.session import Session
-from planfly.studio.settings import SetParameters
+from planfly.studio.settings import ChangedParameters
 from planfly.studio.states import violated_legs
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
 from tests.planfly.studio.drafts import drawn_session
@@ -139,7 +139,7 @@ def test_windows_violate_the_zones_that_the_whole_does() -> None:
 def test_a_dragged_mission_is_flown_with_the_parameters_of_its_landing(tmp_path: Path) -> None:
     """After an RTL it goes on to its landing sequence, with the RTL_AUTOLAND 1 that is assumed; by default it stays."""
     setup = hill_setup(tmp_path, mission=HEAD + mission_rows())
-    context = EditContext.from_setup(setup).with_settings(setup.scenario, SetParameters())
+    context = EditContext.from_setup(setup).with_settings(setup.scenario, ChangedParameters())
     mission = edits.raise_items(context.opened_setup.mission, [0], 50.0)
     released = context.setup(mission)
     route, (window, *_) = judge_windows(context, mission, 0, context.opened_setup)

@@ -9,8 +9,8 @@ from planfly.studio import jobs as jobs_module
 from planfly.studio import messages
 from planfly.studio.documents import open_document, straight_plan
 from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
-from planfly.studio.pilot import Answer, Task
 from planfly.studio.session import Session
+from planfly.studio.worker_process import Answer, Task
 from planfly.studio.worker_tasks import fly, try_suggestions
 from planner.search.plan_front import FrontPlan
 from tests.planfly.studio.drafts import drawn_session
@@ -142,7 +142,7 @@ def test_paths_that_were_found_can_be_chosen_after_another_search_was_stopped(jo
     stopped = jobs.handle_answer(LONG_WORKER, Answer(second.number, "cancelled"), session)
     assert stopped == [{"kind": "stopped", "job": "plan"}]
     session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=1))
-    assert session.sheet()["undo"] == "plan with seed 3"
+    assert session.mission_message()["undo"] == "plan with seed 3"
 
 
 def test_paths_between_items_replace_the_items_of_their_own_search(jobs: Jobs) -> None:

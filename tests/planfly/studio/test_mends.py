@@ -20,9 +20,9 @@ from planfly.flight_options import MissionOptions
 from planfly.studio import documents, messages
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG_WORKER, Jobs
-from planfly.studio.pilot import Answer, Task
 from planfly.studio.server import NO_TOKEN, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
+from planfly.studio.worker_process import Answer, Task
 from planner.plan import read_plan
 from tests.planfly.made_plans import default_run
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
@@ -83,7 +83,7 @@ def test_an_item_that_no_flight_comes_to_has_a_height_and_says_so() -> None:
     passed = replace(mission.items[1], seq=5, lat_deg=mission.items[1].lat_deg + 0.001)
     end = replace(mission.items[2], seq=6, lat_deg=mission.items[2].lat_deg + 0.01)
     session = session_of(replace(mission, items=(*mission.items[:3], jump, passed, end)))
-    found = {one["seq"]: one for one in session.sheet()["items"]}
+    found = {one["seq"]: one for one in session.mission_message()["items"]}
     assert (found[5]["state"], found[6]["state"]) == ("not flown", "")
     assert found[5]["at"][2] == pytest.approx(passed.alt, abs=0.06)
 
@@ -185,7 +185,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
         LONG_WORKER, Answer(asked[0].number, "done", [straight_plan(session.context.scenario, 3)]), session
     )
     assert [one["kind"] for one in answers] == ["stopped", "fault"]
-    assert not jobs.pop_initial_plan(session)
+    assert not jobs.has_new_initial_plan(session)
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
     again.start_first_task(session)
@@ -196,9 +196,9 @@ def test_a_certificate_does_not_outlive_settings() -> None:
     session = planned_session()
     session.plans = ([straight_plan(session.context.scenario, 3)], None)
     session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=0))
-    assert session.sheet()["planned"]
+    assert session.mission_message()["planned"]
     session.change_settings(messages.Settings(kind="settings", wind_speed=9.0))
-    assert not session.sheet()["planned"]
+    assert not session.mission_message()["planned"]
     saved = json.loads(session.save("plan.json").data)
     assert saved["certificate"]["problems"] != ["not planned yet"]
     assert any("wind" in line for line in session.save("waypoints").losses)
@@ -227,7 +227,7 @@ def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_pa
         one.write_text(mission_text(drawn_session(seed, 8).mission, "waypoints"), encoding="utf-8")
     session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
     session.open(open_document(str(other), session.options))
-    assert session.sheet()["over"] == ""
+    assert session.mission_message()["over"] == ""
     with pytest.raises(PlanflyError, match="started without a mission file"):
         session.overwrite_file()
     session.open(open_document(str(file), session.options))
@@ -249,19 +249,19 @@ def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Pat
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     mine = session.mission
     session.autosave(kept)
-    number = session.sheet()["document"]
+    number = session.mission_message()["document"]
     session.open(open_document(str(other), session.options))
-    assert session.sheet()["document"] > number
+    assert session.mission_message()["document"] > number
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=20.0))
     theirs = session.mission
     session.autosave(kept)
     assert open_session(str(file), MissionOptions(scenario="jacksboro"), kept)[0].mission.items == mine.items
     session.step_history("undo")
-    assert session.sheet()["undo"] == "open other.waypoints"
+    assert session.mission_message()["undo"] == "open other.waypoints"
     session.step_history("undo")
     assert session.mission is mine
-    assert session.sheet()["name"] == "m.waypoints"
-    assert session.sheet()["over"] == "waypoints"
+    assert session.mission_message()["name"] == "m.waypoints"
+    assert session.mission_message()["over"] == "waypoints"
     session.step_history("redo")
     session.step_history("redo")
     assert session.mission is theirs
@@ -370,8 +370,8 @@ def test_a_full_disk_is_said_once(tmp_path: Path) -> None:
         server = server_of(session, tmp_path / "file" / "kept.json")
         page = Page(NoSocket(), dark=False)  # type: ignore[arg-type]
         server._pages.add(page)
-        await server._autosave()
-        await server._autosave()
+        await server._autosave_session()
+        await server._autosave_session()
         return sent(page)
 
     (fault,) = asyncio.run(run())

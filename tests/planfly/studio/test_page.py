@@ -221,7 +221,7 @@ def kept_items(studio: Studio) -> list[tuple[MissionItem, ...]]:
 
 
 def test_it_opens_with_the_mission_and_asks_for_nothing_elsewhere(page: Browser, studio: Studio) -> None:
-    assert marks(page) == len(drawn_session(8, 8).sheet()["items"])
+    assert marks(page) == len(drawn_session(8, 8).mission_message()["items"])
     assert page.value("location.hash + location.search") == ""
     own = f"http://127.0.0.1:{studio.port}/"
     assert [one for one in page.requests if not one.startswith((own, "blob:"))] == []

@@ -88,7 +88,7 @@ def test_undo_goes_back_to_the_first_mission_itself() -> None:
         session.step_history("undo")
     assert session.mission is first
     assert session.judged.verdict == verdict
-    assert session.sheet()["redo"]
+    assert session.mission_message()["redo"]
     session.step_history("redo")
     assert session.is_changed
 
@@ -100,7 +100,7 @@ def test_an_edit_of_an_older_sheet_is_refused() -> None:
     with pytest.raises(StaleEdit):
         session.edit(messages.Delete(kind="delete", rev=rev, ks=[k]))
     with pytest.raises(StaleEdit):
-        session.preview(messages.Drag(kind="drag", rev=rev, n=1, k=k, east=0.0, north=0.0))
+        session.judge_drag(messages.Drag(kind="drag", rev=rev, n=1, k=k, east=0.0, north=0.0))
 
 
 def test_a_preview_changes_nothing_and_is_what_the_move_comes_to() -> None:
@@ -108,10 +108,10 @@ def test_a_preview_changes_nothing_and_is_what_the_move_comes_to() -> None:
     k, before = edits.movable_indices(session.mission)[5], session.mission
     east, north, _ = session.item_position(k)
     asked = messages.Drag(kind="drag", rev=session.rev, n=1, k=k, east=east + 300.0, north=north, whole=True)
-    shown = session.preview(asked)["sheet"]
+    shown = session.judge_drag(asked)["sheet"]
     assert session.mission is before
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 300.0, north=north))
-    assert {name: session.sheet()[name] for name in shown} == shown
+    assert {name: session.mission_message()[name] for name in shown} == shown
 
 
 # ----------------------------------------------------------------------
@@ -130,13 +130,13 @@ def test_a_moved_mission_saved_is_read_as_it_is() -> None:
     k = edits.movable_indices(session.mission)[3]
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=100.0, north=200.0))
     session.save("kml")
-    assert session.sheet()["unsaved"] is True
+    assert session.mission_message()["unsaved"] is True
     for form in ("waypoints", "plan"):
         saved = session.save(form)
-        assert (session.sheet()["unsaved"], session.sheet()["changed"]) == (False, True)
+        assert (session.mission_message()["unsaved"], session.mission_message()["changed"]) == (False, True)
         assert parse_mission(saved.data.decode(), saved.name).items == session.mission.items
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
-    assert session.sheet()["unsaved"] is True
+    assert session.mission_message()["unsaved"] is True
 
 
 def test_what_a_form_does_not_hold_is_said() -> None:
@@ -223,12 +223,12 @@ def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: P
     again.replace_plan(messages.Choose(kind="choose", rev=again.rev, which=0))
     again.autosave(kept)
     third, _ = open_session(str(file), world, kept)
-    assert third.sheet()["planned"]
+    assert third.mission_message()["planned"]
     assert third.save("plan.json").data == again.save("plan.json").data
     third.edit(messages.Raise(kind="raise", rev=third.rev, by=5.0))
     third.autosave(kept)
     fourth, _ = open_session(str(file), world, kept)
-    assert (fourth.sheet()["planned"], fourth.context.planned) == (False, True)
+    assert (fourth.mission_message()["planned"], fourth.context.planned) == (False, True)
     assert fourth.settings_json() == session.settings_json()
     assert fourth.mission.items == third.mission.items
 
@@ -354,7 +354,7 @@ def test_a_scenario_opens_with_its_straight_line() -> None:
     assert document.to_plan
     session = Session.from_document(document, MissionOptions())
     assert len(edits.movable_indices(session.mission)) == 2
-    assert session.sheet()["verdict"]["state"] == "fail"
+    assert session.mission_message()["verdict"]["state"] == "fail"
 
 
 def test_a_mission_without_a_scenario_takes_its_world_along() -> None:

@@ -7,8 +7,8 @@ from planfly.flight_options import MissionOptions
 from planfly.studio import messages
 from planfly.studio.documents import open_document
 from planfly.studio.jobs import LONG_WORKER, Jobs
-from planfly.studio.pilot import Answer, Task
 from planfly.studio.session import Session
+from planfly.studio.worker_process import Answer, Task
 from planfly.studio.worker_tasks import plan
 from world.errors import PlanflyError
 
@@ -41,4 +41,4 @@ def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatc
     assert "shortest" in ways[0]["best"]
     session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=1))
     assert session.judged.setup.plan is found[1].plan
-    assert session.sheet()["undo"] == "plan with seed 1"
+    assert session.mission_message()["undo"] == "plan with seed 1"

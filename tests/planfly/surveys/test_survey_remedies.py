@@ -62,7 +62,7 @@ def opened(path: Path) -> FlightSetup:
 def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
     flights, mission = Flights(answer), opened(path)
     monkeypatch.setattr(remedies, "Trial", flights)
-    found = remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
+    found = remedies.find_survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
     return found, flights.flown
 
 
@@ -94,7 +94,7 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
         return found
 
     monkeypatch.setattr(remedies, "Trial", fly)
-    found = remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
+    found = remedies.find_survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
     longer, second = found.remedies
     assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
     assert (second.kind, second.value, second.turn_around, second.lead_in) == ("every", 2.0, 50.0, 150.0)
@@ -137,7 +137,9 @@ def judged_by(
 
     mission = opened(path)
     monkeypatch.setattr(remedies, "Trial", fly)
-    return remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {})))
+    return remedies.find_survey_remedies(
+        mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {}))
+    )
 
 
 def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -198,7 +200,9 @@ def test_nearest_trial_is_the_one_that_makes_more_of_each_line_usable(monkeypatc
 
     mission = opened(FIELD)
     monkeypatch.setattr(remedies, "Trial", fly)
-    found = remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {})))
+    found = remedies.find_survey_remedies(
+        mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {}))
+    )
     assert found.nearest is not None
     assert "0 of 4 photo lines can be used, the worst to 92 %" in near_miss_text(found.nearest)
     assert found.nearest.what == "turn-arounds of 350 m"

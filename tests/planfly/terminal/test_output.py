@@ -189,7 +189,7 @@ def test_input_that_is_refused_first_has_no_line(capsys: pytest.CaptureFixture[s
 # ----------------------------------------------------------------------
 # Before anything is measured: what such a stage took the last time on this machine.
 
-REMEMBER = output._store_duration
+REMEMBER = output._write_duration
 
 
 @pytest.fixture
@@ -197,7 +197,7 @@ def times(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The file of what stages took, which is not there yet."""
     file = tmp_path / "cache" / "durations.json"
     monkeypatch.setattr(output, "_durations_file", lambda: file)
-    monkeypatch.setattr(output, "_store_duration", REMEMBER)
+    monkeypatch.setattr(output, "_write_duration", REMEMBER)
     return file
 
 
@@ -265,7 +265,7 @@ def test_a_damaged_file_of_times_is_none(
 
 def test_no_place_to_remember_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(output, "_store_duration", REMEMBER)
+    monkeypatch.setattr(output, "_write_duration", REMEMBER)
     monkeypatch.setattr(output, "_durations_file", lambda: tmp_path / "file" / "durations.json")
     run(Clock(monkeypatch), "flying", "flying", 2, 1.0)
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from flight.mission.implied_scenario import implied_scenario
-from planfly.workflow.airframe import choose_seed, load_airframe, tightened_airframe
+from planfly.workflow.airframe import choose_seed, load_airframe, with_tightened_limits
 from tests.mission_lines import mission, wp
 from tests.setups import small_scenario
 from world.errors import ScenarioError
@@ -73,7 +73,7 @@ def test_no_wind_is_refused_here_as_what_it_leaves_is_for_the_verdict_to_say() -
 def test_tightened_limits_are_those_of_the_changed_scenario() -> None:
     airframe = load_airframe(small_scenario())
     tight = small_scenario(limits={"max_turn_deg": 20.0}, flight={"max_bank_deg": 15.0})
-    tightened = tightened_airframe(airframe, tight)
+    tightened = with_tightened_limits(airframe, tight)
     assert tightened.limits.max_turn == pytest.approx(math.radians(20.0))
     assert tightened.max_bank == pytest.approx(math.radians(15.0))
     assert (tightened.aircraft, tightened.battery) == (airframe.aircraft, airframe.battery)

@@ -15,7 +15,7 @@ from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from planfly.cli import main
 from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits, flight_text, predicted_seconds
+from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits, length_and_duration_text, predicted_seconds
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge
 from tests.planfly.conftest import FIELD
@@ -67,7 +67,7 @@ def test_a_log_has_a_limit(long: Path, capsys: pytest.CaptureFixture[str]) -> No
 def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its predicted time is that of the flight, within a twentieth."""
     opened = opened_calm(long)
-    told = flight_text(opened)
+    told = length_and_duration_text(opened)
     flown = fly_and_judge(opened, airframe_for_setup(opened), None)
     assert flown.ended == "completed"
     assert predicted_seconds(opened) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
@@ -102,7 +102,7 @@ def test_the_limit_of_time_is_in_ticks() -> None:
 
 
 def test_a_short_flight_is_told_in_seconds() -> None:
-    assert flight_text(example_log().setup).endswith(" s in the air")
+    assert length_and_duration_text(example_log().setup).endswith(" s in the air")
 
 
 def test_a_speed_that_the_autopilot_ignores_lengthens_no_predicted_flight() -> None:

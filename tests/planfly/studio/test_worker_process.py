@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from planfly.studio.pilot import Answer, Task, WorkerProcess
+from planfly.studio.worker_process import Answer, Task, WorkerProcess
 
 WORKS = "tests.planfly.studio.light_works"
 COUNT = f"{WORKS}.count"

@@ -65,7 +65,9 @@ class Cancelled(Exception):
 
 
 class WorkerProcess:
-    """Interface of the server to a worker process. Its methods may be called from any thread, and never block.
+    """Interface of the server to a worker process.
+
+    Its methods may be called from any thread, and never block.
 
     A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
     """
@@ -183,7 +185,7 @@ class WorkerProcess:
                         self._unanswered = [number for number in self._unanswered if number != task.number]
 
     def _fail_unsent(self, task: Task | None, reason: str) -> None:
-        """Report a fault of a task that could not be sent to the process."""
+        """Answer a task that could not be sent to the process with a fault.  reason: line for the user."""
         with self._condition:
             if task is None or self._is_closed:
                 return
@@ -211,7 +213,10 @@ class WorkerProcess:
             self._on_answer(Answer(dropped_number, "cancelled"))
 
     def _drop_unanswered(self) -> list[int]:
-        """Forget the unanswered tasks of a lost process; return their numbers except the newest task's."""
+        """Clear the unanswered tasks of a lost process.
+
+        Returns the numbers of these tasks, except the number of the newest task.
+        """
         dropped_numbers = [
             number for number in self._unanswered if self._newest_task is None or number != self._newest_task.number
         ]
@@ -244,7 +249,10 @@ class WorkerProcess:
         return server_end
 
     def _forward_answers(self, pipe: Connection) -> None:
-        """Forward answers of the process until the pipe closes; a task without an answer gets a fault."""
+        """Forward answers of the process until the pipe closes, and then answer the unanswered tasks.
+
+        The newest task is answered with a fault, older tasks as cancelled.
+        """
         while True:
             try:
                 answer = pipe.recv()
@@ -267,7 +275,7 @@ class WorkerProcess:
             self._on_answer(answer)
 
     def _record_answer(self, pipe: Connection, answer: Answer) -> None:
-        """Record that a task has ended."""
+        """Record that a task has ended, and stop the timer if it waited for this task."""
         with self._condition:
             if self._newest_task is not None and answer.number == self._newest_task.number:
                 self._newest_task = None
@@ -283,7 +291,10 @@ class WorkerProcess:
 
 
 def run_worker(pipe: Connection) -> None:
-    """Run the newest task from the pipe until the pipe closes; the main loop of a worker process."""
+    """Run the newest task from the pipe until the pipe closes.
+
+    This is the main loop of a worker process.
+    """
     import signal
 
     # An interrupt at the terminal is handled by the server.

@@ -12,7 +12,7 @@ GLIDE_TIME_S = 20
 
 
 @dataclass(frozen=True, slots=True)
-class WideNumber:
+class WideQuantity:
     """A quantity with a wide interval.
 
     title: "sink at idle" or "power in level flight".
@@ -28,7 +28,7 @@ class WideNumber:
     def text(self) -> str:
         """Description of the quantity, its interval, and the flight that would narrow the interval.
 
-        >>> WideNumber("sink at idle", 0.23, "glides").text
+        >>> WideQuantity("sink at idle", 0.23, "glides").text
         'sink at idle: known to ±23 % only; fly glides'
         """
         return f"{self.title}: known to ±{100.0 * self.half:.0f} % only; fly {self.show}"
@@ -37,12 +37,13 @@ class WideNumber:
 Interval = tuple[float, float, float]
 
 
-def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideNumber, ...]:
-    """Return those of the two quantities, sink rate and power, that the logs determine only within a wide interval.
+def wide_quantities(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideQuantity, ...]:
+    """Return those of sink rate and power in level flight whose 95 % interval is too wide.
 
+    sink, power: lower bound, estimate and upper bound, in any unit.
     with_current: True if the battery's current was logged; without it the propeller power is unknown.
 
-    >>> [one.title for one in wide_numbers((6.0, 7.0, 8.0), (400.0, 500.0, 590.0), with_current=False)]
+    >>> [one.title for one in wide_quantities((6.0, 7.0, 8.0), (400.0, 500.0, 590.0), with_current=False)]
     ['sink at idle']
     """
     speed_runs = "level runs of 20 s at several speeds"
@@ -58,5 +59,5 @@ def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tupl
     ):
         half_width = 0.5 * (upper - lower) / abs(value)
         if half_width > limit:
-            wide.append(WideNumber(title, half_width, show))
+            wide.append(WideQuantity(title, half_width, show))
     return tuple(wide)
