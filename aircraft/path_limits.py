@@ -115,11 +115,8 @@ class Limits:
         """
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
-    def max_rates(self, amsl: float) -> tuple[float, float]:
-        """Return the maximum climb and sink rates (m/s) in still air at an altitude (m AMSL).
-
-        The airspeed is `airspeed`.
-        """
+    def max_climb_and_sink_rates(self, amsl: float) -> tuple[float, float]:
+        """Return the maximum climb and sink rates (m/s) in still air at an altitude (m AMSL) and `airspeed`."""
         table = self.performance()
         speed = float(true_airspeed(table, amsl))
         climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))

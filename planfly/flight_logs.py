@@ -28,7 +28,7 @@ def is_log(path: Path) -> bool:
 
 
 def judge_log(log: FlightLog) -> Verdict:
-    """Judge the flight of a log from the rows that the log contains."""
+    """Judge a logged flight from its recorded track."""
     return judge_flight(
         log.setup, log.track, log.ended or CUT_SHORT, log_complete=log.complete, reference=log.reference
     )

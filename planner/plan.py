@@ -21,7 +21,7 @@ from world.arrays import Floats
 from world.errors import ArgumentError, MissionError
 from world.files import read_small_file
 from world.html_table import html_table
-from world.scenario import Scenario, scenario_from_spec, with_absolute_ends
+from world.scenario import Scenario, scenario_from_spec, with_amsl_endpoints
 from world.scenario_file import first_fault
 from world.terrain import Terrain
 
@@ -362,7 +362,7 @@ def parse_plan(
     waypoints = np.array(plan_file.waypoints_east_north_amsl_m)
     # With another terrain the ends keep their planned altitudes.
     scenario_spec = (
-        plan_file.scenario if terrain is None else with_absolute_ends(plan_file.scenario, waypoints[0], waypoints[-1])
+        plan_file.scenario if terrain is None else with_amsl_endpoints(plan_file.scenario, waypoints[0], waypoints[-1])
     )
     scenario = scenario_from_spec(scenario_spec, source, base=base, terrain=terrain, ground=ground)
     history = np.array([[np.nan if value is None else value for value in row] for row in plan_file.history]).reshape(

@@ -291,7 +291,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     heights[~is_ground(heights)] = np.nan
     _convert_to_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
-        lambda e, n: _window_pixels(raster.to_pixels, origin, e, n, left, top),
+        lambda e, n: _to_window_pixels(raster.to_pixels, origin, e, n, left, top),
         box + np.array([-buffer, buffer]),
         PIXEL_TOLERANCE,
     )
@@ -390,13 +390,14 @@ def _outline_window(
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
     north = np.concatenate([np.full(41, s), np.full(41, n), s + ramp * (n - s), s + ramp * (n - s)])
-    col, row = _window_pixels(raster.to_pixels, origin, east, north, 0, 0)
+    col, row = _to_window_pixels(raster.to_pixels, origin, east, north, 0, 0)
     return float(col.min()), float(col.max()), float(row.min()), float(row.max())
 
 
-def _window_pixels(
+def _to_window_pixels(
     to_pixels: PixelMap, origin: GeoOrigin, east: Floats, north: Floats, left: int, top: int
 ) -> tuple[Floats, Floats]:
+    """Convert map positions to columns and rows relative to a window's first pixel."""
     lat, lon = to_geo(origin, east, north)
     col, row = to_pixels(lon, lat)
     return np.asarray(col) - left, np.asarray(row) - top

@@ -497,17 +497,17 @@ def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
     >>> with_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
     'jacksboro'
     """
-    spec = with_absolute_ends(scenario.to_json(), scenario.start, scenario.destination)
+    spec = with_amsl_endpoints(scenario.to_json(), scenario.start, scenario.destination)
     return scenario_from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
 
 
-def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
-    """Return a scenario's JSON data with the given altitudes of start and destination.
+def with_amsl_endpoints(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
+    """Return a scenario's JSON data with the altitudes of start and destination in m AMSL.
 
     start, destination: (3,) m, altitude AMSL. The altitude replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
-    >>> with_absolute_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
+    >>> with_amsl_endpoints(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
     {'east_m': 0.0, 'north_m': 0.0, 'amsl_m': 250.0}
     """
     changed_spec = dict(spec)

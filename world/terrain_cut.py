@@ -195,7 +195,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
             fetched_bytes += byte_count
             progress(len(remotes) + 9.0 * tile_index, 10.0 * len(remotes), f"{name}: {fetched_bytes / 1e6:.1f} MB")
 
-        tiles.append(_place_tile(_fetch_tile(remote, fetched_box, count_bytes), degree, box))
+        tiles.append(_georeference_tile(_fetch_tile(remote, fetched_box, count_bytes), degree, box))
     heights, grid = _merge_tiles(tiles, box)
     absent_degrees = tuple(degree for degree, remote in remote_files.items() if remote is None)
     if sea:
@@ -278,7 +278,7 @@ _PIXEL_TOLERANCE = 1e-3
 class _PlacedTile(NamedTuple):
     """Tile with its grid of longitudes and latitudes.
 
-    west, north: outer edges, deg; the longitude is in the same turn as the area.
+    west, north: outer edges, deg; the longitude is shifted by multiples of 360 degrees to match the area.
     dx, dy: size of a pixel, deg.
     """
 
@@ -289,12 +289,12 @@ class _PlacedTile(NamedTuple):
     dy: float
 
 
-def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Determine the grid of a degree's tile, with longitudes in the same turn as the area.
+def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
+    """Return the grid of a one-degree tile, its longitudes shifted by multiples of 360 degrees to match the area.
 
-    degree: south-west corner of the tile.
+    degree: latitude and longitude of the tile's south-west corner.
 
-    Raises TerrainError if the tile has another grid.
+    Raises TerrainError for a tile without a north-up grid of latitude and longitude over this degree.
     """
     dx, column_skew, west, row_skew, dy, north = tile.grid
     if column_skew or row_skew or not dx > 0.0 > dy:

@@ -210,7 +210,7 @@ class Autopilot(ABC):
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """Return the autopilot that a log stores.
+        """Make the autopilot again from the settings that a log stores; the base class has none.
 
         Raises ParameterError if a value is not allowed.
         """

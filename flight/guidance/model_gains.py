@@ -140,9 +140,9 @@ def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
 
 
 def gains_from_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
-    """Return all gains of an aircraft from its model.
+    """Compute the autopilot gains for an aircraft from its linearised flight model.
 
-    fdm: simulation of the aircraft with its engine at rest; None creates one.
+    fdm: simulation of the aircraft with the engine off; None creates one.
 
     Raises FlightError as `airframe_gains` does.
     """

@@ -414,7 +414,7 @@ class _AltitudeConverter:
         self._home_amsl: float | None = None
 
     def amsl(self, stop: RoutePoint, east: float, north: float, previous_altitude: float) -> float:
-        """Return the altitude of a stop, m AMSL.
+        """Return the altitude of a stop (m AMSL); a stop without an altitude keeps the previous one.
 
         previous_altitude: altitude of the previous stop, m AMSL; NaN for the first stop.
         """

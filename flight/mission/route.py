@@ -492,7 +492,7 @@ def route_through_stops(
     _note_unsimulated_loiters(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
-        return_fields, landing = _append_return(placed_mission, return_stop, points, return_rules, limits, notes)
+        return_fields, landing = _append_rtl(placed_mission, return_stop, points, return_rules, limits, notes)
         if landing is not None:
             points += lay_out(read_stops(landing.stops, len(all_stops)))[0]
     _check_point_count(mission.source, len(points))
@@ -634,7 +634,7 @@ def _note_unsimulated_loiters(
         notes.add(loiters.rtl_exit_note, final_stop.item)
 
 
-def _append_return(
+def _append_rtl(
     placed_mission: PlacedMission,
     stop: RoutePoint,
     points: list[RoutePoint],
@@ -642,10 +642,10 @@ def _append_return(
     limits: Limits | None,
     notes: Notes,
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
-    """Append the waypoints of an RTL to the points, and return its fields of `Route` and its landing sequence.
+    """Append the waypoints of an RTL to the points.
 
-    The landing sequence is None if the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside
-    the allowed range.
+    Return the keyword arguments of `Route` for the RTL, and the landing sequence, None if the RTL stays in its loiter.
+    Raises MissionError if the RTL's altitude is outside the allowed range.
     """
     source, start = placed_mission.mission.source, points[-1].map_position
     home, *rally = placed_mission.return_points

@@ -120,7 +120,7 @@ class Track:
 
         Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
-        return track_frame(self)
+        return track_dataframe(self)
 
     def to_csv(self, path: Path | str) -> None:
         """Write the track as comma-separated text, completely or not at all.
@@ -314,7 +314,7 @@ def track_columns(track: Track) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def track_frame(track: Track) -> Any:
+def track_dataframe(track: Track) -> Any:
     """Return the track as a `pandas.DataFrame`. Raises MissingExtraError without the extra ``tables``."""
     require_extra("tables", "to_pandas() needs")
     import pandas as pd

@@ -94,9 +94,11 @@ class _ChunkIndex(NamedTuple):
     def record(self) -> bytes:
         """Encode the chunk index record of the chunk."""
         offsets = b"".join(_INDEX_OFFSET.pack(channel, position) for channel, position in self.offsets)
-        times = _CHUNK_INDEX_HEADER.pack(self.content_start, self.content_end, self.position, self.length, len(offsets))
+        header = _CHUNK_INDEX_HEADER.pack(
+            self.content_start, self.content_end, self.position, self.length, len(offsets)
+        )
         sizes = _CHUNK_SIZES.pack(self.compressed, self.size)
-        content = times + offsets + self.index_length.to_bytes(8, "little") + _COMPRESSION + sizes
+        content = header + offsets + self.index_length.to_bytes(8, "little") + _COMPRESSION + sizes
         return FRAME.pack(Opcode.CHUNK_INDEX, len(content)) + content
 
 

@@ -87,12 +87,12 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
     known_values = np.concatenate([[0.0], planned_values, flown_values])
     known_values = known_values[np.isfinite(known_values)]
     limits = limit_values[np.isfinite(limit_values)]
-    shown_limits = limits[_is_shown_limit(limits, rule, float(np.abs(known_values).max()))]
+    shown_limits = limits[_visible_limits(limits, rule, float(np.abs(known_values).max()))]
     min_value, max_value = float(min([*known_values, *shown_limits])), float(max([*known_values, *shown_limits]))
     margin = _MARGIN * ((max_value - min_value) or 1.0)
     note = ""
     if len(shown_limits) < len(limits):
-        hidden_limits = limits[~_is_shown_limit(limits, rule, float(np.abs(known_values).max()))]
+        hidden_limits = limits[~_visible_limits(limits, rule, float(np.abs(known_values).max()))]
         note = (
             f"{'other ' if shown_limits.size else ''}limits from {hidden_limits.min():.0f}"
             f"{unit if unit == '°' else ' ' + unit}"
@@ -101,10 +101,10 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
     return Panel(title, unit, tuple(layers), span=(bottom, max_value + margin), along=place, note=note)
 
 
-def _is_shown_limit(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return a mask (n,): True for limits to show.
+def _visible_limits(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Return a mask (n,), True for limits to show.
 
-    A much higher limit of turns or corridors would flatten the other values, and is not shown.
+    A limit of a turn or corridor far above `max_value` would flatten the other values, and is hidden.
     """
     max_limit = _MAX_LIMIT_RATIO * max(max_value, 1e-9) if rule in ("turn", "corridor") else math.inf
     return np.asarray(limits <= max_limit, dtype=np.bool_)

@@ -151,7 +151,7 @@ def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
     climb_rate, min_climb_rate = (
-        airframe.limits.with_margin().max_rates(amsl)[0],
+        airframe.limits.with_margin().max_climb_and_sink_rates(amsl)[0],
         MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence),
     )
     if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
@@ -224,7 +224,7 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
     unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
     limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
-    climb, sink = limits.max_rates(float(plan.waypoints[:, 2].max()))
+    climb, sink = limits.max_climb_and_sink_rates(float(plan.waypoints[:, 2].max()))
     deviation = gust_deviation(turbulence)
     for gust, displacement in _gust_displacements(plan.scenario, autopilot):
         if not displacement(0.0, turbulence):
@@ -283,7 +283,7 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
     """
     limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
-    rates = np.array([limits.max_rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
+    rates = np.array([limits.max_climb_and_sink_rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
     climbs, shortfalls = limits.leg_climb_rates(plan.waypoints), list[Shortfall | None]()
     for gust, displacement in _gust_displacements(plan.scenario, autopilot):
         if not displacement(0.0, turbulence):

@@ -139,7 +139,7 @@ def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     for rate, waypoint in zip(
         limits.leg_climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True
     ):
-        climb, sink = limits.max_rates(float(waypoint[2]))
+        climb, sink = limits.max_climb_and_sink_rates(float(waypoint[2]))
         orbits += autopilot.deviations.altitude_miss_probability(
             climb - max(0.0, rate), sink - max(0.0, -rate), turbulence
         )
@@ -160,7 +160,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     22
     """
     scenario, count = plan.scenario, len(plan.waypoints)
-    climb, sink = airframe.limits.with_margin().max_rates(float(plan.waypoints[:, 2].max()))
+    climb, sink = airframe.limits.with_margin().max_climb_and_sink_rates(float(plan.waypoints[:, 2].max()))
     probability = airframe.autopilot.deviations.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
     if probability == 0.0:
         return count

@@ -134,7 +134,10 @@ def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tupl
 
 
 def describe_changes(previous: FlightResults | None, current: FlightResults) -> list[str]:
-    """Return a line for each change since the previous flight; no lines for the first flight.
+    """Return lines on what changed since the previous flight.
+
+    They state the changed answers, or the changed values if no answer changed; ["nothing"] without a change, and [] for
+    the first flight.
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))

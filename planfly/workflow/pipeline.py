@@ -215,11 +215,11 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     if task.log is None:
         track, end_reason = _simulate_and_record(task, flight, None)
-        return _judge_rows(task, requirements, track, end_reason, flight.engine)
+        return _judge_track(task, requirements, track, end_reason, flight.engine)
     with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
         track, recorder.end_reason = _simulate_and_record(task, flight, recorder)
         rows = thin_track(track, task.every)
-        judged_flight = _judge_rows(task, requirements, rows, recorder.end_reason, flight.engine)
+        judged_flight = _judge_track(task, requirements, rows, recorder.end_reason, flight.engine)
         for event in judged_flight.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged_flight.track) if task.returns else None
@@ -261,10 +261,10 @@ def _judge_unflown(
     return JudgedFlight(setup, requirements, track, end_reason, verdict, ())
 
 
-def _judge_rows(
+def _judge_track(
     task: _FlightOptions, requirements: RouteRequirements, track: Track, end_reason: str, engine: str
 ) -> JudgedFlight:
-    """Judge the recorded rows of a flight, with reference flights unless only findings are requested."""
+    """Judge the recorded track of a flight, with reference flights unless only findings are requested."""
     end_time = float(track.time[-1]) if len(track) else 0.0
     events = (
         LogEvent(0.0, f"flight model: {engine}", "info"),

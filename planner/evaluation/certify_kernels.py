@@ -24,7 +24,7 @@ from planner.evaluation.corners import (
 )
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays
-from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags
+from planner.evaluation.terrain_clearance import HEIGHT_LAG, compute_height_lags, lag_at
 from world.arrays import Floats
 from world.kernels import Record, Records, compiled, copy_into, inner, sort_few
 from world.terrain import segment_clearance
@@ -62,7 +62,7 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind_vector(data.aircraft), data.tracking.across
     measure_legs(waypoints, legs)
     measure_corners(data, wind, waypoints, legs, corners)
-    measure_lags(data.tracking, data.aircraft, wind, waypoints, legs, lags)
+    compute_height_lags(data.tracking, data.aircraft, wind, waypoints, legs, lags)
     pieces = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
     piece_count = 0
     for i in range(count - 1):

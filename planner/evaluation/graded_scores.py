@@ -28,8 +28,8 @@ from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays, Re
 from planner.evaluation.terrain_clearance import (
     HEIGHT_LAG,
     TERRAIN_LEG,
+    compute_height_lags,
     lag_at,
-    measure_lags,
     sample_terrain,
     segment_pixels,
     terrain_excess,
@@ -137,7 +137,7 @@ def score_legs(
     measure_corners(data, limits.wind, path, legs, corners)
     add_leg_violations(data, limits, path, legs, corners, True, violations)
     if data.tracking.has_error:
-        measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
+        compute_height_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
         _measure_tracked_corners(corners, flown_corners, extents)
     else:
         _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown_corners, extents)
@@ -227,7 +227,9 @@ def score_missiles(
             vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown_corners[i].radius)
             below, above, extra_height, missile_margin = 0.0, 0.0, 0.0, margin
         if is_near_ground:
-            violations.terrain += _corner_depth(heights, slope_bounds, to_pixel, required, extra_height, vertices)
+            violations.terrain += _turn_clearance_deficit(
+                heights, slope_bounds, to_pixel, required, extra_height, vertices
+            )
         if is_near_missile:
             kill_sum += _corner_exposure(missiles, missile_margin, vertices, below, above)
     objectives.kill_exposure = kill_sum * POINTS_PER_LEG * (count - 1) / length
@@ -340,7 +342,7 @@ def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) 
 
 
 @inner
-def _corner_depth(
+def _turn_clearance_deficit(
     heights: Heights,
     slope_bounds: SlopeBounds,
     to_pixel: PolyMapRecord,
@@ -348,7 +350,7 @@ def _corner_depth(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the depth below the required clearance, integrated along a flown corner (k, 3), m x km.
+    """Return the clearance deficit integrated along a flown turn `vertices` (k, 3), m x km.
 
     extra_height: height in addition to the required clearance, m.
     """

@@ -75,10 +75,13 @@ def set_lag(
 
 
 @inner
-def measure_lags(
+def compute_height_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:
-    """Fill `HEIGHT_LAG` records (w - 1,) of a path (w, 3), flown without deviation at its start."""
+    """Compute how far the aircraft lags in height on each leg of a path (w, 3), from no lag at its start.
+
+    lags: `HEIGHT_LAG` records to fill, (w - 1,).
+    """
     below = 0.0
     for i in range(legs.shape[0]):
         leg, altitude_change = legs[i], path[i + 1, 2] - path[i, 2]

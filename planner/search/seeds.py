@@ -185,7 +185,7 @@ def search_other_sides(search: Search) -> None:
     if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS_FRACTION:
         tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling_routes(search)
     if not search.has_safe():
-        _try_narrow_margins(search, tried_paths)
+        _shorten_with_narrow_margins(search, tried_paths)
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
@@ -228,8 +228,8 @@ def _try_ceiling_routes(search: Search) -> list[Floats]:
     return tried_paths
 
 
-def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
-    """Shorten paths (w, 3) with narrow margins, because no path is safe with the usual margins."""
+def _shorten_with_narrow_margins(search: Search, paths: list[Floats]) -> None:
+    """Shorten paths (w, 3) under narrow margins, for a search without a path that is safe with the usual ones."""
     usual_problem = search.problem
     search.problem = with_narrow_margins(usual_problem)
     try:
@@ -238,7 +238,7 @@ def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
                 break
             search.shorten(path)
     finally:
-        # A search that is asked to end leaves by an exception.
+        # A search that is interrupted raises an exception.
         search.problem = usual_problem
 
 

@@ -28,7 +28,7 @@ from planner.evaluation.corners import (
 )
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at
-from planner.evaluation.terrain_clearance import HEIGHT_LAG, measure_lags
+from planner.evaluation.terrain_clearance import HEIGHT_LAG, compute_height_lags
 from planner.evaluation.travel_cost import LegModel, model_leg
 from planner.seeding.flown_corners import (
     NEAR_GROUND_HEIGHT_M,
@@ -108,7 +108,7 @@ def active_constraints(
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
     if data.tracking.has_error:
-        measure_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
+        compute_height_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
     extra_heights, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     for i in range(count):
         max_climb, max_dive = slope_limits(data, path[i], path[i + 1])

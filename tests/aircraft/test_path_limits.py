@@ -60,7 +60,7 @@ def test_still_air_is_the_envelope() -> None:
 
 def test_rates_are_those_of_still_air_in_any_wind() -> None:
     climb = 25.0 * math.sin(UP + math.radians(0.5))
-    assert _limits(_from(30.0)).max_rates(250.0) == pytest.approx((climb, 25.0 * math.sin(DOWN)))
+    assert _limits(_from(30.0)).max_climb_and_sink_rates(250.0) == pytest.approx((climb, 25.0 * math.sin(DOWN)))
 
 
 @pytest.mark.parametrize(

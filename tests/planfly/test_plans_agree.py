@@ -131,7 +131,7 @@ def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
     scenario = scenario_of("moderate")
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, SEED)
-    climb, sink = airframe.limits.max_rates(150.0)
+    climb, sink = airframe.limits.max_climb_and_sink_rates(150.0)
     wider = replace(airframe, autopilot=airframe.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
     assert wider.autopilot.deviations.altitude_miss_probability(climb, sink, "moderate") == pytest.approx(
         0.0083, abs=0.0001

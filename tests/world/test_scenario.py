@@ -18,7 +18,7 @@ from world.scenario import (
     embedded_scenarios,
     load_scenario,
     scenario_from_spec,
-    with_absolute_ends,
+    with_amsl_endpoints,
     with_flight,
     with_planner,
     with_terrain,
@@ -270,7 +270,7 @@ def test_more_threats_stand_on_the_ground_with_the_scales_of_the_others(scenario
 
 def test_ends_keep_their_heights_above_the_sea_whatever_is_below() -> None:
     before = load_scenario("jacksboro")
-    ends = with_absolute_ends(before.to_json(), before.start, before.destination)
+    ends = with_amsl_endpoints(before.to_json(), before.start, before.destination)
     assert [ends[key]["amsl_m"] for key in ("start", "destination")] == [before.start[2], before.destination[2]]
     assert not any("height_m" in ends[key] for key in ("start", "destination"))
     after = with_terrain(before, "jacksboro")

@@ -127,7 +127,7 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
     if target.is_rtl:
         altitude_target = _rtl_altitude(estimated, target, parameters, memory)
     elif target.follows_terrain:
-        altitude_target = _leg_altitude_above_terrain(estimated, target, parameters, memory)
+        altitude_target = _terrain_following_altitude_demand(estimated, target, parameters, memory)
     else:
         altitude_target = _leg_altitude(estimated, target, parameters, memory)
     lag_fraction = dt / (dt + parameters.tecs_height_demand_time)
@@ -216,8 +216,8 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
 
 
 @inner
-def _leg_altitude_above_terrain(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand at the aircraft on a leg that follows the terrain, m AMSL.
+def _terrain_following_altitude_demand(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
+    """Return the altitude demand (m AMSL) at the aircraft's position on a leg that follows the terrain.
 
     The demanded height above ground changes linearly along the leg, from the height above ground of the leg's start
     (`Plane::set_target_altitude_proportion_terrain`).  If the terrain ahead rises faster than half of the maximum climb

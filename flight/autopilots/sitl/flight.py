@@ -276,7 +276,7 @@ class SitlFlight(ProgramFlight):
             if self._release is None:
                 self._fly_to_first_waypoint()
             else:
-                self._begin_at_release(self._release)
+                self._start_free_flight(self._release)
 
     def _push(self, start_fraction: float = 0.0, end_fraction: float = 1.0) -> None:
         """Accelerate the aircraft along the rail, from one fraction of the push time to another."""
@@ -340,8 +340,8 @@ class SitlFlight(ProgramFlight):
         east, north, up = (scale * navigation.second).tolist()
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
-    def _begin_at_release(self, release_state: Release) -> None:
-        """Release the aircraft, with the program's controls, at the end of the launch or at rest on the runway."""
+    def _start_free_flight(self, release_state: Release) -> None:
+        """Start the simulated motion with SITL's controls, at the end of the launch or stationary on the runway."""
         self._set_unit_factors()
         commands = tuple(float(command) for command in self._workspace.commands)
         self._work.commands = release(self.fdm, release_state, (commands[0], commands[1], commands[2], commands[3]))
@@ -360,7 +360,7 @@ class SitlFlight(ProgramFlight):
         )
 
     def _make_loop(self, tick: Tick) -> None:
-        """Continue the flight over the terrain, with a compiled tick that records the track."""
+        """Replace the loop by one that flies over the terrain and records the track with a compiled tick."""
         bound_tick = partial(tick, self._workspace.block, self._ground.heights)
         tick_with_gnss_error = partial(self._tick, bound_tick, bool(self._work.settings.navigation_sigma))
         self._loop = self._lockstep.make_loop(

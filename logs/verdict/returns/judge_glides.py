@@ -152,7 +152,7 @@ class Glides:
     footprint: GlideFootprint | None = field(default=None, repr=False, compare=False)
 
     def count(self, reach: Reach) -> int:
-        """Return the number of starts with this best destination."""
+        """Return the number of glides whose best destination is of this kind."""
         return sum(glide.reach == reach for glide in self.each)
 
     @property

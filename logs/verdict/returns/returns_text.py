@@ -223,7 +223,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 
 
 def describe_landing(returns: Returns) -> list[str]:
-    """Describe in lines how a return ends with this RTL_AUTOLAND and the mission's landing sequences.
+    """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
 
     Return [] for an autopilot other than ArduPlane.
 
@@ -232,29 +232,29 @@ def describe_landing(returns: Returns) -> list[str]:
     """
     if returns.autoland is None:
         return []
-    stays_text = "a return keeps circling at its target"
+    loiter_text = "a return keeps circling at its target"
     items_text = (
         f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(landing.item) for landing in returns.landings)}"
     )
     match returns.autoland, bool(returns.landings):
         case 0, True:
-            text = f"{stays_text}; with this setting and DO_LAND_START in the mission ArduPlane does not arm"
+            text = f"{loiter_text}; with this setting and DO_LAND_START in the mission ArduPlane does not arm"
         case ((1 | 2), False):
-            text = f"the mission has no DO_LAND_START: {stays_text}"
+            text = f"the mission has no DO_LAND_START: {loiter_text}"
         case 1, True:
             text = f"from its loiter a return continues to the landing sequence at {items_text}"
         case 2, True:
             text = f"a return flies straight to the landing sequence at {items_text}"
         case 3, _:
-            text = f"the landing sequence is for go-arounds only: {stays_text}"
+            text = f"the landing sequence is for go-arounds only: {loiter_text}"
         case 4, _:
             text = "a return follows the mission's return path, if it has one"
         case _:
-            text = stays_text
+            text = loiter_text
     assumed_text = " (assumed: with 0 ArduPlane does not arm)" if returns.autoland_assumed else ""
     lines = [f"RTL_AUTOLAND {returns.autoland}{assumed_text}: {text}"]
     if returns.landings:
-        lines.append("within the landing sequence, the loss of transmitter or station changes nothing")
+        lines.append("within the landing sequence, the loss of the RC or GCS link has no effect")
     return lines
 
 

@@ -199,7 +199,7 @@ def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
-    """Return the name of the source of a limit (m) on height above ground."""
+    """Return a label for where a limit (m) on height above ground comes from."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 

@@ -403,7 +403,10 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
         draw_values = direction.numbers.first_draws(max(draws) + 1)[draws]
         terms = make_regressors(np.repeat(speeds, len(draws)), np.tile(draw_values, (speeds.size, 1)))
         best_index = int(
-            np.argmax(sum(posterior.expected_gains(terms) for posterior in posteriors) + _gains_between(fits, terms))
+            np.argmax(
+                sum(posterior.expected_gains(terms) for posterior in posteriors)
+                + _expected_between_fit_reductions(fits, terms)
+            )
         )
         flights.append((float(speeds[best_index // len(draws)]), draws[best_index % len(draws)]))
         for posterior in posteriors:
@@ -411,11 +414,11 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
     return flights
 
 
-def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return by how much each flight is expected to reduce the variance between the fits, (n,).
+def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
+    """Return the reduction of the boundary's variance between the fits that each flight is expected to bring, (n,).
 
-    The outcome of a flight makes one of the fits more likely.  The reduction, (m/s)^2, is the variance of the mean
-    boundary given the outcome.
+    The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction, in
+    (m/s)^2, is the variance over the two outcomes of the mean boundary given the outcome.
 
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """

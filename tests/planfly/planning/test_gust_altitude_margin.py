@@ -81,7 +81,7 @@ def test_who_keeps_it_otherwise_and_calm_air_are_left_as_they_were() -> None:
 
 def needed(airframe: Airframe, climbs: float = 0.0) -> float:
     """Height (m) that downdrafts may take from the Zagi in moderate turbulence while it climbs, by plain sums."""
-    return 12.0 * (2.33 * GUST - (airframe.limits.max_rates(GROUND + 80.0)[0] - climbs))
+    return 12.0 * (2.33 * GUST - (airframe.limits.max_climb_and_sink_rates(GROUND + 80.0)[0] - climbs))
 
 
 @pytest.mark.parametrize("over", [0.5, -0.5])
@@ -134,7 +134,7 @@ def test_near_a_low_end_half_is_kept() -> None:
     assert plan.safe
     assert len(asked) == 1
     # Over the middle, far from the ends, it has all that the searched limits keep.
-    reserve = min(1.2 * GUST, 0.25 * airframe.limits.max_rates(float(first.waypoints[:, 2].max()))[0])
+    reserve = min(1.2 * GUST, 0.25 * airframe.limits.max_climb_and_sink_rates(float(first.waypoints[:, 2].max()))[0])
     assert asked[0].reserve_climb == pytest.approx(reserve, rel=5e-3)
     assert asked[0].reserve_height == pytest.approx(12.0 * (2.33 * GUST - reserve), rel=5e-3)
     middle = np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) - GROUND - 50.0
@@ -144,7 +144,7 @@ def test_near_a_low_end_half_is_kept() -> None:
 @pytest.mark.parametrize("over", [0.5, -0.5])
 def test_an_end_that_lies_too_low_is_named_and_nothing_is_searched_for(over: float) -> None:
     airframe = load_airframe(scenario_of("moderate"))
-    half = 0.5 * 12.0 * (2.33 * GUST - airframe.limits.max_rates(GROUND + 64.0)[0])
+    half = 0.5 * 12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(GROUND + 64.0)[0])
     scenario = scenario_of("moderate", height=50.0 + half + over)
     found = plan_path(scenario, airframe.limits, seed=SEED)
     assert found.safe
@@ -191,7 +191,7 @@ def test_an_aircraft_that_hardly_climbs_is_not_sent_into_gusts(ground: float, en
     }
     scenario = scenario_from_spec(scenario_of("moderate").to_json() | far, "gusts")
     airframe = load_airframe(scenario)
-    assert (airframe.limits.max_rates(ground + 300.0)[0] > 0.6 * GUST) is enough
+    assert (airframe.limits.max_climb_and_sink_rates(ground + 300.0)[0] > 0.6 * GUST) is enough
     plan = make_plan(scenario, airframe, SEED)
     assert plan.safe is enough
     assert any("with less than 0.92 m/s, downdrafts" in one for one in plan.certificate.problems) is not enough
@@ -205,7 +205,7 @@ def test_a_leg_counts_with_the_least_climb_that_it_leaves() -> None:
     (lacks,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
     assert lacks.place == "on leg 0"
     assert lacks.depth == pytest.approx(
-        12.0 * (2.33 * GUST - airframe.limits.max_rates(GROUND + 780.0)[0]) - 29.0, abs=0.3
+        12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(GROUND + 780.0)[0]) - 29.0, abs=0.3
     )
 
 
@@ -220,7 +220,7 @@ def test_a_tailwind_makes_a_climb_faster(from_deg: float, sign: float) -> None:
     plan = plan_along(airframe, scenario, way + np.array([0.0, 0.0, GROUND]))
     # The guidance keeps the true airspeed, and the wind is the same at every height.
     climbs = slope * (airframe.airspeed + sign * 5.0)
-    left = min(airframe.limits.max_rates(GROUND + up)[0] for up in (80.0, 150.0)) - climbs
+    left = min(airframe.limits.max_climb_and_sink_rates(GROUND + up)[0] for up in (80.0, 150.0)) - climbs
     (lacks,) = find_shortfalls(plan, airframe)
     assert lacks.place == "on leg 1"
     assert lacks.depth == pytest.approx(12.0 * (2.33 * GUST - left) - 30.0, abs=0.5)
@@ -380,7 +380,7 @@ def test_a_level_path_leaves_what_an_updraft_may_give(over: float) -> None:
     airframe = load_airframe(band_of(300.0))
     error = airframe.limits.tracking
     assert error is not None
-    rise = 12.0 * (2.33 * GUST - airframe.limits.max_rates(150.0)[1])
+    rise = 12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(150.0)[1])
     assert rise > 5.0
     scenario = band_of(150.0 + rise + error.up + over)
     plan = plan_along(airframe, scenario, [scenario.start, [4000.0, 0.0, 150.0], scenario.destination])
@@ -396,7 +396,7 @@ def test_a_leg_that_sinks_leaves_less() -> None:
     airframe = load_airframe(scenario)
     way = np.array([[0, 0, 190], [2000, 0, 190], [3500, 0, 80], [8000, 0, 80]], dtype=np.float64)
     sinks = 110.0 / 1500.0 * airframe.limits.performance().airspeed
-    assert airframe.limits.max_rates(190.0)[1] - sinks < 0.6 * GUST
+    assert airframe.limits.max_climb_and_sink_rates(190.0)[1] - sinks < 0.6 * GUST
     (shortfall,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
     assert shortfall.hazard == "above the allowed 230 m above ground"
     assert shortfall.place in {"on leg 0", "on leg 1"}
@@ -412,7 +412,7 @@ def test_a_zone_above_counts() -> None:
     free = {"limits": {"min_clearance_m": 50.0}}
     airframe = load_airframe(band_of(300.0))
     assert airframe.limits.tracking is not None
-    rise = 12.0 * (2.33 * GUST - airframe.limits.max_rates(150.0)[1]) + airframe.limits.tracking.up
+    rise = 12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(150.0)[1]) + airframe.limits.tracking.up
     for above, wrong in ((rise - 1.0, True), (rise + 1.0, False)):
         scenario = band_of(300.0, zones=[over | {"floor_amsl_m": 150.0 + above}], **free)
         plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
@@ -424,7 +424,7 @@ def test_a_search_below_a_maximum_height_leaves_sink_unused(aircraft: str) -> No
     """At most one standard deviation and 0.6 of the sink that there is, but 0.6 standard deviations at least."""
     scenario = band_of(300.0, flight={"aircraft": aircraft, "autopilot": "ardupilot"})
     airframe = load_airframe(scenario)
-    sink = airframe.limits.max_rates(150.0)[1]
+    sink = airframe.limits.max_climb_and_sink_rates(150.0)[1]
     plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     least, share, most = 0.6 * GUST, 0.6 * sink, GUST
     kept = limits_in_gusts(plan, airframe).reserve_sink

@@ -78,7 +78,7 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
     limits, slope = airframe_of_x8.limits, 0.05
     way = np.array([[0.0, 0.0, 150.0], [2000.0, 0.0, 150.0 + 2000.0 * slope], [6000.0, 0.0, 250.0]])
     plan = plan_of(airframe_of_x8, way)
-    climb, sink = limits.max_rates(250.0)
+    climb, sink = limits.max_climb_and_sink_rates(250.0)
     # Speeds are equivalent ones for PX4; the standard atmosphere at 250 m.
     true_airspeed = limits.airspeed / math.sqrt((1.0 - 2.25577e-5 * 250.0) ** 4.2559)
     aside, along = 4.0 * math.cos(math.radians(20.0)), 4.0 * math.sin(math.radians(20.0))

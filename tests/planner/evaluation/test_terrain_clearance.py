@@ -11,7 +11,7 @@ import pytest
 from aircraft.path_limits import Limits, downwind_vector
 from planner.evaluation.corners import LEG, measure_legs
 from planner.evaluation.problem import SlopeBounds, make_problem, required_clearance
-from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags, terrain_excess
+from planner.evaluation.terrain_clearance import HEIGHT_LAG, compute_height_lags, lag_at, terrain_excess
 from tests.planner.tracking_limits import with_tracking_error
 from world.arrays import Floats
 from world.kernels import read_only
@@ -114,7 +114,7 @@ def lags_of(limits: Limits, scenario: Scenario, path: Floats) -> Any:
     data = make_problem(scenario, limits).search
     legs, lags = np.zeros(len(path) - 1, LEG), np.zeros(len(path) - 1, HEIGHT_LAG)
     measure_legs(path, legs)
-    measure_lags(data.tracking, data.aircraft, downwind_vector(data.aircraft), path, legs, lags)
+    compute_height_lags(data.tracking, data.aircraft, downwind_vector(data.aircraft), path, legs, lags)
     return lags
 
 

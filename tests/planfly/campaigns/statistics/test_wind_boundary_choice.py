@@ -11,8 +11,8 @@ from planfly.campaigns.statistics.failure_modes import FailureMode
 from planfly.campaigns.statistics.wind_boundary import (
     Direction,
     FailureFit,
+    _expected_between_fit_reductions,
     _ExpectedPosterior,
-    _gains_between,
     next_flights,
 )
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
@@ -129,7 +129,7 @@ def test_what_tells_between_fits_is_what_their_boundaries_are_apart() -> None:
     def variance(of: np.ndarray) -> float:
         return float(of @ speeds**2 - (of @ speeds) ** 2)
 
-    for row, gain in zip(ROWS, _gains_between(fits, ROWS), strict=True):
+    for row, gain in zip(ROWS, _expected_between_fit_reductions(fits, ROWS), strict=True):
         fails = np.array([norm.cdf(row @ fit.modes[0].mean) for fit in fits])
         expected = variance(weights)
         for chance in (fails, 1.0 - fails):
