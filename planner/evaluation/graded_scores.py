@@ -190,7 +190,6 @@ def score_missiles(
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
         gap_distance = max(flown_corners[i].missile_distance, flown_corners[i + 1].missile_distance)
-        lag = lags[i]
         exposure, at_beginning, at_end = kill_density(
             missiles,
             margin,
@@ -203,8 +202,8 @@ def score_missiles(
             z2,
             extents[i],
             extents[i + 1],
-            lag.max_below,
-            -lag.min_below,
+            lags[i].max_below,
+            -lags[i].min_below,
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
         kill_sum += exposure * legs[i].length
@@ -227,9 +226,7 @@ def score_missiles(
             vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown_corners[i].radius)
             below, above, extra_height, missile_margin = 0.0, 0.0, 0.0, margin
         if is_near_ground:
-            violations.terrain += _turn_clearance_deficit(
-                heights, slope_bounds, to_pixel, required, extra_height, vertices
-            )
+            violations.terrain += _clearance_deficit(heights, slope_bounds, to_pixel, required, extra_height, vertices)
         if is_near_missile:
             kill_sum += _corner_exposure(missiles, missile_margin, vertices, below, above)
     objectives.kill_exposure = kill_sum * POINTS_PER_LEG * (count - 1) / length
@@ -342,7 +339,7 @@ def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) 
 
 
 @inner
-def _turn_clearance_deficit(
+def _clearance_deficit(
     heights: Heights,
     slope_bounds: SlopeBounds,
     to_pixel: PolyMapRecord,
