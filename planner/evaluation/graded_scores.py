@@ -184,8 +184,7 @@ def score_missiles(
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown_corners, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
-    count, has_error = path.shape[0], data.tracking.has_error
-    length, kill_sum = 0.0, 0.0
+    count, length, kill_sum = path.shape[0], 0.0, 0.0
     for i in range(count - 1):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
@@ -218,7 +217,7 @@ def score_missiles(
         )
         if vertical_drop + lateral_offset < 0.01 or not (is_near_ground or is_near_missile):
             continue
-        if has_error:
+        if data.tracking.has_error:
             vertices = leg_parts_at_corner(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
             below, above = _max_lag_near(lags[i], legs[i], corners[i])
             extra_height, missile_margin = below + slope_bounds.steepest * lateral_offset, margin + lateral_offset
