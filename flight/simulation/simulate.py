@@ -250,14 +250,15 @@ class TrackBuilder:
         return Track(**self._columns)
 
     def _store_pending_rows(self) -> None:
-        rows = join_rows(self._pending_rows)
+        for name, column in self._columns.items():
+            row_count = len(column)
+            # Enlarge the array in place: a copy of a long flight takes as much memory again.
+            column.resize((row_count + self._pending_row_count, *column.shape[1:]), refcheck=False)
+            for rows in self._pending_rows:
+                column[row_count : row_count + len(rows)] = rows[name]
+                row_count += len(rows)
         self._pending_rows.clear()
         self._pending_row_count = 0
-        for name, column in self._columns.items():
-            stored_count = len(column)
-            # Enlarge the array in place: a copy of a long flight takes as much memory again.
-            column.resize((stored_count + len(rows), *column.shape[1:]), refcheck=False)
-            column[stored_count:] = rows[name]
 
 
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.

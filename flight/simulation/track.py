@@ -187,7 +187,8 @@ def join_tracks(parts: list[Track]) -> Track:
 
 # Empty array of rows, the result of joining no parts.
 _NO_ROWS = np.zeros(0, TRACK_ROW)
-# Reciprocal resolution of each column but the time.
+# Reciprocal resolution of each column but the time.  It is a power of two, so that products with it and with its
+# reciprocal are exact.
 _STEPS_PER_UNIT = np.exp2(
     [DIGITS.get(name, 0) for name, width in COLUMNS.items() if name != "time" for _ in range(width)]
 )
@@ -215,10 +216,11 @@ def _round_to_steps(values: Floats, steps: Floats) -> None:
     values: (t, n).
     steps: number of steps per unit for each column, (n,).
     """
+    units = 1.0 / steps
     for row in range(values.shape[0]):
         for k in range(steps.size):
             # Adding 0.0 removes a negative zero.
-            values[row, k] = np.rint(values[row, k] * steps[k]) / steps[k] + 0.0
+            values[row, k] = np.rint(values[row, k] * steps[k]) * units[k] + 0.0
 
 
 def join_rows(parts: Sequence[Rows]) -> Rows:

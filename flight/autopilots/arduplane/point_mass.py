@@ -70,8 +70,7 @@ def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, win
 
     Beyond the grid of trims, the values at the grid's edge apply.
     """
-    speeds, trims, alpha, lift = _load_trim_tables(aircraft)
-    excess = fill_excess_power(trims)
+    speeds, excess, alpha, lift, glides = _load_trim_tables(aircraft)
     has_power = bool(envelope.power_level.size)
     power = np.full((3, len(speeds), len(_ALTITUDES_M)), np.nan)
     if has_power:
@@ -84,7 +83,7 @@ def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, win
     record.induced = _induced_drag_factor(speeds, excess[0, :, 0])
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
     record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
-    return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
+    return PointMass(record, excess.copy(), power, glides)
 
 
 # Version of the cached tables: increase it with any change of `_compute_trim_tables`.
@@ -92,12 +91,12 @@ _CACHE_VERSION = 2
 
 
 @functools.lru_cache(maxsize=8)
-def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
-    """Return airspeeds, specific excess power and two coefficients of the angle of attack, from trims or their cache.
+def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float, bool]:
+    """Return airspeeds, excess power, two coefficients of the angle of attack, and True if the aircraft can glide.
 
-    The airspeeds (v,) and the excess power (t, v, h) are in m/s; the excess power is NaN where no trim exists.  The
-    angle of attack is the first coefficient (rad) plus the second one (rad m^2/s^2) divided by the square of airspeed.
-    Trims are cached in the user's cache folder, like the envelope.
+    The airspeeds (v,) and the specific excess power (t, v, h) are in m/s.  The angle of attack is the first coefficient
+    (rad) plus the second one (rad m^2/s^2) divided by the square of airspeed.  The aircraft can glide if there is a
+    trim with closed throttle.  Trims are cached in the user's cache folder, like the envelope.
     """
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _AIRSPEED_COUNT)
     version = model_hash(aircraft)
@@ -112,7 +111,8 @@ def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]
     _fill_gaps(alphas)
     terms = np.stack([np.ones(_AIRSPEED_COUNT), speeds**-2.0], axis=1)
     alpha, lift = least_squares(terms, np.nan_to_num(alphas))
-    return speeds, tables["excess"], float(alpha), float(lift)
+    trims = tables["excess"]
+    return speeds, fill_excess_power(trims), float(alpha), float(lift), bool(np.isfinite(trims[0]).any())
 
 
 def _compute_trim_tables(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:

@@ -245,13 +245,12 @@ def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats
     position: positions of the track, m, (n, 3).
     target: position, m, (2,) or (3,).
     """
-    start = position[:-1, :2]
-    step = position[1:, :2] - start
-    offsets = target[:2] - start
-    length_square = np.maximum((step * step).sum(axis=1), 1e-12)
-    fraction = np.clip((step * offsets).sum(axis=1) / length_square, 0.0, 1.0)
-    closest_offsets = offsets - fraction[:, None] * step
-    return np.hypot(closest_offsets[:, 0], closest_offsets[:, 1]), fraction
+    # Column by column: sums over rows of two numbers take three times as long.
+    step_east, step_north = np.diff(position[:, 0]), np.diff(position[:, 1])
+    east, north = target[0] - position[:-1, 0], target[1] - position[:-1, 1]
+    length_square = np.maximum(step_east * step_east + step_north * step_north, 1e-12)
+    fraction = np.clip((step_east * east + step_north * north) / length_square, 0.0, 1.0)
+    return np.hypot(east - fraction * step_east, north - fraction * step_north), fraction
 
 
 def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
