@@ -189,7 +189,7 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
         f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power that flight takes",
     ]
     if uncertainty.climb_guessed:
-        lines.append("climb_guessed = true  # --climb states it")
+        lines.append("climb_guessed = true  # state the true value with --climb")
     if uncertainty.battery_guessed:
         lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
     for quantity in uncertainty.quantities:

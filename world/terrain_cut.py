@@ -307,7 +307,9 @@ def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _
     ):
         lat, lon = degree
         allowed = f"expected latitude {lat}..{lat + 1}, longitude {lon}..{lon + 1}"
-        raise TerrainError(f"{tile.name}: covers another area: {allowed}", file=tile.name, allowed=allowed)
+        raise TerrainError(
+            f"{tile.name}: does not cover the area of its name: {allowed}", file=tile.name, allowed=allowed
+        )
     turn_count = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
     return _PlacedTile(tile, west + 360.0 * turn_count, north, dx, -dy)
 

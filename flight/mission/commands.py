@@ -334,7 +334,7 @@ SUPPORT: dict[Command, Support] = {
     C.DO_ENGINE_CONTROL: Support(_OPEN, _REFUSED, "starts or stops the engine"),
     C.OBLIQUE_SURVEY: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
     # PX4 1.16 refuses it.
-    C.COMPONENT_ARM_DISARM: Support(_REFUSED, _OPEN, "may stop the motor; PX4 accepts it from 1.17 on"),
+    C.COMPONENT_ARM_DISARM: Support(_REFUSED, _OPEN, "can stop the motor; PX4 accepts this command from v1.17 on"),
     C.SET_CAMERA_MODE: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
     # `parse_mavlink_mission_item` has no case for it.
     C.SET_CAMERA_ZOOM: Support(_NO_EFFECT, _REFUSED, CAMERA_REASON),

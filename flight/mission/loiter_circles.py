@@ -283,7 +283,9 @@ def _signed_radius(
         radius = default_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
     elif radius < MIN_LOITER_RADIUS_M:
-        notes.add(f"loiter radius below {MIN_LOITER_RADIUS_M:.0f} m: flown with {MIN_LOITER_RADIUS_M:.0f} m", stop.item)
+        notes.add(
+            f"loiter radius below {MIN_LOITER_RADIUS_M:.0f} m: simulated with {MIN_LOITER_RADIUS_M:.0f} m", stop.item
+        )
         radius = MIN_LOITER_RADIUS_M
     elif round(radius * radius_scale) != round(stated_radius):
         notes.add(

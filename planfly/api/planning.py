@@ -99,7 +99,9 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
     """
     for name, value in options.items():
         if name in _SEARCH_OPTIONS and value is not None:
-            raise ArgumentError.of_argument(name, value, "not with waypoints, which are not searched")
+            raise ArgumentError.of_argument(
+                name, value, "cannot be combined with waypoints, because nothing is then searched"
+            )
     expected = "expected an array (w, 3) of at least 2 rows: east, north and altitude AMSL, m"
     try:
         path = np.array(waypoints, dtype=np.float64)

@@ -220,7 +220,9 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
         message = f"{motion.source}: {aircraft.name} was identified from the whole log: {allowed}"
         raise LogError(message, file=motion.source, field="aircraft", value=aircraft.name, allowed=allowed)
     if start is not None and start < used:
-        allowed = f"expected at least {used:g} s: {aircraft.name} was identified from the rows before"
+        allowed = (
+            f"expected at least {used:g} s: the rows before were used to identify {aircraft.name}, and test nothing"
+        )
         raise PlanflyError.of_argument("start", start, allowed)
     return used if start is None else start
 

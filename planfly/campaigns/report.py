@@ -164,7 +164,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
         bars = [
             Bar(QUANTITY_BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities
         ]
-        figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the deciding margin depends on"))
+        figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the smallest margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
         figures.append((failures, "Number of flights that failed each rule, by place"))

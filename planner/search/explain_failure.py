@@ -296,9 +296,9 @@ def _describe_walls(scenario: Scenario) -> list[str]:
         gaps = scenario.ceiling - min_altitudes
         if not (gaps > 0.0).any():
             lines.append(
-                f"terrain blocks every route {distance:.0f} m from the start, across the whole map: its lowest"
-                " point and "
-                f"the clearance require {np.nanmin(min_altitudes):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
+                f"{distance:.0f} m from the start, terrain blocks the whole width of the map: over its lowest point"
+                f" there the clearance requires {np.nanmin(min_altitudes):.0f} m AMSL, and the ceiling is"
+                f" {scenario.ceiling:.0f} m"
             )
             break
         if not _has_gap(scenario, points[gaps > 0.0], min_altitudes[gaps > 0.0]):
@@ -338,10 +338,9 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
         min_altitude = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
         if min_altitude + margin > ceiling:
             return [
-                f"too little height is left {distance:.0f} m from the start, across the whole map: its lowest"
-                " point, the"
-                f" clearance and a margin of {margin:.1f} m require {min_altitude + margin:.0f} m, {name} allows"
-                f" {ceiling:.0f} m"
+                f"{distance:.0f} m from the start, too little height is left over the whole width of the map: over the"
+                f" lowest ground there, the clearance and a margin of {margin:.1f} m require"
+                f" {min_altitude + margin:.0f} m AMSL, and {name} allows {ceiling:.0f} m"
             ]
     return []
 

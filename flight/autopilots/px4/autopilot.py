@@ -91,12 +91,12 @@ _NEUTRAL = {
 }
 # Part of an RTL that is not simulated, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
-    2: "RTL_TYPE 2, a return along the mission to its landing or back, is flown as 1, to the nearest rally "
-    "point or home",
-    3: "RTL_TYPE 3, a return to the nearest of home, rally points and the mission's landing, is flown as 0, to "
-    "no landing",
-    4: "RTL_TYPE 4, a return along the mission to its landing or back, is flown as 1, to the nearest rally "
-    "point or home",
+    2: "RTL_TYPE 2, a return along the mission to its landing or in reverse to home, is not simulated; RTL_TYPE 1 is "
+    "simulated instead, to the nearest rally point or home",
+    3: "RTL_TYPE 3, a return to the nearest of home, rally points and the mission's landing, is not simulated; "
+    "RTL_TYPE 0 is simulated instead, without the landing",
+    4: "RTL_TYPE 4, a return along the mission to its landing or in reverse to home, is not simulated; RTL_TYPE 1 is "
+    "simulated instead, to the nearest rally point or home",
 }
 
 # Values of RTL_TYPE for an RTL along the mission.

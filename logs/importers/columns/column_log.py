@@ -290,8 +290,8 @@ class ColumnLog:
         """Raise LogError for a clock that is not aligned and has no time in common with the main clock."""
         time, main = self._own_times(name), self._own_times(self._main_clock)
         if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
-            spans = f"{time[0]:.6g} to {time[-1]:.6g} s, and {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
-            allowed = f"runs from {spans}: expected the same clock, `offset_s` or `align`"
+            spans = f"{time[0]:.6g} to {time[-1]:.6g} s, {self._main_clock} from {main[0]:.6g} to {main[-1]:.6g} s"
+            allowed = f"runs from {spans}, without overlap: expected the same clock, `offset_s` or `align`"
             raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
     def _own_times(self, name: str) -> Floats:
@@ -322,7 +322,7 @@ class ColumnLog:
             best = find_clock_shift(time, values[is_known], *partner, align.within_s)
             if best.correlation < _MIN_CORRELATION:
                 message = f"{align.column} and {align.partner} have a correlation of at most {best.correlation:.2f}"
-                requirement = f"expected {_MIN_CORRELATION:g} at a shift within {align.within_s:g} s"
+                requirement = f"expected at least {_MIN_CORRELATION:g} at a shift of at most {align.within_s:g} s"
                 raise LogError(
                     f"{self.table_path}: {field}: {message}; {requirement}", file=self.table_path, field=field
                 )

@@ -265,7 +265,7 @@ class Goal:
     def method(self) -> str:
         """Description of the method of the bounds."""
         if self.stops:
-            return "beta-binomial mixture, valid at every number of flights"
+            return "beta-binomial mixture, valid whenever the flights are stopped"
         if self.changed:
             return (
                 "Clopper-Pearson, one-sided, but the number of flights was changed during the campaign: "

@@ -164,7 +164,10 @@ def _with(points: Any, row: int, column: int, value: float) -> Any:
 
 
 def test_given_waypoints_are_not_searched(path: planfly.Plan) -> None:
-    with pytest.raises(planfly.ArgumentError, match="algorithm fda: not with waypoints, which are not searched"):
+    with pytest.raises(
+        planfly.ArgumentError,
+        match="algorithm fda: cannot be combined with waypoints, because nothing is then searched",
+    ):
         planfly.plan(path.scenario, waypoints=path.waypoints, algorithm="fda")
 
 

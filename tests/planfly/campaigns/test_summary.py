@@ -68,7 +68,7 @@ def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Pat
         assert summary.deciding == "clearance"
         assert summary.sensitivities == ()
         assert "would show what the margin depends on" in campaign_lines(summary)[-1]
-        assert "What the deciding margin depends on" not in campaign_page(base, summary, store, "").decode()
+        assert "What the smallest margin depends on" not in campaign_page(base, summary, store, "").decode()
 
 
 def test_what_ends_a_flight_comes_before_what_it_then_misses() -> None:

@@ -8,7 +8,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.identification.parameters import prior_means
 from planfly.identification.base_numbers import base_model
-from planfly.identification.folder import _check_level_flight
+from planfly.identification.folder import _check_level_flight_at_cruise
 from world.errors import LogError
 
 
@@ -26,9 +26,9 @@ def _identified(cruise: float) -> Any:
 def test_an_aircraft_without_level_flight_is_refused(cruise: float) -> None:
     """At 5 m/s the wing carries no 1.96 kg (a lift coefficient of 4.2), and at 60 m/s no motor holds its drag."""
     with pytest.raises(LogError, match=rf"a\.BIN: .*cannot fly level at {cruise}") as refused:
-        _check_level_flight(_identified(cruise), load_aircraft("ultrastick25e"))
+        _check_level_flight_at_cruise(_identified(cruise), load_aircraft("ultrastick25e"))
     assert "\n" not in str(refused.value)
 
 
 def test_an_aircraft_with_level_flight_passes() -> None:
-    _check_level_flight(_identified(17.0), load_aircraft("ultrastick25e"))
+    _check_level_flight_at_cruise(_identified(17.0), load_aircraft("ultrastick25e"))
