@@ -51,7 +51,7 @@ _MAX_JUMPS_IN_A_ROW_ARDUPLANE = 65
 # passed (`AP_Mission::advance_current_nav_cmd`, `max_loops`).
 _MAX_COMMANDS_IN_A_ROW_ARDUPLANE = 257
 
-# Simulated duration of a loiter without end, s; the mission ends there.
+# Minimum simulated duration of a loiter without end, s; at least one lap is flown, and the mission ends there.
 ENDLESS_LOITER_TIME_S = 60.0
 
 # Note on items after a mission's end.
@@ -69,7 +69,7 @@ class Loiter:
         to the next position.
     timed: True if the item states a time, even 0.
     to_altitude: True if the loiter lasts until the item's altitude is reached.
-    endless: True if the item states a loiter without end, of which ``seconds`` are simulated.
+    endless: True if the item states a loiter without end, of which ``seconds`` and at least one lap are simulated.
     exits_on_course: True if the item states an exit on the course to the next stop. Only PX4 reads it; ArduPlane always
         exits on that course.
     exits_on_tangent: True if the item states that the line to the next stop starts on the circle (PX4) or at the exit
@@ -90,7 +90,8 @@ class Loiter:
 
         In wind a circle over the ground takes longer than its length divided by the airspeed.
         """
-        return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
+        min_turns = 1.0 if self.endless else self.turns
+        return max(2.0 * math.pi * min_turns, self.seconds * airspeed / radius)
 
 
 def arduplane_turns(stated_turns: float) -> float:
@@ -717,7 +718,8 @@ class _ItineraryBuilder:
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.add_open_item(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
-            self.notes.add(f"{name}: flown for {ENDLESS_LOITER_TIME_S:.0f} s; the mission ends there", item.seq)
+            duration_text = f"{ENDLESS_LOITER_TIME_S:.0f} s and at least one lap"
+            self.notes.add(f"{name}: flown for {duration_text}; the mission ends there", item.seq)
             self.has_ended = True
         elif item.command == Command.NAV_LOITER_TURNS and (turns := arduplane_turns(item.params[0])) != item.params[0]:
             self.notes.arduplane.add(

@@ -16,7 +16,7 @@ import numpy as np
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, closest_to_limit
+from logs.verdict.findings import Finding, closest_to_limit, undecided_findings
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
@@ -292,12 +292,14 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
     """Return the rule and the place of each failed finding.
 
-    An incomplete flight without a failed finding fails the rule `completion`.
+    If a flight that does not count as flyable has no failed finding, these are its undecided findings, or else the rule
+    `completion`.
     """
     failed_findings = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     if failed_findings or verdict.flies:
         return failed_findings
-    return (("completion", Place("flight")),)
+    undecided = tuple((finding.rule, finding.place) for finding in undecided_findings(verdict.findings))
+    return undecided or (("completion", Place("flight")),)
 
 
 def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, MinimumMargin], ...]:

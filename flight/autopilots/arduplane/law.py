@@ -418,7 +418,9 @@ def control_as_ardupilot(
         guidance.is_in_rtl = is_last and (
             not target.loiters_to_altitude or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
         )
-        loiters_forever = target.loiter_time == math.inf and memory.loiter_time > ENDLESS_LOITER_TIME_S
+        # A loiter without end is flown for a minute and at least one lap.
+        has_flown_enough = memory.loiter_time > ENDLESS_LOITER_TIME_S and memory.loiter_angle_sum >= 2.0 * math.pi
+        loiters_forever = target.loiter_time == math.inf and has_flown_enough
         guidance.is_finished = is_last and (memory.loiter_complete or loiters_forever)
     if memory.is_in_rtl and waypoints[waypoints.shape[0] - 1].is_rtl:
         update_rtl_loiter(estimated, waypoints[memory.leg + 1], guidance, dt)

@@ -66,7 +66,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 
     The program has set the commands in the block.  Once the program reports that it flies to its last item, the flight
     completes where the aircraft passes the end of the path; an RTL completes in its loiter, a loiter without end after
-    `ENDLESS_LOITER_TIME_S`, and a mission whose last waypoint is circled completes after one lap.
+    `ENDLESS_LOITER_TIME_S` and one lap, and a mission whose last waypoint is circled completes after one lap.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -124,14 +124,15 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
 @inner
 def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: float) -> None:
-    """Update the time on a loiter without end, and finish the flight after `ENDLESS_LOITER_TIME_S`.
+    """Update time and angle on a loiter without end; finish the flight after `ENDLESS_LOITER_TIME_S` and one lap.
 
     The time starts when the aircraft is near the circle, and its speed around the center, in the loiter's direction, is
     higher than its speed towards or away from the center.  Once started, it does not depend on the radius flown.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; `loiter_time` is the time on the loiter, s.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; `loiter_time` is the time on the loiter, s, and
+        `loiter_angle` the angle flown around its center, rad.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
@@ -143,9 +144,10 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
         and tangential_speed > abs(radial_speed)
     ):
         memory.loiter_time += dt
+        memory.loiter_angle += tangential_speed / distance * dt
     # An aircraft that loiters at the mission's end, however wide, has not missed it.
     memory.is_in_rtl = True
-    memory.is_finished = memory.loiter_time > ENDLESS_LOITER_TIME_S
+    memory.is_finished = memory.loiter_time > ENDLESS_LOITER_TIME_S and memory.loiter_angle >= 2.0 * math.pi
 
 
 @inner

@@ -176,7 +176,7 @@ def _loiter_finding(
     """Judge one loiter by its radius and by the findings on its corners, which this finding replaces."""
     corners = slice(circle.first, circle.last + 1)
     is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
-    min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
+    min_radius = _min_radius(requirements, circle) if is_known else math.nan
     corner_findings = [_unjudge_if_unreached_corner(aligned, finding) for finding in corner_findings]
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
@@ -232,6 +232,28 @@ def _loiter_finding(
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
         check=UNKNOWN_PATH if ok is None and hazards_text else "",
+    )
+
+
+def _min_radius(requirements: RouteRequirements, circle: LoiterCircle) -> float:
+    """Return the radius of a loiter at the bank limit, for the courses of its arcs, m.
+
+    A loiter without end meets every course, also if the route follows it for a part of a lap only.
+    """
+    min_radius = float(requirements.min_radius[circle.first : circle.last + 1].max())
+    setup = requirements.setup
+    item = next((item for item in setup.mission.items if item.seq == setup.route.items[circle.first]), None)
+    loiter = None if item is None else stated_loiter(item)
+    if loiter is None or not loiter.endless:
+        return min_radius
+    altitude, airspeed = (
+        float(requirements.points[circle.first, 2]),
+        float(requirements.route.leg_airspeeds[circle.first - 1]),
+    )
+    # Two half laps cover all courses.
+    return max(
+        min_radius,
+        *(setup.limits.turn_radius(course, course + math.pi, altitude, airspeed) for course in (0.0, math.pi)),
     )
 
 

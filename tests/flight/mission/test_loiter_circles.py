@@ -92,8 +92,14 @@ def test_loiters_last_as_long_as_asked() -> None:
     endless = route(wp(0, 0), wp(0, 2000, command=17, p="0 0 -150 0"), wp(3000, 2000))
     assert endless.items[-1] == 2
     assert circled(endless, 2)[0] * TURN * -150.0 == pytest.approx(ENDLESS_LOITER_TIME_S * 25.0)
-    assert any("item 2: NAV_LOITER_UNLIM: flown for 60 s; the mission ends there" in note for note in endless.notes)
+    assert any(
+        "item 2: NAV_LOITER_UNLIM: flown for 60 s and at least one lap; the mission ends" in note
+        for note in endless.notes
+    )
     assert any("item 3: never reached" in note for note in endless.notes)
+    # A minute is 0.6 laps of this circle, and the aircraft meets the wind from every side.
+    wide = route(wp(0, 0), wp(0, 2000, command=17, p="0 0 400 0"))
+    assert circled(wide, 2)[0] == pytest.approx(1.0)
 
 
 def test_loiter_to_altitude_spirals_within_the_envelope() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
-from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, Finding, make_finding
+from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, UNKNOWN_PATH, Finding, make_finding
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase
@@ -214,6 +214,13 @@ def test_a_flight_that_failed_nothing_but_is_not_whole_names_completion() -> Non
     assert list_failed_findings(verdict) == (("completion", Place("flight")),)
     finding = make_finding("turn", Place("waypoint", 1), ok=False, reason="x")
     assert list_failed_findings(replace(verdict, findings=(finding,))) == (("turn", Place("waypoint", 1)),)
+
+
+def test_a_flight_that_is_not_judged_in_full_names_what_is_not_judged() -> None:
+    verdict = Verdict((), flyable=False, complete=True, lines=("x",), level="flown", unjudged="x")
+    item = make_finding("mission", Place("mission", 0, item=3), ok=None, reason="x", check=UNKNOWN_PATH)
+    known = make_finding("slope", Place("leg", 1), ok=None, reason="nothing to judge")
+    assert list_failed_findings(replace(verdict, findings=(known, item))) == (("mission", Place("mission", 0, item=3)),)
 
 
 def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:

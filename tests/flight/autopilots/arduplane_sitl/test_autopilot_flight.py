@@ -128,18 +128,18 @@ def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
 
 
 @pytest.mark.usefixtures("short_run_in")
-def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute(fake_autopilot: MakeFake) -> None:
+def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute_and_a_lap(fake_autopilot: MakeFake) -> None:
     """The program circles on; the flight's clock counts from the circle on, and ends it there."""
-    setup = setup_of(wp(0, 0), wp(0, 1000, command=17, p="0 0 -250 0"))
+    setup = setup_of(wp(0, 0), wp(0, 1000, command=17, p="0 0 -400 0"))
     flown, _ = fly_autopilot(setup, AEROSONDE, arduplane_program(fake_autopilot("none")), {})
     assert flown.ended == "completed"
     away = np.hypot(*(flown.track.position[:, :2] - (0.0, 1000.0)).T)
-    # 750 m to the rim at 25 m/s are 30 s, then a minute, in the circle alone once it has settled.
-    assert 85.0 < flown.track.time[-1] < 105.0
-    assert away[flown.track.time > 45.0] == pytest.approx(250.0, rel=0.15)
+    # 600 m to the rim at 25 m/s are 24 s, then a lap of 100 s, in the circle alone once it has settled.
+    assert 115.0 < flown.track.time[-1] < 140.0
+    assert away[flown.track.time > 45.0] == pytest.approx(400.0, rel=0.15)
     around = np.unwrap(np.arctan2(*(flown.track.position[:, :2] - (0.0, 1000.0)).T))
-    # 60 s at 25 m/s on 250 m are 6 rad, to the left.
-    assert around[-1] - around[0] == pytest.approx(-6.0, abs=1.0)
+    # A lap to the left.
+    assert around[-1] - around[0] == pytest.approx(-2.0 * math.pi, abs=1.0)
 
 
 @pytest.mark.usefixtures("short_run_in")

@@ -6,6 +6,7 @@ At 25 m/s of equivalent airspeed 500 m above the sea it flies 25.6 m/s, by the s
 import functools
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,7 +19,7 @@ from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
 from planfly.workflow.airframe import load_airframe, max_turn_bank
-from planfly.workflow.open_flight import make_setup
+from planfly.workflow.open_flight import make_setup, open_flight
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some
@@ -198,3 +199,16 @@ def test_the_bank_limit_is_the_lesser_of_scenario_and_autopilot() -> None:
     law = setup.autopilot
     assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=20.0)) == math.radians(20.0)
     assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=50.0)) == math.radians(30.0)
+
+
+@pytest.mark.parametrize("from_deg", [0.0, 90.0, 180.0, 270.0])
+def test_a_loiter_without_end_meets_the_wind_from_every_side(tmp_path: Path, from_deg: float) -> None:
+    """Joined from its center, three quarters of a lap are drawn, which from 180 degrees lack the fastest course."""
+    lines = [wp(0, 0, 0), wp(0, 0, 100), wp(4000, 3000, 100), wp(4000, 3000, 100, command=17, p="0 0 250 0")]
+    file = tmp_path / "own.waypoints"
+    file.write_text("\n".join(["QGC WPL 110", *(f"{k} 0 {line} 1" for k, line in enumerate(lines))]), encoding="utf-8")
+    setup = open_flight(file, {"wind": (10.0, from_deg), "autopilot": "ardupilot"})
+    (finding,) = (one for one in judge_geometry(setup).findings if one.rule == "loiter")
+    amsl = setup.route.positions[-1, 2]
+    ground_speed = 25.0 * (1.0 - 0.0065 * amsl / 288.15) ** -2.128 + 10.0
+    assert finding.limit == pytest.approx(ground_speed**2 / (9.80665 * math.tan(setup.limits.max_bank)), rel=0.005)
