@@ -325,6 +325,36 @@ def test_every_place_of_a_drag_is_sent_and_no_stale_or_late_answer_is_shown(page
     assert page.value(program) == [[1, 2, 3], [3]]
 
 
+# A map of two laps over the same items: the first lap fails on its way to item 4, the second one is near a limit.
+LAPS = """Promise.all([import('/map.js'), import('/hands.js')]).then(([{ MapView, cornerStates }, { Hands }]) => {
+  const box = document.createElementNS('http://www.w3.org/2000/svg', 'svg'), said = [];
+  document.createElement('div').append(box);
+  const map = new MapView(box), flat = [0, 0, 9, 1000, 0, 9];
+  const model = {
+    items: [{ k: 3, seq: 3, at: [0, 0, 9] }, { k: 4, seq: 4, at: [1000, 0, 9] }], of: [3, 4, 3, 4],
+    route: [[0, 0, 9], [1000, 0, 9], [0, 0, 9], [1000, 0, 9]], path: [flat, [], flat],
+    states: { legs: [['ok', ''], ['ok', ''], ['ok', '']], corners: [1, 2, 3, 4].map(() => ['ok', '']) },
+    violated: { threats: [], zones: [] } };
+  map.resize(900, 500);
+  map.show(model);
+  map.view.fit([[0, 1000], [-100, 100]]);
+  const legs = [['fail', 'clearance: 29.3 m'], ['ok', ''], ['near', 'clearance 31 m']];
+  const corners = [['ok', ''], ['fail', 'missed'], ['ok', ''], ['near', 'waypoint 4 m']];
+  map.update({ ...model, states: { legs, corners } });
+  const app = { map, model: () => map.model, showPlace() {}, hint: (lines, x, y, state) => said.push(...lines, state) };
+  Object.assign(Object.create(Hands.prototype), { app }).hover(map.view.x(300), map.view.y(0), 'mouse');
+  const drawn = [...map.legs.querySelectorAll('path')].map((one) => one.getAttribute('class'));
+  return [drawn, said, cornerStates(map.model).get(4)];
+})"""
+
+
+def test_the_worst_lap_is_drawn_last_and_named_first(page: Browser) -> None:
+    drawn, said, corner = page.value(LAPS)
+    assert drawn == ["leg ok", "leg near", "leg fail"]
+    assert said == ["leg 0, to item 4", "clearance: 29.3 m", "leg 2, to item 4: clearance 31 m", "fail"]
+    assert corner == ["fail", "missed"]
+
+
 def test_a_drag_ends_where_another_page_changes_the_items(page: Browser, studio: Studio) -> None:
     x, y = centre(page, ".mark .dot", 2)
     drag(page, [x, y], (30.0, 0.0), let_go=False)
