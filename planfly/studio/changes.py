@@ -108,7 +108,7 @@ def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bo
 
 
 def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
-    """Return a key that sorts results from the worst to the best; passes and unjudged results that were not flown are last."""
+    """Return a key that sorts results from the worst to the best; places not reached that do not fail are last."""
     is_last = result.level == _NOT_REACHED and result.ok is not False
     return is_last, _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
 
