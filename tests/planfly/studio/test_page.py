@@ -355,6 +355,44 @@ def test_the_worst_lap_is_drawn_last_and_named_first(page: Browser) -> None:
     assert corner == ["fail", "missed"]
 
 
+# The verdict's panel with findings by geometry and of a flight: titles, and each place with what is offered there.
+FINDINGS = """import('/panel.js').then(({ Panel }) => {
+  const sent = [], raise = { text: 'raise it', apply: true }, verdict = { state: 'fail', answer: 'not flyable',
+    headline: '', lines: [], failed: 1 };
+  const finding = (rule, where, ok, ...suggestions) => (
+    { rule, where, ok, suggestions, number: sent.length + suggestions.length, kind: 'leg', index: null, text: '' });
+  const show = (planned, flown) => {
+    const app = { now: { work: {} }, commit: (one) => sent.push([one.finding, one.flown]) };
+    const box = document.createElement('div');
+    const now = { rev: 1, verdict, notes: [], findings: planned };
+    const flight = { rev: 1, verdict, changes: [], autopilot: '', seconds: 1, findings: flown };
+    Object.assign(Object.create(Panel.prototype), { app, boxes: { verdict: box }, now, flight }).buildVerdict();
+    box.querySelector('.apply')?.click();
+    const parts = box.querySelectorAll(':scope > h2, :scope > .findings > li');
+    return [...parts].map((one) => one.textContent);
+  };
+  const leg = (ok, ...more) => finding('slopes', 'leg 1', ok, ...more);
+  const [other, open] = [finding('clearance', 'leg 2', false), finding('slopes', 'leg 3', null)];
+  return [show([leg(false, raise), other], [leg(false), open]),
+    show([], [leg(null)]), show([leg(null)], [leg(true)]), sent];
+})"""
+
+
+def test_a_place_is_listed_once_under_a_title_of_what_it_is(page: Browser) -> None:
+    both, flown, planned, sent = page.value(FINDINGS)
+    assert both == [
+        "What fails",
+        "clearance leg 2",
+        "What fails or is not judged in flight",
+        "slopes leg 1Applyraise it (by geometry, not flown)",
+        "slopes leg 3",
+    ]
+    assert flown == ["What is not judged in flight", "slopes leg 1"]
+    assert planned[0] == "What is not judged"
+    # The geometry's own finding is applied.
+    assert sent == [[1, False]]
+
+
 def test_a_drag_ends_where_another_page_changes_the_items(page: Browser, studio: Studio) -> None:
     x, y = centre(page, ".mark .dot", 2)
     drag(page, [x, y], (30.0, 0.0), let_go=False)
@@ -397,7 +435,7 @@ def test_a_suggestion_is_applied_by_its_button(page: Browser) -> None:
 def test_a_suggestion_of_the_flight_is_offered_once_it_was_flown_and_applied(page: Browser) -> None:
     page.value("document.getElementById('tab-verdict').click()")
     own = (
-        "[...document.querySelectorAll('#panel-verdict h2')].find((one) => one.textContent === 'What fails in flight')"
+        "[...document.querySelectorAll('#panel-verdict h2')].find((one) => /^What .* in flight$/.test(one.textContent))"
     )
     apply = f"{own}?.nextElementSibling.querySelector('.apply')"
     page.wait_for(f"{apply} && document.getElementById('stop').hidden", 150.0)
