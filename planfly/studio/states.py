@@ -61,7 +61,7 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     zones: set[int] = set()
     open_ids = {id(finding) for finding in undecided_findings(findings)}
     for finding in findings:
-        state = finding_state(finding, unjudged=id(finding) in open_ids)
+        state = finding_state(finding, unjudged=id(finding) in open_ids or _leaves_terrain(finding))
         if state is None:
             continue
         place = finding.place
@@ -76,6 +76,13 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     for leg, state in _missile_states(requirements).items():
         _set_worse_state(legs, (leg + shift,), state)
     return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
+
+
+def _leaves_terrain(finding: Finding) -> bool:
+    """Return True if the height of a leg is unknown because the leg leaves the terrain data."""
+    return (
+        finding.rule == "clearance" and finding.place.kind == "leg" and finding.ok is None and finding.planned is None
+    )
 
 
 def _missile_states(requirements: RouteRequirements) -> dict[int, State]:
@@ -109,7 +116,7 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
 
     Returns None if the finding does not affect the state.
 
-    unjudged: True if the verdict is withheld because of this finding.
+    unjudged: True if the place is not judged because of this finding.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flight.mission.items import MissionItem
@@ -353,6 +354,27 @@ def test_the_worst_lap_is_drawn_last_and_named_first(page: Browser) -> None:
     assert drawn == ["leg ok", "leg near", "leg fail"]
     assert said == ["leg 0, to item 4", "clearance: 29.3 m", "leg 2, to item 4: clearance 31 m", "fail"]
     assert corner == ["fail", "missed"]
+
+
+# A profile whose ground is unknown from 2 to 3 of its 5 samples: the ends of what is drawn of it.
+GROUND = """import('/profile.js').then(({ Profile }) => {
+  const profile = new Profile(document.createElementNS('http://www.w3.org/2000/svg', 'svg'));
+  const states = { legs: [['ok', '']], corners: [['ok', ''], ['ok', '']] };
+  const samples = { x: [0, 100, 200, 300, 400], ground: [500, 510, null, null, 520], cuts: [] };
+  profile.resize(600, 200);
+  profile.show({ route: [[0, 0, 600], [400, 0, 600]], of: [-1, -1], items: [], states, profile: samples },
+    { clearance: 30 }, null, null);
+  const ends = (kind) => [...profile.root.querySelectorAll('.' + kind)].map((one) => {
+    const x = one.getAttribute('d').match(/[-\\d.]+ [-\\d.]+(?=L|Z|$)/g).map((point) => Number(point.split(' ')[0]));
+    return [Math.min(...x), Math.max(...x)]; });
+  return [profile.x(0), profile.x(100), profile.x(400), ends('ground'), ends('clearance'), ends('clearance-line')];
+})"""
+
+
+def test_the_profile_has_a_gap_where_the_ground_is_not_known(page: Browser) -> None:
+    start, before, end, *drawn = page.value(GROUND)
+    for parts in drawn:
+        assert np.ravel(parts) == pytest.approx([start, before, end, end], abs=0.1)
 
 
 # The verdict's panel with findings by geometry and of a flight: titles, and each place with what is offered there.

@@ -66,3 +66,18 @@ def test_a_leg_close_to_a_missile_is_near(beside: float, near: bool) -> None:
     if near:
         distance = float(closest[0].text.split(" m away")[0].split()[-1])
         assert distance == pytest.approx(beside, abs=0.1)
+
+
+def test_a_leg_that_leaves_the_terrain_data_is_not_judged() -> None:
+    scenario, _ = world_of("jacksboro")
+    (west, east), (south, north) = scenario.bounds.tolist()
+    items = []
+    for seq, across in enumerate((0.4, 0.6, 20.0), 1):
+        place = west + across * (east - west), 0.5 * (south + north)
+        lat, lon = (round(float(one), 7) for one in to_geo(scenario.origin, *place))
+        items.append(MissionItem(seq, 16, int(Frame.GLOBAL), (0.0,) * 4, lat, lon, 1500.0))
+    judged = session_of(Mission(drawn_session(5, 12).mission.home, tuple(items), source="far")).judged
+    findings = [one for one in judged.verdict.findings if one.rule == "clearance"]
+    legs = place_states(judged.requirements, findings).legs
+    assert legs[len(judged.setup.route.positions) - 2][::2] == ("open", "clearance: the leg leaves the terrain data")
+    assert legs[0].state != "open"
