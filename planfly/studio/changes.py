@@ -23,6 +23,10 @@ _MAX_STATE_CHANGES = 6
 _MAX_VALUE_CHANGES = 3
 # Sort key of the states.
 _WORST_FIRST = {False: 0, None: 1, True: 2}
+# Levels of results: numbers of the flight, numbers of the plan, and results at a place that the flight did not reach.
+_FLOWN = "flown"
+_PLANNED = "planned"
+_NOT_REACHED = "not reached"
 
 
 class PlaceResult(NamedTuple):
@@ -32,6 +36,8 @@ class PlaceResult(NamedTuple):
     value, margin: value and margin in ``unit``, or None if there are none.
     place: description of the place, with the item numbers of its own mission.
     scale: smallest noticeable difference of the margin.
+    level: "flown" or "planned", according to the value, or "not reached" if the flight ended before the place; only
+        values of the same level are compared.
     """
 
     ok: bool | None
@@ -40,6 +46,7 @@ class PlaceResult(NamedTuple):
     unit: str
     place: str
     scale: float | None = None
+    level: str = _FLOWN
 
     @property
     def text(self) -> str:
@@ -54,7 +61,7 @@ class FlightResults(NamedTuple):
     """Results of a flight, for a comparison with another flight.
 
     items: command, latitude, longitude and altitude of each item of the mission, in order.
-    results: worst result of each rule at each place.
+    results: worst result of each rule at each place, over all laps that were flown.
     seconds: duration of the flight.
     """
 
@@ -64,18 +71,23 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect the worst result of each rule at each place of a flight.
+    """Collect the worst result of each rule at each place of a flight, over all laps that were flown.
 
     seconds: duration of the flight, s.
     """
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
     results: _Results = {}
+    findings = tuple(findings)
+    places_reached = _places_reached(findings)
     for finding in findings:
         key, description = _place_key(finding.place, route.items.tolist(), order)
         value = finding.planned if finding.flown is None else finding.flown
+        level = _PLANNED if finding.flown is None else _FLOWN
+        if places_reached and not _is_reached(finding.place, places_reached):
+            level = _NOT_REACHED
         result = PlaceResult(
-            finding.ok, value, finding.margin, finding.unit, description, RULE_WORDS[finding.rule].scale
+            finding.ok, value, finding.margin, finding.unit, description, RULE_WORDS[finding.rule].scale, level
         )
         previous = results.get((finding.rule, key))
         if previous is None or _severity_key(result) < _severity_key(previous):
@@ -83,9 +95,22 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
     return FlightResults(item_contents, results, seconds)
 
 
-def _severity_key(result: PlaceResult) -> tuple[int, float]:
-    """Return a key that sorts results from the worst to the best."""
-    return _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
+def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
+    """Return the kinds and indices of the places with a flown number; empty if nothing was flown."""
+    return {(finding.place.kind, finding.place.index) for finding in findings if finding.flown is not None}
+
+
+def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bool:
+    """Return False for a leg that was not begun, and for a waypoint to which no leg was begun."""
+    if place.kind not in ("leg", "waypoint") or place.index is None or (place.kind, place.index) in places_reached:
+        return True
+    return place.kind == "waypoint" and ("leg", place.index - 1) in places_reached
+
+
+def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
+    """Return a key that sorts results from the worst to the best; places not reached that do not fail are last."""
+    is_last = result.level == _NOT_REACHED and result.ok is not False
+    return is_last, _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
@@ -147,6 +172,10 @@ def describe_changes(previous: FlightResults | None, current: FlightResults) -> 
     ['leg to item 2: clearance 22 m \u2192 61 m, now passes', '12 s longer']
     >>> describe_changes(high, high), describe_changes(None, high)
     (['nothing'], [])
+    >>> not_reached = PlaceResult(None, 62.0, None, "m", "leg to item 2", level="not reached")
+    >>> ended_before = FlightResults(items, {leg: not_reached}, 500.0)
+    >>> describe_changes(low, ended_before), describe_changes(ended_before, low)
+    (['leg to item 2: clearance 22 m, not flown now'], ['leg to item 2: clearance 22 m, fails now, not flown before'])
     """
     if previous is None:
         return []
@@ -190,10 +219,13 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
     worse, better = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
-        had_failed = old_result is not None and old_result.ok is False
-        if result.ok is False and not had_failed:
-            worse.append(_change_text(rule, result, old_result, "fails now"))
-        elif result.ok is not False and had_failed:
+        old_failure = old_result if old_result is not None and old_result.ok is False else None
+        if result.ok is False and old_failure is None:
+            not_before = old_result is not None and old_result.level == _NOT_REACHED
+            worse.append(_change_text(rule, result, old_result, f"fails now{', not flown before' * not_before}"))
+        elif result.ok is not False and old_failure is not None and result.level == _NOT_REACHED:
+            better.append(_change_text(rule, old_failure._replace(place=result.place), None, "not flown now"))
+        elif result.ok is not False and old_failure is not None:
             better.append(_change_text(rule, result, old_result, "now passes" if result.ok else "is not judged now"))
     current_keys = {key for _, key in new_results}
     for (rule, key), old_result in old_results.items():
@@ -208,9 +240,11 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:
-    """Describe a change at a place: the rule, the old and the new value, and the new state."""
+    """Describe a change at a place: the rule, the old value if it is of the same level, the new value and state."""
     values = dict.fromkeys(
-        shown_result.text for shown_result in (old_result, result) if shown_result is not None and shown_result.text
+        shown_result.text
+        for shown_result in (old_result, result)
+        if shown_result is not None and shown_result.text and shown_result.level == result.level
     )
     values_text = " \u2192 ".join(values)
     return f"{result.place}: {RULE_WORDS[rule].word} {values_text}".rstrip() + f", {state_text}"
@@ -229,13 +263,15 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
     failure_lines = [
         _change_text(rule, result, old_result, "still fails")
         for rule, old_result, result in failures
-        if old_result.text != result.text
+        if old_result.text != result.text and old_result.level == result.level
     ]
     old_closest, new_closest = _closest_results(old_results), _closest_results(new_results)
     change_lines = []
     for rule, result in new_closest.items():
         old_result = old_closest.get(rule)
         if old_result is None or old_result.text == result.text or not old_result.scale:
+            continue
+        if old_result.level != result.level:
             continue
         relative_change = abs((result.margin or 0.0) - (old_result.margin or 0.0)) / old_result.scale
         place_description = (
@@ -254,9 +290,14 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _closest_results(results: _Results) -> dict[str, PlaceResult]:
-    """Return for each rule the result with the smallest margin; rules without a margin are omitted."""
+    """Return for each rule the result with the smallest margin.
+
+    Rules without a margin and places that the flight did not reach are omitted.
+    """
     closest: dict[str, PlaceResult] = {}
     for (rule, _), result in results.items():
-        if result.margin is not None and (rule not in closest or result.margin < (closest[rule].margin or 0.0)):
+        if result.level == _NOT_REACHED or result.margin is None:
+            continue
+        if rule not in closest or result.margin < (closest[rule].margin or 0.0):
             closest[rule] = result
     return closest

@@ -9,12 +9,16 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from logs.verdict.findings import Finding, undecided_findings
+from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.violated_legs import violated_legs
+from logs.verdict.measures.violated_legs import legs_near_missiles, violated_legs
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.wording import quantity_text
 
-# Fraction of the limit that is near the limit, for a rule whose margin has no scale, such as turns.
+# Fraction of the limit within which a value is near the limit, if the margin's scale is not smaller.
 _NEAR_FRACTION = 0.1
+# Distance from a missile's sphere that is near it, if the navigation error is not larger, m.
+_NEAR_SPHERE_M = 10.0
 _SEVERITY_ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
 
 
@@ -22,7 +26,7 @@ class State(NamedTuple):
     """State of a place.
 
     state: "fail", "open", "near" or "ok".
-    closeness: margin as a multiple of a noticeable difference; below 1 is near the limit, below 0 beyond the limit.
+    closeness: margin relative to the largest margin that is near the limit; below 0 beyond the limit.
     text: short text of the finding, shown at the pointer.
     """
 
@@ -48,7 +52,7 @@ class PlaceStates(NamedTuple):
 def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
     """Return the states of legs, corners, threats and zones according to findings.
 
-    A violated threat or zone also fails the legs that enter it.
+    A violated threat or zone also fails the legs that enter it, and legs that pass a missile's sphere closely are near.
     shift: number added to the numbers of legs and corners, for the findings on a part of a route.
     """
     legs: dict[int, State] = {}
@@ -57,7 +61,7 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     zones: set[int] = set()
     open_ids = {id(finding) for finding in undecided_findings(findings)}
     for finding in findings:
-        state = finding_state(finding, unjudged=id(finding) in open_ids)
+        state = finding_state(finding, unjudged=id(finding) in open_ids or _leaves_terrain(finding))
         if state is None:
             continue
         place = finding.place
@@ -69,7 +73,31 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
             _set_worse_state(legs, (leg + shift for leg in violated_legs(requirements, finding)), state)
             if place.index is not None:
                 (threats if place.kind in ("missile", "radar") else zones).add(place.index)
+    for leg, state in _missile_states(requirements).items():
+        _set_worse_state(legs, (leg + shift,), state)
     return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
+
+
+def _leaves_terrain(finding: Finding) -> bool:
+    """Return True if the height of a leg is unknown because the leg leaves the terrain data."""
+    return (
+        finding.rule == "clearance" and finding.place.kind == "leg" and finding.ok is None and finding.planned is None
+    )
+
+
+def _missile_states(requirements: RouteRequirements) -> dict[int, State]:
+    """Return the states of the legs that pass a missile's sphere within `_NEAR_SPHERE_M` or the navigation error."""
+    navigation_error, names = position_error(requirements.setup), requirements.setup.scenario.threats.names
+    max_distance = max(_NEAR_SPHERE_M, navigation_error)
+    error_text = f" (navigation error {quantity_text(navigation_error, 'm')})" if navigation_error > 0.0 else ""
+    return {
+        leg: State(
+            "near",
+            distance / max_distance,
+            f"{RULE_WORDS['threat'].word} {names[number]} {quantity_text(distance, 'm')} away" + error_text,
+        )
+        for leg, (distance, number) in legs_near_missiles(requirements, max_distance).items()
+    }
 
 
 def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
@@ -88,7 +116,7 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
 
     Returns None if the finding does not affect the state.
 
-    unjudged: True if the verdict is withheld because of this finding.
+    unjudged: True if the place is not judged because of this finding.
 
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
@@ -116,13 +144,13 @@ def _rule_name(finding: Finding) -> str:
 
 
 def _closeness(finding: Finding) -> float:
-    """Return the margin of a finding, relative to the margin below which it is shown as near its limit."""
-    scale, margin = RULE_WORDS[finding.rule].scale, finding.margin or 0.0
-    if scale is None:
-        if finding.limit is None or not finding.limit:
-            return math.inf
-        scale = _NEAR_FRACTION * abs(finding.limit)
-    return margin / scale
+    """Return the margin of a finding, relative to the margin below which it is shown as near its limit.
+
+    That margin is a tenth of the limit, and at most the scale of the rule's margin.
+    """
+    scale = RULE_WORDS[finding.rule].scale or math.inf
+    near_margin = min(scale, _NEAR_FRACTION * abs(finding.limit)) if finding.limit else scale
+    return (finding.margin or 0.0) / near_margin if math.isfinite(near_margin) else math.inf
 
 
 def _value_text(finding: Finding) -> str:

@@ -232,11 +232,14 @@ def _state_pair(state: State) -> list[str]:
 
 
 def verdict_json(verdict: Verdict) -> Json:
-    """Return page data of a verdict: state, answer, headline, lines, level and count of failures."""
+    """Return page data of a verdict: state, answer, headline, lines, level and count of failures.
+
+    The answer is that of the headline, as `planfly check` prints it, also for a flight that ended early.
+    """
     presentation = verdict.present()
     return {
         "state": presentation.state,
-        "answer": verdict.answer,
+        "answer": "not flyable" if verdict.state == "fail" else verdict.answer,
         "headline": presentation.headline,
         "lines": list(presentation.details),
         "level": verdict.level,

@@ -1,9 +1,15 @@
-"""Find the legs on which a plan violates a threat, a zone or the area; findings name only the violated object."""
+"""Find the legs on which a plan violates a threat, a zone or the area, or passes a missile's sphere closely.
+
+Findings name only the object.
+"""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding
+from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.tolerances import ROUNDING_M
 from world.arrays import Floats
@@ -33,6 +39,25 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
     return ()
 
 
+def legs_near_missiles(requirements: RouteRequirements, max_distance: float) -> dict[int, tuple[float, int]]:
+    """Return the legs of the planned path that pass a missile's sphere closely.
+
+    Each leg has its distance from the sphere that is nearest, m, negative inside, and the index of that threat.
+
+    max_distance: distance from a sphere within which a leg is returned, m.
+    """
+    path, threats = requirements.path, requirements.setup.scenario.threats
+    radii = threats.kill_radius
+    closest = path_spheres(path.points, path.times, threats.position, radii, threats.kill_scale).closest
+    nearest: dict[int, tuple[float, int]] = {}
+    for number in np.flatnonzero((radii > 0.0) & (closest <= radii + max_distance)).tolist():
+        distances = _segment_distances(path.points, threats.position[number]) - radii[number]
+        for segment in np.flatnonzero(distances <= max_distance).tolist():
+            leg = int(path.legs[segment])
+            nearest[leg] = min(nearest.get(leg, (math.inf, 0)), (float(distances[segment]), number))
+    return nearest
+
+
 def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missile: bool) -> NDArray[np.bool_]:
     """Return a mask (n - 1,): True for each path segment that enters the sphere of a threat.
 
@@ -40,7 +65,15 @@ def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missil
     number: index of the threat.
     """
     radius = float((threats.kill_radius if is_missile else threats.detection_radius)[number])
-    start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
+    return np.asarray(_segment_distances(points, threats.position[number]) <= radius)
+
+
+def _segment_distances(points: Floats, centre: Floats) -> Floats:
+    """Return the distance of each segment of a path from a point, m, (n - 1,).
+
+    points: points of the path, m, (n, 3).
+    """
+    start, step = points[:-1] - centre, np.diff(points, axis=0)
     length_square = (step**2).sum(axis=1)
     fraction = np.clip(
         np.divide(
@@ -50,4 +83,4 @@ def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missil
         1,
     )
     nearest_offset = start + fraction[:, None] * step
-    return np.asarray((nearest_offset**2).sum(axis=1) <= radius**2)
+    return np.asarray(np.sqrt((nearest_offset**2).sum(axis=1)))

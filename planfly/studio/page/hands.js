@@ -4,6 +4,8 @@ import { plain } from "/axes.js";
 import { heightWords, legStates } from "/map.js";
 
 const STEP = 10, FAR = 100, UP = 5;
+// Legs that are named where several lie over one another.
+const MOST_LEGS = 3;
 
 export class Hands {
   // app: model(), link, map, profile, grid(), select(k), hint(lines, x, y), commit(message), begin(k), cancel()
@@ -151,11 +153,10 @@ export class Hands {
     app.map.root.classList.toggle("on-middle", hit?.after !== undefined);
     if (hit?.item !== undefined) return this.words(hit.item, x, y);
     if (hit) return app.hint(["insert a waypoint here"], x, y);
-    const leg = app.map.legAt(x, y);
-    if (leg < 0) return app.hint(null);
-    const [state, text] = model.states.legs[leg];
-    const to = model.items.find((one) => one.k === model.of[leg + 1]);
-    app.hint([to ? `leg ${leg}, to item ${to.seq}` : `leg ${leg}`, text || (state === "ok" ? "passes" : "")], x, y, state);
+    const legs = app.map.legsAt(x, y);
+    if (!legs.length) return app.hint(null);
+    const [[name, text], ...others] = legs.slice(0, MOST_LEGS).map((leg) => legWords(model, leg));
+    app.hint([name, text, ...others.map((words) => words.filter(Boolean).join(": "))], x, y, model.states.legs[legs[0]][0]);
   }
 
   // Numbers beside the pointer: heights, and what of its corner and legs is closest to its limit.
@@ -286,6 +287,12 @@ export class Hands {
     }
     return undefined;
   }
+}
+
+// The name of a leg, and what is closest to its limit there.
+function legWords(model, leg) {
+  const [state, text] = model.states.legs[leg], to = model.items.find((one) => one.k === model.of[leg + 1]);
+  return [to ? `leg ${leg}, to item ${to.seq}` : `leg ${leg}`, text || (state === "ok" ? "passes" : "")];
 }
 
 export const words = plain;

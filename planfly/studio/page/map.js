@@ -7,6 +7,8 @@ const DENSE = 80;
 const CHUNK = 6;
 // Pixels that legend, compass and scale take at the lower edge.
 const TOOLS = 76;
+// Pixels within which a leg is below the pointer, and within which two legs are as near to it.
+const REACH = 9, SAME = 3;
 
 export class MapView {
   constructor(root) {
@@ -23,6 +25,8 @@ export class MapView {
     this.ways = svg("g", { class: "ways" }, this.world);
     this.straight = svg("g", {}, this.world);
     this.legs = svg("g", { class: "legs" }, this.world);
+    // The worst state is drawn last, so that a later lap does not hide a leg that fails in an earlier one.
+    this.layers = Object.fromEntries([...ORDER].reverse().map((state) => [state, svg("g", {}, this.legs)]));
     this.track = svg("path", { class: "track" }, this.world);
     this.names = svg("g", { class: "names", "aria-hidden": "true" }, root);
     this.diamonds = svg("g", { class: "diamonds" }, root);
@@ -88,13 +92,13 @@ export class MapView {
   }
 
   build(model) {
-    clear(this.legs);
+    for (const layer of Object.values(this.layers)) clear(layer);
     clear(this.legsUnder);
     clear(this.markers);
     this.drawn = model.path.map(() => [null, ""]);
     this.marked = model.items.map(() => "");
     this.places = [];
-    this.legParts = model.path.map(() => [svg("path", {}, this.legsUnder), svg("path", {}, this.legs)]);
+    this.legParts = model.path.map(() => [svg("path", {}, this.legsUnder), svg("path", {}, this.layers.ok)]);
     this.marks = model.items.map((item) => {
       const group = svg("g", { class: "mark", tabindex: -1, role: "button", "data-k": item.k }, this.markers);
       svg("circle", { r: 18, class: "hold" }, group);
@@ -109,6 +113,7 @@ export class MapView {
     this.legParts.forEach(([under, over], k) => {
       const flat = model.path[k], parts = [], drawn = this.drawn[k], state = model.states.legs[k][0];
       if (drawn[0] === flat && drawn[1] === state) return;
+      if (over.parentNode !== this.layers[state]) this.layers[state].append(over);
       this.drawn[k] = [flat, state];
       for (let i = 0; i < flat.length; i += 3) parts.push(`${flat[i]} ${flat[i + 1]}`);
       const d = parts.length ? `M${parts.join("L")}` : "";
@@ -301,19 +306,21 @@ export class MapView {
     return middle ? { after: middle.after } : null;
   }
 
-  // The leg nearest to the pointer, within a few pixels.
-  legAt(x, y) {
-    let best = -1, least = 9;
+  // The legs below the pointer, the worst first: those of all laps that are as near as the nearest one.
+  legsAt(x, y) {
+    const found = [], { legs } = this.model.states, rank = (k) => ORDER.indexOf(legs[k][0]);
     this.model.path.forEach((flat, k) => {
+      let least = REACH;
       for (let i = 0; i + 5 < flat.length; i += 3) {
         const ax = this.view.x(flat[i]), ay = this.view.y(flat[i + 1]), bx = this.view.x(flat[i + 3]), by = this.view.y(flat[i + 4]);
         const dx = bx - ax, dy = by - ay, size = dx * dx + dy * dy || 1;
         const t = Math.min(1, Math.max(0, ((x - ax) * dx + (y - ay) * dy) / size));
-        const away = Math.hypot(ax + t * dx - x, ay + t * dy - y);
-        if (away < least) [best, least] = [k, away];
+        least = Math.min(least, Math.hypot(ax + t * dx - x, ay + t * dy - y));
       }
+      if (least < REACH) found.push({ k, away: least });
     });
-    return best;
+    const nearest = Math.min(...found.map((one) => one.away));
+    return found.filter((one) => one.away <= nearest + SAME).map((one) => one.k).sort((a, b) => rank(a) - rank(b));
   }
 
   extentOf(points) {

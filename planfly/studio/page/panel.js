@@ -17,6 +17,12 @@ export function answerText(verdict, stale) {
   return `${verdict.answer}${failed}${stale ? ", changed since" : ""}`;
 }
 
+// The title of a list of findings, by what is in it.
+function titleOf(findings, where) {
+  const words = [[false, "fails"], [null, "is not judged"]].filter(([ok]) => findings.some((one) => one.ok === ok)).map((one) => one[1]);
+  return `What ${words.join(" or ")}${where}`;
+}
+
 export class Panel {
   constructor(app) {
     this.app = app;
@@ -126,17 +132,15 @@ export class Panel {
       if (flight.changes.length) part.append(element("p", {}, element("b", {}, "Since the last flight")), element("ul", { class: "changes" }, ...flight.changes.map((text) => element("li", {}, text))));
       box.append(part);
     }
-    const flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
-    // A place that the flight has judged, too, is listed there, unless only the geometry has a change to offer.
-    const flownToo = (one) => flownFailed.length && flight.findings.find((other) => other.ok !== true && other.rule === one.rule && other.where === one.where);
-    const failed = this.listed(now.findings.filter((one) => {
-      const other = flownToo(one);
-      return !other || (one.suggestions.length && !other.suggestions.length && !this.app.now.work.trials);
-    }), false);
-    if (failed.length) box.append(element("h2", {}, "What fails"), element("ul", { class: "findings" }, ...failed));
+    // A place that the flight has judged, too, is listed only there, with the changes that the geometry offers if it has none.
+    const flownFailed = flight && !stale ? flight.findings.filter((one) => one.ok !== true) : [];
+    const same = (one) => (other) => other.rule === one.rule && other.where === one.where;
+    const failed = now.findings.filter((one) => one.ok !== true && !flownFailed.some(same(one)));
+    if (failed.length) box.append(element("h2", {}, titleOf(failed, "")), element("ul", { class: "findings" }, ...failed.map((one) => this.finding(one, false))));
     if (flownFailed.length) {
-      const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
-      box.append(element("h2", {}, "What fails in flight"), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed));
+      const { trials } = this.app.now.work, planned = (one) => !one.suggestions.length && !trials && now.findings.find((other) => other.ok !== true && same(one)(other));
+      const trying = trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
+      box.append(element("h2", {}, titleOf(flownFailed, " in flight")), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed.map((one) => this.finding(one, true, planned(one)))));
     }
     const passed = now.findings.filter((one) => one.ok);
     if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, false))));
@@ -163,14 +167,11 @@ export class Panel {
       lines.length ? element("details", {}, element("summary", {}, "In full"), ...lines.map((line) => element("p", { class: "line" }, line))) : null);
   }
 
-  listed(findings, flown) {
-    return findings.filter((one) => one.ok !== true).map((one) => this.finding(one, flown));
-  }
-
-  finding(one, flown) {
-    const { rev } = this.now, suggestions = one.suggestions.map((each, which) => element("li", {},
-      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: one.number, which, flown }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
-      element("span", {}, each.text)));
+  // planned: the same finding by geometry, if its changes are offered.
+  finding(one, flown, planned) {
+    const { rev } = this.now, from = planned || one, suggestions = from.suggestions.map((each, which) => element("li", {},
+      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: from.number, which, flown: flown && !planned }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
+      element("span", {}, planned ? `${each.text} (by geometry, not flown)` : each.text)));
     const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
     return element("li", { "data-state": one.ok === false ? "fail" : one.ok === null ? "open" : "ok" },

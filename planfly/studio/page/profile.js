@@ -61,13 +61,14 @@ export class Profile {
   draw() {
     this.at = this.distances();
     this.length = Math.max(1, this.at[this.at.length - 1]);
-    const ground = this.groundLine().filter((p) => Number.isFinite(p[1]));
-    if (!this.held) this.range(ground);
+    const ground = knownParts(this.groundLine());
+    if (!this.held) this.range(ground.flat());
     clear(this.back);
     clear(this.front);
     this.axes();
     this.cuts();
-    this.drawGround(ground);
+    for (const part of ground) this.drawGround(part);
+    this.drawCeiling(ground.length);
     this.way();
     this.drawDots();
   }
@@ -111,15 +112,18 @@ export class Profile {
     }
   }
 
+  // ground: a part of the way below which the ground is known.
   drawGround(ground) {
-    if (!ground.length) return;
     const line = (more) => ground.map((p) => `${this.x(p[0]).toFixed(1)} ${this.y(p[1] + more).toFixed(1)}`);
     const base = this.height - SIDES.bottom, clearance = this.world?.clearance || 0;
     const ends = [this.x(ground[ground.length - 1][0]), this.x(ground[0][0])];
     svg("path", { d: `M${line(clearance).join("L")}L${ends[0]} ${base}L${ends[1]} ${base}Z`, class: "clearance" }, this.back);
     svg("path", { d: `M${line(0).join("L")}L${ends[0]} ${base}L${ends[1]} ${base}Z`, class: "ground" }, this.back);
     svg("path", { d: `M${line(clearance).join("L")}`, class: "clearance-line" }, this.back);
-    if (this.world?.ceiling && this.world.ceiling < this.high) {
+  }
+
+  drawCeiling(shown) {
+    if (shown && this.world?.ceiling && this.world.ceiling < this.high) {
       svg("path", { d: `M${SIDES.left} ${this.y(this.world.ceiling)}H${this.width - SIDES.right}`, class: "ceiling" }, this.back);
       svg("text", { x: this.width - SIDES.right - 4, y: this.y(this.world.ceiling) - 4, "text-anchor": "end", class: "unit" }, this.back).textContent = "ceiling";
     }
@@ -177,4 +181,14 @@ export class Profile {
     }
     return best;
   }
+}
+
+// The parts of a line of [distance, height] whose heights are known.
+function knownParts(line) {
+  const parts = [[]];
+  for (const point of line) {
+    if (Number.isFinite(point[1])) parts[parts.length - 1].push(point);
+    else if (parts[parts.length - 1].length) parts.push([]);
+  }
+  return parts.filter((part) => part.length);
 }

@@ -124,14 +124,15 @@ export class Scene {
       const ground = groundAt(grid, east, north);
       if (!Number.isNaN(ground)) this.line(pen, [[east, north, ground], [east, north, up]]);
     }
-    model.path.forEach((flat, k) => {
+    // In the order of `colours`: the worst state is drawn last.
+    const legs = Object.keys(colours).flatMap((state) => model.path.filter((_, k) => model.states.legs[k][0] === state).map((flat) => [state, flat]));
+    for (const [state, flat] of legs) {
       const points = [];
       for (let i = 0; i < flat.length; i += 3) points.push([flat[i], flat[i + 1], flat[i + 2]]);
-      const state = model.states.legs[k][0];
       pen.strokeStyle = this.colour(colours[state]);
       pen.lineWidth = state === "fail" ? 5 : 4;
       this.line(pen, points);
-    });
+    }
     pen.strokeStyle = this.colour("flown");
     pen.lineWidth = 1.3;
     if (flown?.track?.length) this.line(pen, flown.track);

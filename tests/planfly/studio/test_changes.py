@@ -1,12 +1,18 @@
 """What has changed since the last flight: by legs and items, with figures, over insertions and deletions."""
 
 import re
+from dataclasses import replace
+
+import numpy as np
 
 from flight.mission import edits
+from flight.mission.items import Command, Frame
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.places import Place
 from planfly.studio import messages
 from planfly.studio.changes import FlightResults, describe_changes, flight_results
 from planfly.studio.session import Session
-from tests.planfly.studio.drafts import drawn_session
+from tests.planfly.studio.drafts import drawn_session, session_of
 
 
 def figures_of(session: Session, seconds: float = 100.0) -> FlightResults:
@@ -65,3 +71,41 @@ def test_without_a_failure_the_closest_figures_are_said() -> None:
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
     said = describe_changes(before, figures_of(session))
     assert any(line.startswith("closest to its limit: clearance") for line in said), said
+
+
+def clearance(leg: int, planned: float, flown: float | None = None) -> Finding:
+    ok = None if flown is None else flown >= 30.0
+    margin = None if flown is None else flown - 30.0
+    return make_finding(
+        "clearance", Place("leg", leg), ok=ok, reason="", planned=planned, flown=flown, margin=margin, unit="m"
+    )
+
+
+def approach(waypoint: int, planned: float, flown: float | None = None) -> Finding:
+    """Of a waypoint that counts as reached within 5 m."""
+    ok = None if flown is None else flown <= 5.0
+    return make_finding(
+        "waypoint", Place("waypoint", waypoint), ok=ok, reason="", planned=planned, flown=flown, unit="m"
+    )
+
+
+def test_a_place_is_compared_by_its_flown_laps_and_never_with_one_that_was_not_flown() -> None:
+    """The first flight ends on the hill before item 2, the second one only in the second lap."""
+    drawn = drawn_session(5, 12, jumps=False).mission
+    places = [item for item in drawn.items if item.command == Command.NAV_WAYPOINT][:3]
+    items = [replace(item, seq=k) for k, item in enumerate(places, 1)]
+    jump = replace(items[0], seq=4, command=int(Command.DO_JUMP), frame=int(Frame.MISSION), params=(2.0, 1.0, 0.0, 0.0))
+    mission = replace(drawn, items=(*items, jump))
+    route = session_of(mission).judged.setup.route
+    (first_to_2, second_to_2), last = np.flatnonzero(route.items[1:] == 2).tolist(), route.legs
+    hill = [clearance(first_to_2, 41.0, -0.3), clearance(second_to_2, 41.5)]
+    hill += [approach(first_to_2 + 1, 0.07, 937.0), approach(second_to_2 + 1, 0.07), approach(last, 0.08)]
+    later = [clearance(first_to_2, 41.0, 40.0), clearance(second_to_2, 41.5)]
+    later += [approach(first_to_2 + 1, 0.07, 2.75), approach(second_to_2 + 1, 0.07), approach(last, 0.08, 2200.0)]
+    before, after = (flight_results(mission, route, findings, 100.0) for findings in (hill, later))
+    assert describe_changes(before, after) == [
+        "item 3: waypoint 2200 m, fails now, not flown before",
+        "leg to item 2: clearance -0.3 m \u2192 40 m, now passes",
+        "item 2: waypoint 937 m \u2192 2.75 m, now passes",
+    ]
+    assert describe_changes(after, before)[-1] == "item 3: waypoint 2200 m, not flown now"

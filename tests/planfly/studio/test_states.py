@@ -1,0 +1,83 @@
+"""What is near a limit on the page: little of what the limit allows is left, or little room beside a missile."""
+
+import numpy as np
+import pytest
+
+from flight.mission.items import Frame, Mission, MissionItem
+from logs.verdict.findings import make_finding
+from logs.verdict.places import Place
+from planfly.studio.states import finding_state, place_states
+from tests.planfly.studio.drafts import drawn_session, session_of, world_of
+from world.frames import to_geo
+
+
+@pytest.mark.parametrize(
+    ("rule", "unit", "limit", "value", "state"),
+    [
+        # A waypoint passed at 3 % of the radius of 5.1 m, and at 96 % of it.
+        ("waypoint", "m", 5.1, 0.154, "ok"),
+        ("waypoint", "m", 5.1, 4.9, "near"),
+        # A tenth of 500 m is more than 10 m, so that 12 m are enough; a tenth of 3.2 degrees is less than 1.
+        ("waypoint", "m", 500.0, 488.0, "ok"),
+        ("waypoint", "m", 500.0, 491.0, "near"),
+        ("slope", "deg", 3.2, 2.5, "ok"),
+        ("slope", "deg", 3.2, 3.0, "near"),
+        # A course change has no scale.
+        ("turn", "deg", 90.0, 80.0, "ok"),
+        ("turn", "deg", 90.0, 82.0, "near"),
+    ],
+)
+def test_a_value_is_near_its_limit_within_a_tenth_of_it(
+    rule: str, unit: str, limit: float, value: float, state: str
+) -> None:
+    finding = make_finding(
+        rule, Place("leg", 0), ok=True, reason="", planned=value, limit=limit, margin=limit - value, unit=unit
+    )
+    found = finding_state(finding)
+    assert found is not None
+    assert found.state == state
+
+
+def test_a_limit_of_zero_leaves_the_scale_of_its_rule() -> None:
+    for margin, state in ((8.0, "near"), (12.0, "ok")):
+        finding = make_finding(
+            "bounds", Place("leg", 0), ok=True, reason="", planned=margin, limit=0.0, margin=margin, unit="m"
+        )
+        found = finding_state(finding)
+        assert found is not None
+        assert found.state == state
+
+
+@pytest.mark.parametrize(("beside", "near"), [(2.2, True), (9.0, True), (40.0, False)])
+def test_a_leg_close_to_a_missile_is_near(beside: float, near: bool) -> None:
+    scenario, _ = world_of("jacksboro")
+    threats = scenario.threats
+    m = int(np.flatnonzero(threats.kill_radius > 0.0)[0])
+    centre, east = threats.position[m], float(threats.position[m, 0] + threats.kill_radius[m]) + beside
+    items = []
+    for seq, along in enumerate((-3000.0, 0.0, 3000.0), 1):
+        lat, lon = (round(float(one), 7) for one in to_geo(scenario.origin, east, float(centre[1]) + along))
+        items.append(MissionItem(seq, 16, int(Frame.GLOBAL), (0.0,) * 4, lat, lon, round(float(centre[2]), 3)))
+    judged = session_of(Mission(drawn_session(5, 12).mission.home, tuple(items), source="chord")).judged
+    # Without the findings on the ground, which the chord may enter.
+    states = place_states(judged.requirements, [one for one in judged.verdict.findings if one.rule == "threat"])
+    closest = [state for state in states.legs.values() if f" {threats.names[m]} " in state.text]
+    assert [state.state for state in closest] == ["near"] * (2 * near)
+    if near:
+        distance = float(closest[0].text.split(" m away")[0].split()[-1])
+        assert distance == pytest.approx(beside, abs=0.1)
+
+
+def test_a_leg_that_leaves_the_terrain_data_is_not_judged() -> None:
+    scenario, _ = world_of("jacksboro")
+    (west, east), (south, north) = scenario.bounds.tolist()
+    items = []
+    for seq, across in enumerate((0.4, 0.6, 20.0), 1):
+        place = west + across * (east - west), 0.5 * (south + north)
+        lat, lon = (round(float(one), 7) for one in to_geo(scenario.origin, *place))
+        items.append(MissionItem(seq, 16, int(Frame.GLOBAL), (0.0,) * 4, lat, lon, 1500.0))
+    judged = session_of(Mission(drawn_session(5, 12).mission.home, tuple(items), source="far")).judged
+    findings = [one for one in judged.verdict.findings if one.rule == "clearance"]
+    legs = place_states(judged.requirements, findings).legs
+    assert legs[len(judged.setup.route.positions) - 2][::2] == ("open", "clearance: the leg leaves the terrain data")
+    assert legs[0].state != "open"
