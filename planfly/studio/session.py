@@ -21,7 +21,7 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
-from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, settings_json
+from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, own_aircraft, settings_json
 from planfly.studio.view_model import Json, mission_json, windows_json, world_json
 from planfly.studio.worker_process import INTERNAL
 from planfly.workflow.apply_suggestion import apply_suggestion
@@ -64,6 +64,7 @@ class Session:
     file_mission: the mission as saved last over the document's file.
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
+    aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
     """
 
     document: Document
@@ -83,6 +84,10 @@ class Session:
     document_rev: int = 1
     earlier_states: list[_OpenedState] = field(default_factory=list)
     undone_states: list[_OpenedState] = field(default_factory=list)
+    aircraft_folders: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.aircraft_folders |= own_aircraft(self.context.scenario)
 
     @classmethod
     def from_document(cls, document: Document, options: MissionOptions) -> "Session":
@@ -104,6 +109,7 @@ class Session:
             [],
         )
         self._restore_state((new_session.document, new_session.context, new_session.history))
+        self.aircraft_folders |= new_session.aircraft_folders
 
     def _opened_state(self) -> _OpenedState:
         """Return the document with its context and history, to restore it later."""
@@ -404,7 +410,7 @@ class Session:
 
         Raises PlanflyError for a value that is not allowed in a scenario.
         """
-        scenario = apply_scenario_settings(self.context.scenario, settings)
+        scenario = apply_scenario_settings(self.context.scenario, settings, self.aircraft_folders)
         context = self.context.with_settings(
             scenario, apply_parameter_settings(self.context.parameters, scenario, settings)
         )
@@ -415,7 +421,9 @@ class Session:
 
     def settings_json(self) -> Json:
         """Return the current settings as page data."""
-        return settings_json(self.context.scenario, self.context.airframe, self.context.parameters)
+        return settings_json(
+            self.context.scenario, self.context.airframe, self.context.parameters, self.aircraft_folders
+        )
 
     # ------------------------------------------------------------------
     # Page data, and files.
@@ -520,6 +528,7 @@ class Session:
             self.context, self.judged, self.plans = previous_state
             self.unreadable.append(file)
             return False
+        self.aircraft_folders |= own_aircraft(self.context.scenario)
         if autosave[0] is not self.history.first:
             self._add_to_history(autosave[0], "the edits of the previous session")
         return True
