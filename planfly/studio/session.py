@@ -64,6 +64,7 @@ class Session:
     file_mission: the mission as saved last over the document's file.
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
+    replaced_settings: autosaved settings of this document that were not restored, each as text.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
     """
 
@@ -84,6 +85,7 @@ class Session:
     document_rev: int = 1
     earlier_states: list[_OpenedState] = field(default_factory=list)
     undone_states: list[_OpenedState] = field(default_factory=list)
+    replaced_settings: tuple[str, ...] = ()
     aircraft_folders: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -110,6 +112,7 @@ class Session:
         )
         self._restore_state((new_session.document, new_session.context, new_session.history))
         self.aircraft_folders |= new_session.aircraft_folders
+        self.replaced_settings = ()
 
     def _opened_state(self) -> _OpenedState:
         """Return the document with its context and history, to restore it later."""
@@ -441,9 +444,14 @@ class Session:
             "redo": self.redo_text,
             "over": self.document.kind if self.document.path is not None else "",
             "planned": self.judged.setup.plan is not None,
-            "notes": [*self.mission.warnings, *self.judged.setup.notes],
+            "notes": [*filter(None, [self.replaced_text]), *self.mission.warnings, *self.judged.setup.notes],
             **mission_json(self.context, self.judged),
         }
+
+    @property
+    def replaced_text(self) -> str:
+        """Text on the autosaved settings that were not restored; "" if all were restored."""
+        return f"kept settings replaced: {'; '.join(self.replaced_settings)}" if self.replaced_settings else ""
 
     def world_message(self) -> Json:
         """Return the message with the map, threats, zones and settings."""
@@ -519,19 +527,23 @@ class Session:
         """
         previous_state = self.context, self.judged, self.plans
         try:
-            autosave = read_autosave(file, self.context, self.document)
+            autosave = read_autosave(file, self.context, self.document, self.options)
             if autosave is None:
                 return False
-            self._set_mission(*autosave)
-            json.dumps(self.mission_message(), allow_nan=False)
+            mission, context, replaced_settings = autosave
+            is_edited = mission is not self.history.first
+            if is_edited or context is not self.context:
+                self._set_mission(mission, context)
+                json.dumps(self.mission_message(), allow_nan=False)
         except (*INTERNAL, PlanflyError):
             self.context, self.judged, self.plans = previous_state
             self.unreadable.append(file)
             return False
         self.aircraft_folders |= own_aircraft(self.context.scenario)
-        if autosave[0] is not self.history.first:
-            self._add_to_history(autosave[0], "the edits of the previous session")
-        return True
+        self.replaced_settings = replaced_settings
+        if is_edited:
+            self._add_to_history(mission, "the edits of the previous session")
+        return is_edited or context is not previous_state[0]
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:

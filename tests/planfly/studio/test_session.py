@@ -18,6 +18,7 @@ from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, open_session
 from planfly.workflow.suggestion_trials import with_tried_suggestions
+from tests.own_aircraft import copy_aerosonde
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
@@ -271,6 +272,40 @@ def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
     assert again.restore(kept)
     assert again.mission.items == session.mission.items
     assert again.context.scenario.wind.speed != 9.0
+
+
+def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(tmp_path: Path) -> None:
+    file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    world = MissionOptions(scenario="jacksboro-air")
+    session, _ = open_session(str(file), world, kept)
+    asked = {"wind_speed": 9.0, "wind_from": 90.0, "turbulence": "light", "airspeed": 26.0, "parameter": "WP_RADIUS=55"}
+    session.change_settings(messages.Settings.model_validate({"kind": "settings", **asked}))
+    session.autosave(kept)
+    windy, restored = open_session(str(file), world | MissionOptions(wind=(3.0, 90.0), turbulence="none"), kept)
+    shown = windy.settings_json()
+    assert restored
+    assert (shown["wind_speed"], shown["wind_from"], shown["turbulence"]) == (3.0, 90.0, "none")
+    # What no option sets is kept.
+    assert (shown["airspeed"], shown["parameters"]) == (26.0, {"WP_RADIUS": 55.0})
+    said = "kept settings replaced: wind 9 \u2192 3; turbulence light \u2192 none"
+    assert said in windy.mission_message()["notes"]
+    # Another aircraft has another airspeed, another file of parameters replaces those that were set.
+    (tmp_path / "mine.parm").write_text("WP_RADIUS 70\n", encoding="utf-8")
+    copy_aerosonde(tmp_path)
+    named = MissionOptions(aircraft=tmp_path / "own", params=tmp_path / "mine.parm")
+    other, _ = open_session(str(file), world | named, kept)
+    assert other.settings_json()["aircraft"] == "own"
+    assert other.settings_json()["parameters"] == {}
+    assert other.context.airframe.autopilot.stated_value("WP_RADIUS") == 70.0
+    for part in ("aircraft aerosonde \u2192 own", "airspeed 26 \u2192 25", "parameter WP_RADIUS 55"):
+        assert part in other.replaced_text
+    assert other.settings_json()["wind_speed"] == 9.0
+    # The settings of one scenario are not those of another.
+    third, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
+    assert not restored
+    assert third.replaced_text == "kept settings replaced: all of them, which belong to jacksboro-air"
+    assert not open_session(str(file), world, kept)[0].replaced_text
 
 
 # Changes of a kept session: whole texts, and values of keys.
