@@ -24,7 +24,7 @@ from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, R
 from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, own_aircraft, settings_json
 from planfly.studio.view_model import Json, mission_json, windows_json, world_json
 from planfly.studio.worker_process import INTERNAL
-from planfly.workflow.apply_suggestion import apply_suggestion
+from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.suggestion_trials import SuggestionTrials
 from planner.plan import Plan
@@ -350,17 +350,23 @@ class Session:
         finding = findings[message.finding]
         if not message.which < len(finding.suggestions):
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        trial = SuggestionTrials(self.context, self.judged).try_suggestion(finding, message.which)
+        trials = SuggestionTrials(self.context, self.judged)
+        trial = trials.try_suggestion(finding, message.which)
         if trial is None:
             # A suggestion that moves no item has a reason of its own.
             apply_suggestion(self.context, self.judged, finding, finding.suggestions[message.which])
-            raise MissionError(
-                f"{self.document.name}: this suggestion would not remove its finding, or would add findings",
-                field="suggestion",
-            )
-        mission = replace(trial.setup.mission, autopilot=self.mission.autopilot)
-        moves = [move for change in trial.suggestion for move in change.moves]
-        return mission, f"apply a suggestion of {finding.rule}" + (f": move {moves_text(moves)}" if moves else "")
+            reason = trials.explain_refusal(finding, message.which)
+            raise MissionError(f"{self.document.name}: {reason}", field="suggestion")
+        return self._suggested_edit(trial.setup.mission, finding.rule)
+
+    def _suggested_edit(self, mission: Mission, source: str) -> tuple[Mission, str]:
+        """Return a mission with a suggestion applied, and a description of the edit with the moves of the items.
+
+        source: where the suggestion comes from.
+        """
+        moves = item_moves(self.context, self.mission, mission)
+        text = f"apply a suggestion of {source}" + (f": move {moves_text(moves)}" if moves else "")
+        return replace(mission, autopilot=self.mission.autopilot), text
 
     def _mission_with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission as flown in the trial of a suggestion, and a description of the edit.
@@ -371,7 +377,7 @@ class Session:
         flown_mission = missions.get((message.finding, message.which)) if rev == self.rev else None
         if flown_mission is None:
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        return replace(flown_mission, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
+        return self._suggested_edit(flown_mission, "the flight")
 
     def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
         """Return the mission with a planned path in place of the items between two items.

@@ -17,6 +17,7 @@ from planfly.studio import messages
 from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, open_session
+from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.suggestion_trials import with_tried_suggestions
 from tests.own_aircraft import copy_aerosonde
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
@@ -360,6 +361,34 @@ def test_a_suggestion_applied_mends_its_finding(rule: str, by: float, seed: int,
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
     after = [one for one in session.judged.verdict.findings if (one.rule, one.place) == (item.rule, item.place)]
     assert not [one for one in after if one.ok is False]
+
+
+@pytest.mark.parametrize(
+    ("seed", "by", "rule", "said"),
+    [
+        (4, 0.0, "threat", "would not remove its finding: east valley (missile): threat: inside the missile's range"),
+        (6, 30.0, "bounds", "would add a finding: leg 1, to item 3: clearance: .* 60 m are required"),
+    ],
+)
+def test_a_refused_suggestion_names_the_finding_that_stays_or_is_added(
+    seed: int, by: float, rule: str, said: str
+) -> None:
+    session = drawn_session(seed, 12)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+    findings = session.judged.verdict.findings
+    number = next(n for n, one in enumerate(findings) if one.rule == rule and one.suggestions)
+    with pytest.raises(MissionError, match=said.replace("(", "[(]").replace(")", "[)]")) as refused:
+        session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
+    if by:
+        # The suggestion made by hand: its finding is gone, and leg 1 is too low, which it was not.
+        item = findings[number]
+        mission = apply_suggestion(session.context, session.judged, item, item.suggestions[0])
+        after = session.context.judge(mission).verdict.failed
+        assert (item.rule, item.place) not in [(one.rule, one.place) for one in after]
+        low = [one.place.to_item for one in after if one.rule == "clearance"]
+        assert 3 in low
+        assert 3 not in [one.place.to_item for one in session.judged.verdict.failed if one.rule == "clearance"]
+    assert "or would" not in str(refused.value)
 
 
 def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
