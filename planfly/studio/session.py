@@ -12,11 +12,11 @@ import numpy as np
 
 from flight.mission import edits
 from flight.mission.items import LANDINGS, Mission
-from logs.verdict.wording import moves_text
+from logs.verdict.wording import count_text, moves_text
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
-from planfly.studio.documents import Document, SavedFile, open_document, planned_mission, save_document
+from planfly.studio.documents import KINDS, Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
@@ -60,7 +60,7 @@ class Session:
     unreadable: autosave files that cannot be read.
     document_rev: number that increases with every opened document.
     named_file: file named on the command line, the only file that may be overwritten.
-    saved_mission: the mission as saved last.
+    saved_mission: the mission as saved last over the document's file; without such a file, as downloaded last.
     file_mission: the mission as saved last over the document's file.
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
@@ -154,6 +154,11 @@ class Session:
     def is_changed(self) -> bool:
         """True if the mission differs from the opened mission."""
         return self.mission is not self.history.first
+
+    @property
+    def file_kind(self) -> str:
+        """Format of the file that the mission may overwrite; "" if there is none."""
+        return self.document.kind if self.document.path is not None else ""
 
     @property
     def is_unsaved(self) -> bool:
@@ -271,9 +276,7 @@ class Session:
             case Raise():
                 indices = self._indices_to_raise(message.ks)
                 mission = edits.raise_items(self.mission, indices, message.by)
-                items_text = (
-                    "all items" if message.ks is None else f"{len(indices)} item{'s' if len(indices) != 1 else ''}"
-                )
+                items_text = "all items" if message.ks is None else count_text(len(indices), "item")
                 return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
             case Apply():
                 return self._mission_with_suggestion(message)
@@ -335,7 +338,7 @@ class Session:
             place_indices = edits.movable_indices(mission)
             nearest_index = min(place_indices, key=lambda place_index: abs(place_index - index))
             mission = self.context.with_updated_radii(mission, nearest_index)
-        return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
+        return mission, f"delete {count_text(len(set(indices)), 'item')}"
 
     def _mission_with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission changed by a suggestion, and a description of the edit.
@@ -448,7 +451,7 @@ class Session:
             "unsaved": self.is_unsaved,
             "undo": self.undo_text,
             "redo": self.redo_text,
-            "over": self.document.kind if self.document.path is not None else "",
+            "over": self.file_kind,
             "planned": self.judged.setup.plan is not None,
             "notes": [*filter(None, [self.replaced_text]), *self.mission.warnings, *self.judged.setup.notes],
             **mission_json(self.context, self.judged),
@@ -469,9 +472,12 @@ class Session:
         }
 
     def save(self, form: str) -> SavedFile:
-        """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it."""
+        """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
+
+        The mission counts as saved if there is no file that has to be overwritten for that.
+        """
         saved_file = save_document(self.document, self.context, self.judged, form)
-        if form != "kml":
+        if form in KINDS and form != "kml" and not self.file_kind:
             self.saved_mission = self.mission
         return saved_file
 
@@ -481,13 +487,14 @@ class Session:
         Raises PlanflyError if the studio was started without one, or if another program has changed it.
         """
         path = self.document.path
-        if path is None or not self.document.kind:
+        if path is None or not self.file_kind:
             raise PlanflyError("the studio was started without a mission file: save as a new file", field="over")
         if path.exists() and path.read_bytes() != self.document.on_disk:
             message = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(message, file=path)
-        saved_file = self.save(self.document.kind)
+        saved_file = self.save(self.file_kind)
         write_atomically(path, saved_file.data)
+        self.saved_mission = self.mission
         self.document = replace(self.document, on_disk=saved_file.data)
         # The next autosave knows the new file.
         self.file_mission, self.autosaved_rev = self.mission, 0

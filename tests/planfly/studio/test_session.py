@@ -1,6 +1,7 @@
 """A session: what is done to a mission and undone, judged as the API judges it, saved without loss, and kept."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 import planfly
 from flight.mission import edits
-from flight.mission.items import Frame, Mission, MissionItem
+from flight.mission.items import Command, Frame, Mission, MissionItem, renumber_items
 from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
@@ -19,7 +20,7 @@ from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, open_session
 from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.suggestion_trials import with_tried_suggestions
-from tests.own_aircraft import copy_aerosonde
+from tests.own_aircraft import copy_aerosonde, write_mission, write_scenario
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
@@ -148,6 +149,52 @@ def test_what_a_form_does_not_hold_is_said() -> None:
     assert "only a map" in session.save("kml").losses[0]
     with pytest.raises(MissionError, match="plain waypoints"):
         session.save("plan.json")
+
+
+def test_what_one_threat_and_a_map_lack_is_said_in_the_singular(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_scenario('[[threats]]\nname = "col"\neast_m = 3000\nnorth_m = 3000\nkill_radius_m = 100\nkill_scale_m = 50\n')
+    write_mission(1000.0, 1000.0, 1000.0)
+    session, _ = open_session("m.waypoints", MissionOptions(scenario="s.toml"))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    losses = session.save("waypoints").losses
+    assert losses == ("the scenario's 1 threat: planfly export writes a fence of them",)
+    assert session.save("kml").losses == ("the commands, speeds and frames of the items: it is only a map",)
+
+
+def test_a_download_leaves_the_file_unsaved(tmp_path: Path) -> None:
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.save("waypoints")
+    session.save("plan")
+    assert session.is_unsaved
+    session.overwrite_file()
+    assert not session.is_unsaved
+    # Without a file of its own, a mission is saved by its download.
+    other = drawn_session(8, 10)
+    other.edit(messages.Raise(kind="raise", rev=other.rev, by=10.0))
+    other.change_settings(messages.Settings(kind="settings", parameter="WP_RADIUS=55"))
+    other.save("parm")
+    assert other.is_unsaved
+    other.save("plan")
+    assert not other.is_unsaved
+
+
+def test_a_plan_file_has_the_speed_at_which_the_mission_starts() -> None:
+    """It is set to 19 m/s in the studio, and 17 m/s is commanded later."""
+    mission = drawn_session(8, 10).mission
+    after = edits.movable_indices(mission)[3]
+    speed = MissionItem(0, Command.DO_CHANGE_SPEED, Frame.MISSION, (0.0, 17.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    items = (*mission.items[: after + 1], speed, *mission.items[after + 1 :])
+    session = session_of(renumber_items(replace(mission, items=items)))
+    session.change_settings(messages.Settings(kind="settings", airspeed=19.0))
+    assert json.loads(session.save("plan").data)["mission"]["cruiseSpeed"] == 19
+    # A file that is not of the studio does not take the later speed for the first, either.
+    assert json.loads(mission_text(session.mission, "plan"))["mission"]["cruiseSpeed"] != 17
 
 
 def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
