@@ -16,7 +16,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe, scenario_airspeed_range
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
@@ -85,6 +85,7 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
         "airspeed": settings.airspeed,
         "autopilot": settings.autopilot,
     }
+    _check_airspeed(scenario, options)
     new_scenario = apply_options(scenario, options)
     if settings.limits is None and settings.ceiling is None:
         return new_scenario
@@ -96,6 +97,19 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
             raise PlanflyError("ceiling: only a scenario has an area with a ceiling", field="ceiling")
         spec["area"]["ceiling_amsl_m"] = settings.ceiling
     return scenario_from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
+
+
+def _check_airspeed(scenario: Scenario, options: FlightOptions) -> None:
+    """Raise PlanflyError if the aircraft cannot fly at the airspeed of the options."""
+    airspeed, name = options.get("airspeed"), options.get("aircraft")
+    if airspeed is None:
+        return
+    new_scenario = scenario if name is None else with_flight(scenario, aircraft=str(name))
+    aircraft, _ = find_aircraft_and_energy(new_scenario)
+    min_airspeed, max_airspeed = scenario_airspeed_range(aircraft)
+    if not min_airspeed <= airspeed <= max_airspeed:
+        allowed = f"{aircraft.name} flies {min_airspeed:g}..{max_airspeed:g} m/s"
+        raise PlanflyError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 
 
 def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, settings: Settings) -> ChangedParameters:
