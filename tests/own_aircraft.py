@@ -63,11 +63,16 @@ def assert_refused(capsys: pytest.CaptureFixture[str], *said: str) -> None:
     assert sorted(Path().rglob("*")) == before
 
 
-def change_model(folder: Path, old: str, new: str) -> None:
-    """Make ./own of this folder, the Aerosonde with one change, and a scenario and a mission that fly it there."""
+def copy_aerosonde(folder: Path) -> None:
+    """Make ./own of this folder, the Aerosonde under another name."""
     shutil.copytree(load_aircraft("aerosonde").folder, folder / "own")
     for file in (folder / "own").glob("aerosonde.*"):
         file.rename(file.with_stem("own"))
+
+
+def change_model(folder: Path, old: str, new: str) -> None:
+    """Make ./own of this folder, the Aerosonde with one change, and a scenario and a mission that fly it there."""
+    copy_aerosonde(folder)
     model = folder / "own" / "own.xml"
     text = model.read_text(encoding="utf-8")
     assert old in text

@@ -547,10 +547,10 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
 def plan_file_text(mission: Mission) -> str:
     """Return a mission as the text of a `.plan` file; the same mission always gives the same bytes.
 
-    cruiseSpeed is the mission's speed, or its first DO_CHANGE_SPEED, or QGC's default. It is written in whole m/s, as
-    hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC reads
-    both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for planfly's own
-    guidance, which no ground station knows.
+    cruiseSpeed is the mission's speed, or a DO_CHANGE_SPEED before its second position, or QGC's default. It is written
+    in whole m/s, as hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses
+    "25.0"; QGC reads both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0
+    for planfly's own guidance, which no ground station knows.
     """
     mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
@@ -593,7 +593,11 @@ def _cruise_speed(mission: Mission) -> float:
     """Return the cruise speed to write, m/s; see `plan_file_text`."""
     if mission.cruise_speed is not None:
         return mission.cruise_speed
+    position_count = 0
     for item in mission.items:
+        position_count += is_located(item.command, item.frame)
+        if position_count > 1:
+            break
         if item.command == Command.DO_CHANGE_SPEED and 0.0 < item.params[1] <= _MAX_SPEED_MPS:
             return item.params[1]
     return _CRUISE_SPEED_MPS

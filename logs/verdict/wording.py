@@ -164,6 +164,15 @@ def suggestion_text(suggestion: Suggestion) -> str:
     return f"{text} (move {moves_text(moves)})" if moves else text
 
 
+def count_text(count: int, noun: str) -> str:
+    """Return a number with its noun.
+
+    >>> count_text(1, "threat"), count_text(2, "threat")
+    ('1 threat', '2 threats')
+    """
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
 def moves_text(moves: Sequence[ItemMove]) -> str:
     """List moves of items; items that move alike are named together.
 

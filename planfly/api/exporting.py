@@ -14,6 +14,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.measures.mission_ends import missing_ends_text
+from logs.verdict.wording import count_text
 from logs.views.exports.map_files import (
     MapLine,
     MapZone,
@@ -344,7 +345,7 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
     if suffix in LOG_SUFFIXES and source.log is not None:
         return _flight_content(source.log, suffix)
     if suffix in MAP_WRITERS:
-        descriptions = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
+        descriptions = [*source.lines, *([count_text(len(source.zones), "zone")] if source.zones else [])]
         lines, zones = list(source.lines.values()), source.zones
         if suffix == ".kml" and source.returns:
             lines, zones = lines + source.returns, zones + source.footprint
@@ -360,8 +361,8 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
         return mission_text(mission, kind), f"{count} {_CONTENT_NAMES[kind]}"
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):
-        extra = f", {len(mission.fences)} fence items, {len(mission.rally)} rally points"
-    return mission_text(mission, kind), f"{len(mission.items)} items{extra}"
+        extra = f", {count_text(len(mission.fences), 'fence item')}, {count_text(len(mission.rally), 'rally point')}"
+    return mission_text(mission, kind), f"{count_text(len(mission.items), 'item')}{extra}"
 
 
 def judging_parameters_text(
@@ -390,7 +391,7 @@ def judging_parameters_text(
         if has_own_parameters
         else "by planfly's defaults for this mission; a parameter file of your own wins (export ... --params FILE)"
     )
-    return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}{omitted}"
+    return parameters_text(values, title), f"{count_text(len(values), 'parameter')} of {autopilot.title}{omitted}"
 
 
 def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:

@@ -1,16 +1,17 @@
 """Save the mission, settings and plan of a session automatically, in case the server dies.
 
 An autosave is restored only into its own document, which is identified by its first mission, or by the file that the
-studio has written over it.
+studio has written over it.  Options of the command line take precedence over the saved settings.
 """
 
 import hashlib
 import json
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from flight.mission.items import MAX_BYTES, Home, Mission, MissionItem, item_problem
+from planfly.flight_options import MissionOptions
 from planfly.studio.documents import Document, planned_mission
 from planfly.studio.edit_context import EditContext
 from planfly.studio.settings import ChangedParameters
@@ -26,6 +27,33 @@ _SCHEMA = "planfly.studio/1"
 _MAX_AUTOSAVE_BYTES = 4 * MAX_BYTES
 # Tables of a scenario that the studio changes.
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
+_AUTOPILOT_KEYS = ("autopilot", "autopilot_from", "params", "arduplane_version", "px4_version", "guidance")
+# Entries of a scenario that an option of the command line sets: their table and keys.
+_OPTION_ENTRIES = {
+    "wind": ("wind", ("speed_mps", "from_deg")),
+    "turbulence": ("wind", ("turbulence",)),
+    "aircraft": ("flight", ("aircraft", "aircraft_by_default")),
+    "airspeed": ("flight", ("airspeed_mps",)),
+    "params": ("flight", _AUTOPILOT_KEYS),
+    "autopilot": ("flight", _AUTOPILOT_KEYS),
+    "guidance": ("flight", _AUTOPILOT_KEYS),
+    "nav": ("flight", ("nav",)),
+}
+# Entries that belong to an aircraft, and are not kept for another aircraft.
+_AIRCRAFT_KEYS = ("airspeed_mps", "battery_wh")
+
+
+class Restored(NamedTuple):
+    """State of a session that was restored from an autosave.
+
+    mission: the edited mission, which is the opened mission itself if it was not edited.
+    context: editing context with the saved settings.
+    replaced: saved settings that are not restored, each with the reason or the value that replaces it.
+    """
+
+    mission: Mission
+    context: EditContext
+    replaced: tuple[str, ...] = ()
 
 
 def autosave_text(
@@ -49,6 +77,7 @@ def autosave_text(
         "first": mission_data(document.setup.mission),
         "file": _file_digest(document),
         "in_file": is_in_file,
+        "scenario": _scenario_name(context),
         "settings": {table: spec[table] for table in names},
         "parameters": asdict(context.parameters),
         "planned": context.planned,
@@ -62,11 +91,15 @@ def _file_digest(document: Document) -> str:
     return hashlib.sha256(document.on_disk).hexdigest() if document.on_disk else ""
 
 
-def read_autosave(file: Path, context: EditContext, document: Document) -> tuple[Mission, EditContext] | None:
-    """Return the saved mission and its editing context, or None if nothing is to be restored.
+def _scenario_name(context: EditContext) -> str:
+    """Return the name of the scenario that the user named; "" for a scenario made around the mission."""
+    return "" if context.scenario.external else context.scenario.name
 
-    Nothing is restored without a file, from the autosave of another mission, and from an autosave that equals the
-    opened document.
+
+def read_autosave(file: Path, context: EditContext, document: Document, options: MissionOptions) -> Restored | None:
+    """Return the saved mission and its editing context, or None without a file or from the file of another mission.
+
+    options: options of the command line, which replace saved settings.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
     if not file.exists():
@@ -81,11 +114,12 @@ def read_autosave(file: Path, context: EditContext, document: Document) -> tuple
     is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
     mission = first if is_opened else mission_from_data(data["mission"], first)
     try:
-        restored = _restore_plan(_restore_settings(context, data), mission, data)
-    except (*INTERNAL, PlanflyError):
+        new_context, replaced = _restore_settings(context, data, options)
+        # The certificate of a plan applies only to the settings that it was made for.
+        return Restored(*((mission, new_context) if replaced else _restore_plan(new_context, mission, data)), replaced)
+    except (*INTERNAL, PlanflyError) as error:
         # If the settings cannot be restored, restore at least the edited mission.
-        restored = mission, context
-    return None if restored[0] is first and restored[1] is context else restored
+        return Restored(mission, context, (f"none of them can be restored: {error}",))
 
 
 def sibling_autosave_path(file: Path, first: Mission) -> Path:
@@ -98,25 +132,68 @@ def sibling_autosave_path(file: Path, first: Mission) -> Path:
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
 
-def _restore_settings(context: EditContext, data: Json) -> EditContext:
-    """Return the editing context with the saved settings.
+def _restore_settings(context: EditContext, data: Json, options: MissionOptions) -> tuple[EditContext, tuple[str, ...]]:
+    """Return the editing context with the saved settings, and the saved settings that were replaced.
 
-    Returns `context` itself if the settings do not differ.
+    The context is `context` itself if the settings do not differ.
+
+    options: options of the command line, which replace saved settings.
     """
     scenario: Scenario = context.scenario
+    scenario_name = data.get("scenario", _scenario_name(context))
+    if scenario_name != _scenario_name(context):
+        return context, (f"all of them, which belong to {scenario_name or 'the mission without a scenario'}",)
     spec, saved = json.loads(json.dumps(scenario.to_json())), data.get("settings", {})
+    new_spec = spec | {table: dict(value) for table, value in saved.items() if table in _SAVED_TABLES}
+    replaced = _apply_options(new_spec, spec, options)
     saved_parameters = data.get("parameters") or asdict(ChangedParameters())
     parameters = ChangedParameters(
         dict(saved_parameters["values"]), saved_parameters["file"], tuple(saved_parameters["unused"])
     )
-    new_spec = spec | {table: value for table, value in saved.items() if table in _SAVED_TABLES}
+    # As in the studio, a parameter file replaces all parameters, and another autopilot has other parameters.
+    has_other_autopilot = any(text.startswith("autopilot ") for text in replaced)
+    if parameters.values and (options.get("params") is not None or has_other_autopilot):
+        replaced += [f"parameter {name} {value:g}" for name, value in parameters.values.items()]
+        parameters = ChangedParameters()
     if new_spec == spec and parameters == context.parameters:
         new_context = context
     else:
         new_context = context.with_settings(
             scenario_from_spec(new_spec, scenario.name, ground=scenario.terrain, external=scenario.external), parameters
         )
-    return new_context if new_context.planned or not data.get("planned") else replace(new_context, planned=True)
+    is_planned = new_context.planned or not data.get("planned")
+    return new_context if is_planned else replace(new_context, planned=True), tuple(replaced)
+
+
+def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions) -> list[str]:
+    """Replace the entries of a saved scenario that options set by those of the opened scenario.
+
+    Returns one text for each entry that was different, with both values.
+    """
+    replaced = []
+    for option, (table, keys) in _OPTION_ENTRIES.items():
+        if options.get(option) is None:
+            continue
+        saved, opened = saved_spec.setdefault(table, {}), opened_spec.get(table, {})
+        if option == "aircraft" and saved.get("aircraft") != opened.get("aircraft"):
+            keys = (*keys, *_AIRCRAFT_KEYS)
+        for key in keys:
+            old_value, new_value = saved.pop(key, None), opened.get(key)
+            if new_value is not None:
+                saved[key] = new_value
+            if old_value != new_value and key not in ("aircraft_by_default", "autopilot_from"):
+                replaced.append(f"{_key_text(key)} {_value_text(old_value)} \u2192 {_value_text(new_value)}")
+    return replaced
+
+
+def _key_text(key: str) -> str:
+    """Return the name of an entry of a scenario for a user."""
+    return {"speed_mps": "wind", "from_deg": "wind from", "airspeed_mps": "airspeed"}.get(key, key.replace("_", " "))
+
+
+def _value_text(value: object) -> str:
+    """Return a value of a scenario as text; of a path only the name."""
+    return "none" if value is None else Path(value).name if isinstance(value, str) else f"{value:g}"
 
 
 def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[Mission, EditContext]:

@@ -16,6 +16,7 @@ from logs.importers.open_log import is_imported_log
 from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.reader import read_log
 from logs.recording.setup_attachments import PLAN_FILE, SCENARIO_FILE
+from logs.verdict.wording import count_text
 from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.api.imported import read_imported
 from planfly.flight_logs import MCAP_MAGIC, is_log
@@ -263,9 +264,11 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
         return _saved_plan(name, context, judged_mission)
     if kind == "kml":
         text = kml_text(context.scenario.name, [plan_line(judged_mission.setup)], map_zones(judged_mission.setup))
-        return SavedFile(
-            name, _to_bytes(text), ("only a map: it does not contain the commands, speeds and frames of the items",)
-        )
+        return SavedFile(name, _to_bytes(text), ("the commands, speeds and frames of the items: it is only a map",))
+    start_airspeed = float(judged_mission.setup.route.leg_airspeeds[0])
+    is_stated_in_file = document.kind == "plan" and start_airspeed == document.setup.route.leg_airspeeds[0]
+    if kind == "plan" and not is_stated_in_file:
+        mission = replace(mission, cruise_speed=start_airspeed)
     mission = replace(mission, autopilot=judged_mission.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(opened_scenario, context))
@@ -284,22 +287,19 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     """
     parsed, losses = parse_mission(text, name), []
     lost_counts: Mapping[str, tuple[int, str]] = {
-        "fence items": (len(mission.fences) - len(parsed.fences), "a .plan contains them"),
-        "rally points": (len(mission.rally) - len(parsed.rally), "a .plan contains them"),
-        "survey plans": (
-            len(mission.survey_plans),
-            "their items are kept; other data of the ground station is lost",
-        ),
+        "fence item": (len(mission.fences) - len(parsed.fences), "only in a .plan"),
+        "rally point": (len(mission.rally) - len(parsed.rally), "only in a .plan"),
+        "survey plan": (len(mission.survey_plans), "the items are kept; other data of the ground station is lost"),
     }
     losses += [
-        f"{count} {content}: {explanation}" for content, (count, explanation) in lost_counts.items() if count > 0
+        f"{count_text(count, noun)}: {explanation}" for noun, (count, explanation) in lost_counts.items() if count > 0
     ]
     if kind == "waypoints" and mission.cruise_speed != parsed.cruise_speed and mission.cruise_speed is not None:
         losses.append("the ground station's cruise speed")
     threats, zones = len(context.scenario.threats), len(context.scenario.zones)
-    world_contents = [f"{count} {content}" for count, content in ((threats, "threats"), (zones, "zones")) if count]
+    world_contents = [count_text(count, noun) for count, noun in ((threats, "threat"), (zones, "zone")) if count]
     if world_contents:
-        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes them as a fence")
+        losses.append(f"the scenario's {' and '.join(world_contents)}: planfly export writes a fence of them")
     return tuple(losses)
 
 
@@ -322,7 +322,7 @@ def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str
 def _lost_parameters(context: EditContext) -> tuple[str, ...]:
     """Return a line on the autopilot parameters set in the studio, which only a parameter file can store."""
     count = len(context.parameters.values)
-    return (f"{count} parameter{('s' if count != 1 else '')} set here: a .parm contains them",) if count else ()
+    return (f"{count_text(count, 'parameter')} set here: only in a .parm",) if count else ()
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:

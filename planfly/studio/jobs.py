@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from aircraft.catalog import aircraft_names
 from planfly.arguments import CHOICES
 from planfly.studio import messages
 from planfly.studio.changes import FlightResults, describe_changes
@@ -96,9 +95,8 @@ class Jobs:
             worker.close()
 
     def choices(self) -> Json:
-        """Return the page data of aircraft, autopilots, turbulence levels and algorithms to choose from."""
+        """Return the page data of autopilots, turbulence levels and algorithms to choose from."""
         return {
-            "aircraft": aircraft_names(),
             "autopilots": list(CHOICES["autopilot"]),
             "turbulence": list(CHOICES["turbulence"]),
             "algorithms": {name: algorithm.summary for name, algorithm in ALGORITHMS.items()},

@@ -57,7 +57,7 @@ def open_studio(
     seed: seed of planner and turbulence.
     port: port of the server; None for 8790, or any free port if 8790 is taken.
     browser: True opens the page in the browser.
-    keep: the folder of autosaves, which the next start restores.
+    keep: the folder of autosaves, which the next start restores; options given here replace settings in them.
     stop: polled continuously; the studio ends when it returns True.
     on_message: called with the page's address, which contains the access token.
 
@@ -73,6 +73,8 @@ def open_studio(
         if restored:
             undo_hint = "; undo reverts this" if session.undo_text else ""
             on_message(f"earlier edits are restored (from {autosave_file}){undo_hint}")
+        if session.replaced_text:
+            on_message(f"{session.replaced_text} (from {autosave_file})")
         for file in session.unreadable:
             on_message(
                 f"{file}: this autosave file cannot be read; it stays unchanged, and edits are not saved automatically"

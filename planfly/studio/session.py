@@ -12,19 +12,19 @@ import numpy as np
 
 from flight.mission import edits
 from flight.mission.items import LANDINGS, Mission
-from logs.verdict.wording import moves_text
+from logs.verdict.wording import count_text, moves_text
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
-from planfly.studio.documents import Document, SavedFile, open_document, planned_mission, save_document
+from planfly.studio.documents import KINDS, Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
-from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, settings_json
+from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, own_aircraft, settings_json
 from planfly.studio.view_model import Json, mission_json, windows_json, world_json
 from planfly.studio.worker_process import INTERNAL
-from planfly.workflow.apply_suggestion import apply_suggestion
+from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.suggestion_trials import SuggestionTrials
 from planner.plan import Plan
@@ -60,10 +60,12 @@ class Session:
     unreadable: autosave files that cannot be read.
     document_rev: number that increases with every opened document.
     named_file: file named on the command line, the only file that may be overwritten.
-    saved_mission: the mission as saved last.
+    saved_mission: the mission as saved last over the document's file; without such a file, as downloaded last.
     file_mission: the mission as saved last over the document's file.
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
+    replaced_settings: autosaved settings of this document that were not restored, each as text.
+    aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
     """
 
     document: Document
@@ -83,6 +85,11 @@ class Session:
     document_rev: int = 1
     earlier_states: list[_OpenedState] = field(default_factory=list)
     undone_states: list[_OpenedState] = field(default_factory=list)
+    replaced_settings: tuple[str, ...] = ()
+    aircraft_folders: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.aircraft_folders |= own_aircraft(self.context.scenario)
 
     @classmethod
     def from_document(cls, document: Document, options: MissionOptions) -> "Session":
@@ -104,6 +111,8 @@ class Session:
             [],
         )
         self._restore_state((new_session.document, new_session.context, new_session.history))
+        self.aircraft_folders |= new_session.aircraft_folders
+        self.replaced_settings = ()
 
     def _opened_state(self) -> _OpenedState:
         """Return the document with its context and history, to restore it later."""
@@ -145,6 +154,11 @@ class Session:
     def is_changed(self) -> bool:
         """True if the mission differs from the opened mission."""
         return self.mission is not self.history.first
+
+    @property
+    def file_kind(self) -> str:
+        """Format of the file that the mission may overwrite; "" if there is none."""
+        return self.document.kind if self.document.path is not None else ""
 
     @property
     def is_unsaved(self) -> bool:
@@ -262,9 +276,7 @@ class Session:
             case Raise():
                 indices = self._indices_to_raise(message.ks)
                 mission = edits.raise_items(self.mission, indices, message.by)
-                items_text = (
-                    "all items" if message.ks is None else f"{len(indices)} item{'s' if len(indices) != 1 else ''}"
-                )
+                items_text = "all items" if message.ks is None else count_text(len(indices), "item")
                 return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {items_text} by {abs(message.by):g} m"
             case Apply():
                 return self._mission_with_suggestion(message)
@@ -326,7 +338,7 @@ class Session:
             place_indices = edits.movable_indices(mission)
             nearest_index = min(place_indices, key=lambda place_index: abs(place_index - index))
             mission = self.context.with_updated_radii(mission, nearest_index)
-        return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
+        return mission, f"delete {count_text(len(set(indices)), 'item')}"
 
     def _mission_with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission changed by a suggestion, and a description of the edit.
@@ -341,17 +353,23 @@ class Session:
         finding = findings[message.finding]
         if not message.which < len(finding.suggestions):
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        trial = SuggestionTrials(self.context, self.judged).try_suggestion(finding, message.which)
+        trials = SuggestionTrials(self.context, self.judged)
+        trial = trials.try_suggestion(finding, message.which)
         if trial is None:
             # A suggestion that moves no item has a reason of its own.
             apply_suggestion(self.context, self.judged, finding, finding.suggestions[message.which])
-            raise MissionError(
-                f"{self.document.name}: this suggestion would not remove its finding, or would add findings",
-                field="suggestion",
-            )
-        mission = replace(trial.setup.mission, autopilot=self.mission.autopilot)
-        moves = [move for change in trial.suggestion for move in change.moves]
-        return mission, f"apply a suggestion of {finding.rule}" + (f": move {moves_text(moves)}" if moves else "")
+            reason = trials.explain_refusal(finding, message.which)
+            raise MissionError(f"{self.document.name}: {reason}", field="suggestion")
+        return self._suggested_edit(trial.setup.mission, finding.rule)
+
+    def _suggested_edit(self, mission: Mission, source: str) -> tuple[Mission, str]:
+        """Return a mission with a suggestion applied, and a description of the edit with the moves of the items.
+
+        source: where the suggestion comes from.
+        """
+        moves = item_moves(self.context, self.mission, mission)
+        text = f"apply a suggestion of {source}" + (f": move {moves_text(moves)}" if moves else "")
+        return replace(mission, autopilot=self.mission.autopilot), text
 
     def _mission_with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission as flown in the trial of a suggestion, and a description of the edit.
@@ -362,7 +380,7 @@ class Session:
         flown_mission = missions.get((message.finding, message.which)) if rev == self.rev else None
         if flown_mission is None:
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        return replace(flown_mission, autopilot=self.mission.autopilot), "apply a suggestion of the flight"
+        return self._suggested_edit(flown_mission, "the flight")
 
     def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
         """Return the mission with a planned path in place of the items between two items.
@@ -404,7 +422,7 @@ class Session:
 
         Raises PlanflyError for a value that is not allowed in a scenario.
         """
-        scenario = apply_scenario_settings(self.context.scenario, settings)
+        scenario = apply_scenario_settings(self.context.scenario, settings, self.aircraft_folders)
         context = self.context.with_settings(
             scenario, apply_parameter_settings(self.context.parameters, scenario, settings)
         )
@@ -415,7 +433,9 @@ class Session:
 
     def settings_json(self) -> Json:
         """Return the current settings as page data."""
-        return settings_json(self.context.scenario, self.context.airframe, self.context.parameters)
+        return settings_json(
+            self.context.scenario, self.context.airframe, self.context.parameters, self.aircraft_folders
+        )
 
     # ------------------------------------------------------------------
     # Page data, and files.
@@ -431,11 +451,16 @@ class Session:
             "unsaved": self.is_unsaved,
             "undo": self.undo_text,
             "redo": self.redo_text,
-            "over": self.document.kind if self.document.path is not None else "",
+            "over": self.file_kind,
             "planned": self.judged.setup.plan is not None,
-            "notes": [*self.mission.warnings, *self.judged.setup.notes],
+            "notes": [*filter(None, [self.replaced_text]), *self.mission.warnings, *self.judged.setup.notes],
             **mission_json(self.context, self.judged),
         }
+
+    @property
+    def replaced_text(self) -> str:
+        """Text on the autosaved settings that were not restored; "" if all were restored."""
+        return f"kept settings replaced: {'; '.join(self.replaced_settings)}" if self.replaced_settings else ""
 
     def world_message(self) -> Json:
         """Return the message with the map, threats, zones and settings."""
@@ -447,9 +472,12 @@ class Session:
         }
 
     def save(self, form: str) -> SavedFile:
-        """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it."""
+        """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
+
+        The mission counts as saved if there is no file that has to be overwritten for that.
+        """
         saved_file = save_document(self.document, self.context, self.judged, form)
-        if form != "kml":
+        if form in KINDS and form != "kml" and not self.file_kind:
             self.saved_mission = self.mission
         return saved_file
 
@@ -459,13 +487,14 @@ class Session:
         Raises PlanflyError if the studio was started without one, or if another program has changed it.
         """
         path = self.document.path
-        if path is None or not self.document.kind:
+        if path is None or not self.file_kind:
             raise PlanflyError("the studio was started without a mission file: save as a new file", field="over")
         if path.exists() and path.read_bytes() != self.document.on_disk:
             message = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(message, file=path)
-        saved_file = self.save(self.document.kind)
+        saved_file = self.save(self.file_kind)
         write_atomically(path, saved_file.data)
+        self.saved_mission = self.mission
         self.document = replace(self.document, on_disk=saved_file.data)
         # The next autosave knows the new file.
         self.file_mission, self.autosaved_rev = self.mission, 0
@@ -511,18 +540,23 @@ class Session:
         """
         previous_state = self.context, self.judged, self.plans
         try:
-            autosave = read_autosave(file, self.context, self.document)
+            autosave = read_autosave(file, self.context, self.document, self.options)
             if autosave is None:
                 return False
-            self._set_mission(*autosave)
-            json.dumps(self.mission_message(), allow_nan=False)
+            mission, context, replaced_settings = autosave
+            is_edited = mission is not self.history.first
+            if is_edited or context is not self.context:
+                self._set_mission(mission, context)
+                json.dumps(self.mission_message(), allow_nan=False)
         except (*INTERNAL, PlanflyError):
             self.context, self.judged, self.plans = previous_state
             self.unreadable.append(file)
             return False
-        if autosave[0] is not self.history.first:
-            self._add_to_history(autosave[0], "the edits of the previous session")
-        return True
+        self.aircraft_folders |= own_aircraft(self.context.scenario)
+        self.replaced_settings = replaced_settings
+        if is_edited:
+            self._add_to_history(mission, "the edits of the previous session")
+        return is_edited or context is not previous_state[0]
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:

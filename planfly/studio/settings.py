@@ -3,20 +3,24 @@
 Values are checked by the same code as in scenarios and parameter files, and refused with the same messages.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from aircraft.catalog import aircraft_names
 from flight.autopilots.autopilot import Parameters
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe, scenario_airspeed_range
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
+from world.scenario_tables import names_folder
 
 # Suffixes of parameter files.
 PARAMETER_FILES = (".parm", ".param", ".params")
@@ -56,8 +60,17 @@ class ChangedParameters:
         return replace(airframe, autopilot=airframe.autopilot.restore(stored_autopilot._replace(parameters=parameters)))
 
 
-def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
-    """Return a scenario with the requested settings. Raises PlanflyError for an invalid value."""
+def own_aircraft(scenario: Scenario) -> dict[str, str]:
+    """Return the folder of a scenario's aircraft by the aircraft's name; empty for an embedded aircraft."""
+    folder = scenario.flight.aircraft
+    return {Path(folder).name: folder} if names_folder(folder) else {}
+
+
+def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Mapping[str, str]) -> Scenario:
+    """Return a scenario with the requested settings. Raises PlanflyError for an invalid value.
+
+    folders: folders of the user's own aircraft, by name.
+    """
     wind = None
     if settings.wind_speed is not None or settings.wind_from is not None:
         speed = scenario.wind.speed if settings.wind_speed is None else settings.wind_speed
@@ -68,10 +81,11 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
     options: FlightOptions = {
         "wind": wind,
         "turbulence": settings.turbulence,
-        "aircraft": settings.aircraft,
+        "aircraft": folders.get(settings.aircraft, settings.aircraft) if settings.aircraft is not None else None,
         "airspeed": settings.airspeed,
         "autopilot": settings.autopilot,
     }
+    _check_airspeed(scenario, options)
     new_scenario = apply_options(scenario, options)
     if settings.limits is None and settings.ceiling is None:
         return new_scenario
@@ -83,6 +97,19 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
             raise PlanflyError("ceiling: only a scenario has an area with a ceiling", field="ceiling")
         spec["area"]["ceiling_amsl_m"] = settings.ceiling
     return scenario_from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
+
+
+def _check_airspeed(scenario: Scenario, options: FlightOptions) -> None:
+    """Raise PlanflyError if the aircraft cannot fly at the airspeed of the options."""
+    airspeed, name = options.get("airspeed"), options.get("aircraft")
+    if airspeed is None:
+        return
+    new_scenario = scenario if name is None else with_flight(scenario, aircraft=str(name))
+    aircraft, _ = find_aircraft_and_energy(new_scenario)
+    min_airspeed, max_airspeed = scenario_airspeed_range(aircraft)
+    if not min_airspeed <= airspeed <= max_airspeed:
+        allowed = f"{aircraft.name} flies {min_airspeed:g}..{max_airspeed:g} m/s"
+        raise PlanflyError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 
 
 def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, settings: Settings) -> ChangedParameters:
@@ -146,8 +173,10 @@ def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
     return autopilot.parameters
 
 
-def settings_json(scenario: Scenario, airframe: Airframe, changed_parameters: ChangedParameters) -> dict[str, Any]:
-    """Return the current settings as page data."""
+def settings_json(
+    scenario: Scenario, airframe: Airframe, changed_parameters: ChangedParameters, folders: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return the current settings as page data.  folders: folders of the user's own aircraft, by name."""
     limits, parameters = scenario.to_json().get("limits", {}), airframe.autopilot.parameters
     remainder_text = (
         f" and {len(changed_parameters.unused) - _MAX_LISTED_NAMES} more"
@@ -156,6 +185,7 @@ def settings_json(scenario: Scenario, airframe: Airframe, changed_parameters: Ch
     )
     return {
         "aircraft": airframe.aircraft.name,
+        "aircraft_names": list(dict.fromkeys((*folders, *aircraft_names()))),
         "autopilot": airframe.autopilot.name,
         "autopilot_title": airframe.autopilot.title,
         "airspeed": round(airframe.airspeed, 1),

@@ -17,6 +17,7 @@ from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Change, Suggestion, TriedSuggestions
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
@@ -59,6 +60,16 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
     )
 
 
+def added_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
+    """Return the findings that fail only after a change, and those that leave the verdict open only after it."""
+    failed_before = set(map(finding_key, old_verdict.failed))
+    open_before = {finding_key(finding) for finding in old_verdict.findings if finding.ok is not True}
+    return [
+        *(finding for finding in new_verdict.failed if finding_key(finding) not in failed_before),
+        *(finding for finding in undecided_findings(new_verdict.findings) if finding_key(finding) not in open_before),
+    ]
+
+
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
     """Return True if a change improves the verdict and makes no finding undecided.
 
@@ -68,6 +79,11 @@ def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> b
     undecided_after = set(map(finding_key, undecided_findings(new_verdict.findings)))
     is_decided = all(item.ok for item in new_verdict.findings if finding_key(item) == finding_key(finding))
     return is_improved(old_verdict, new_verdict, finding) and is_decided and undecided_after <= open_before
+
+
+def _finding_text(finding: Finding) -> str:
+    """Return place, rule and reason of a finding in a line."""
+    return f"{finding.where}: {RULE_WORDS[finding.rule].word}: {finding.brief or finding.reason}"
 
 
 @dataclass(frozen=True)
@@ -172,6 +188,29 @@ class SuggestionTrials:
         (*first_changes, last_change), trial = passed_candidate
         moves = item_moves(self.context, self.judged.mission, trial.setup.mission)
         return PassedTrial(finding, (*first_changes, replace(last_change, moves=moves)), trial.setup)
+
+    def explain_refusal(self, finding: Finding, number: int) -> str:
+        """Return the reason why no geometric trial of a suggestion passes: the finding stays, or others are added."""
+        verdicts = [
+            trial.geometry_verdict
+            for _, trial in islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
+        ]
+        for verdict in verdicts:
+            open_after = [item for item in verdict.findings if item.ok is not True]
+            added = added_findings(self._current_trial.geometry_verdict, verdict)
+            if added and finding_key(finding) not in map(finding_key, open_after):
+                others_text = f", and {len(added) - 1} more" if len(added) > 1 else ""
+                return f"this suggestion would add a finding: {_finding_text(added[0])}{others_text}"
+        remaining = next(
+            (
+                item
+                for verdict in verdicts[-1:]
+                for item in verdict.findings
+                if finding_key(item) == finding_key(finding)
+            ),
+            finding,
+        )
+        return f"this suggestion would not remove its finding: {_finding_text(remaining)}"
 
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
         """Return True if a trial passes by geometry, and by a flight if the judged verdict is flown.

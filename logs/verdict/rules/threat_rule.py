@@ -133,11 +133,12 @@ def _no_entry_finding(
     navigation_error: navigation error, m.
     is_judged: False if nothing was flown, so that the finding is not judged.
     """
-    reason = (
-        f"none of the missile spheres of {threat_count} threats is entered"
-        if threat_count
-        else "the scenario has no threats"
-    )
+    reason = "the scenario has no threats"
+    if threat_count == 1:
+        has_sphere = math.isfinite(nearest_distance)
+        reason = "the missile sphere of the only threat is not entered" if has_sphere else "the only threat is a radar"
+    elif threat_count:
+        reason = f"none of the missile spheres of {threat_count} threats is entered"
     facts = []
     if math.isfinite(nearest_distance):
         facts.append(Fact("nearest", nearest_distance, "m"))

@@ -319,7 +319,7 @@ export class Panel {
       setTimeout(() => URL.revokeObjectURL(url), 10000);
     }
     const lost = losses.length ? element("ul", {}, ...losses.map((text) => element("li", {}, text))) : null;
-    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is saved`), ` ${where ? `in ${where}` : "among your browser's downloads"}. `, losses.length ? "It does not contain:" : "It contains the whole mission."), ...(lost ? [lost] : []));
+    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is ${where ? "saved" : "downloaded"}`), ` ${where ? `in ${where}` : "by your browser"}. `, losses.length ? "It lacks:" : "It contains the whole mission."), ...(lost ? [lost] : []));
     this.reveal("files");
   }
 

@@ -45,7 +45,7 @@ function flown(settings, offered, send) {
   const same = (values, own) => [...new Set([own, ...values])].filter(Boolean).map((one) => [one, one]);
   const need = (name) => (value) => value !== null && send({ [name]: value });
   return [
-    field("Aircraft", list("set-aircraft", same(offered.aircraft, settings.aircraft), settings.aircraft, need("aircraft"))),
+    field("Aircraft", list("set-aircraft", same(settings.aircraft_names, settings.aircraft), settings.aircraft, need("aircraft"))),
     field("Autopilot", list("set-autopilot", same(offered.autopilots, settings.autopilot), settings.autopilot, need("autopilot"))),
     field("Airspeed, m/s", number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
     field("Wind, m/s", number("set-wind_speed", settings.wind_speed, 0.5, need("wind_speed"))),

@@ -104,7 +104,10 @@ def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Job
     assert jobs.result_messages()[0]["findings"] == tried["findings"]
     finding, which = offered[0]
     apply = messages.Apply(kind="apply", rev=session.rev, finding=finding["number"], which=which, flown=True)
+    old_items = session.mission.items
     session.edit(apply)
+    moved = [new.seq for old, new in zip(old_items, session.mission.items, strict=True) if old != new]
+    assert session.undo_text.startswith(f"apply a suggestion of the flight: move item {moved[0]} ")
     jobs.fly(session)
     after = answer_of(jobs, session, fly)
     assert after["verdict"]["failed"] <= before["verdict"]["failed"]

@@ -1,6 +1,7 @@
 """A session: what is done to a mission and undone, judged as the API judges it, saved without loss, and kept."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 import planfly
 from flight.mission import edits
-from flight.mission.items import Frame, Mission, MissionItem
+from flight.mission.items import Command, Frame, Mission, MissionItem, renumber_items
 from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
@@ -17,7 +18,9 @@ from planfly.studio import messages
 from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, open_session
+from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.suggestion_trials import with_tried_suggestions
+from tests.own_aircraft import copy_aerosonde, write_mission, write_scenario
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
@@ -148,6 +151,52 @@ def test_what_a_form_does_not_hold_is_said() -> None:
         session.save("plan.json")
 
 
+def test_what_one_threat_and_a_map_lack_is_said_in_the_singular(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_scenario('[[threats]]\nname = "col"\neast_m = 3000\nnorth_m = 3000\nkill_radius_m = 100\nkill_scale_m = 50\n')
+    write_mission(1000.0, 1000.0, 1000.0)
+    session, _ = open_session("m.waypoints", MissionOptions(scenario="s.toml"))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    losses = session.save("waypoints").losses
+    assert losses == ("the scenario's 1 threat: planfly export writes a fence of them",)
+    assert session.save("kml").losses == ("the commands, speeds and frames of the items: it is only a map",)
+
+
+def test_a_download_leaves_the_file_unsaved(tmp_path: Path) -> None:
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.save("waypoints")
+    session.save("plan")
+    assert session.is_unsaved
+    session.overwrite_file()
+    assert not session.is_unsaved
+    # Without a file of its own, a mission is saved by its download.
+    other = drawn_session(8, 10)
+    other.edit(messages.Raise(kind="raise", rev=other.rev, by=10.0))
+    other.change_settings(messages.Settings(kind="settings", parameter="WP_RADIUS=55"))
+    other.save("parm")
+    assert other.is_unsaved
+    other.save("plan")
+    assert not other.is_unsaved
+
+
+def test_a_plan_file_has_the_speed_at_which_the_mission_starts() -> None:
+    """It is set to 19 m/s in the studio, and 17 m/s is commanded later."""
+    mission = drawn_session(8, 10).mission
+    after = edits.movable_indices(mission)[3]
+    speed = MissionItem(0, Command.DO_CHANGE_SPEED, Frame.MISSION, (0.0, 17.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    items = (*mission.items[: after + 1], speed, *mission.items[after + 1 :])
+    session = session_of(renumber_items(replace(mission, items=items)))
+    session.change_settings(messages.Settings(kind="settings", airspeed=19.0))
+    assert json.loads(session.save("plan").data)["mission"]["cruiseSpeed"] == 19
+    # A file that is not of the studio does not take the later speed for the first, either.
+    assert json.loads(mission_text(session.mission, "plan"))["mission"]["cruiseSpeed"] != 17
+
+
 def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
     file = tmp_path / "m.waypoints"
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
@@ -273,6 +322,40 @@ def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
     assert again.context.scenario.wind.speed != 9.0
 
 
+def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(tmp_path: Path) -> None:
+    file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    world = MissionOptions(scenario="jacksboro-air")
+    session, _ = open_session(str(file), world, kept)
+    asked = {"wind_speed": 9.0, "wind_from": 90.0, "turbulence": "light", "airspeed": 26.0, "parameter": "WP_RADIUS=55"}
+    session.change_settings(messages.Settings.model_validate({"kind": "settings", **asked}))
+    session.autosave(kept)
+    windy, restored = open_session(str(file), world | MissionOptions(wind=(3.0, 90.0), turbulence="none"), kept)
+    shown = windy.settings_json()
+    assert restored
+    assert (shown["wind_speed"], shown["wind_from"], shown["turbulence"]) == (3.0, 90.0, "none")
+    # What no option sets is kept.
+    assert (shown["airspeed"], shown["parameters"]) == (26.0, {"WP_RADIUS": 55.0})
+    said = "kept settings replaced: wind 9 \u2192 3; turbulence light \u2192 none"
+    assert said in windy.mission_message()["notes"]
+    # Another aircraft has another airspeed, another file of parameters replaces those that were set.
+    (tmp_path / "mine.parm").write_text("WP_RADIUS 70\n", encoding="utf-8")
+    copy_aerosonde(tmp_path)
+    named = MissionOptions(aircraft=tmp_path / "own", params=tmp_path / "mine.parm")
+    other, _ = open_session(str(file), world | named, kept)
+    assert other.settings_json()["aircraft"] == "own"
+    assert other.settings_json()["parameters"] == {}
+    assert other.context.airframe.autopilot.stated_value("WP_RADIUS") == 70.0
+    for part in ("aircraft aerosonde \u2192 own", "airspeed 26 \u2192 25", "parameter WP_RADIUS 55"):
+        assert part in other.replaced_text
+    assert other.settings_json()["wind_speed"] == 9.0
+    # The settings of one scenario are not those of another.
+    third, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
+    assert not restored
+    assert third.replaced_text == "kept settings replaced: all of them, which belong to jacksboro-air"
+    assert not open_session(str(file), world, kept)[0].replaced_text
+
+
 # Changes of a kept session: whole texts, and values of keys.
 SHAPES: dict[str, Any] = {
     "nothing": "",
@@ -325,6 +408,34 @@ def test_a_suggestion_applied_mends_its_finding(rule: str, by: float, seed: int,
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
     after = [one for one in session.judged.verdict.findings if (one.rule, one.place) == (item.rule, item.place)]
     assert not [one for one in after if one.ok is False]
+
+
+@pytest.mark.parametrize(
+    ("seed", "by", "rule", "said"),
+    [
+        (4, 0.0, "threat", "would not remove its finding: east valley (missile): threat: inside the missile's range"),
+        (6, 30.0, "bounds", "would add a finding: leg 1, to item 3: clearance: .* 60 m are required"),
+    ],
+)
+def test_a_refused_suggestion_names_the_finding_that_stays_or_is_added(
+    seed: int, by: float, rule: str, said: str
+) -> None:
+    session = drawn_session(seed, 12)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+    findings = session.judged.verdict.findings
+    number = next(n for n, one in enumerate(findings) if one.rule == rule and one.suggestions)
+    with pytest.raises(MissionError, match=said.replace("(", "[(]").replace(")", "[)]")) as refused:
+        session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
+    if by:
+        # The suggestion made by hand: its finding is gone, and leg 1 is too low, which it was not.
+        item = findings[number]
+        mission = apply_suggestion(session.context, session.judged, item, item.suggestions[0])
+        after = session.context.judge(mission).verdict.failed
+        assert (item.rule, item.place) not in [(one.rule, one.place) for one in after]
+        low = [one.place.to_item for one in after if one.rule == "clearance"]
+        assert 3 in low
+        assert 3 not in [one.place.to_item for one in session.judged.verdict.failed if one.rule == "clearance"]
+    assert "or would" not in str(refused.value)
 
 
 def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:

@@ -1,9 +1,15 @@
 """Settings: limits and the autopilot's parameters are judged at once, refused in one line, and said to be lost."""
 
+from pathlib import Path
+
 import pytest
 
+from flight.mission_files.formats import mission_text
+from planfly.flight_options import MissionOptions
+from planfly.studio.documents import open_document
 from planfly.studio.messages import Settings
-from planfly.studio.session import Session
+from planfly.studio.session import Session, open_session
+from tests.own_aircraft import copy_aerosonde
 from tests.planfly.studio.drafts import drawn_session
 from world.errors import PlanflyError
 
@@ -57,6 +63,26 @@ def test_parameters_are_flown_with_and_saved() -> None:
         session.save("parm")
 
 
+def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> None:
+    copy_aerosonde(tmp_path)
+    file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
+    file.write_text(mission_text(drawn_session(6, 14).mission, "waypoints"), encoding="utf-8")
+    named = MissionOptions(scenario="jacksboro", aircraft=str(tmp_path / "own"))
+    session, _ = open_session(str(file), named, kept)
+    for _ in range(2):
+        set_in(session, aircraft="aerosonde")
+        assert session.world_message()["settings"]["aircraft_names"][:2] == ["own", "aerosonde"]
+        set_in(session, aircraft="own")
+        assert session.context.scenario.flight.aircraft == str(tmp_path / "own")
+    # Also when it comes from the kept session, and in another document.
+    session.autosave(kept)
+    again, _ = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
+    again.open(open_document(str(file), again.options))
+    assert again.settings_json()["aircraft"] == "aerosonde"
+    set_in(again, aircraft="own")
+    assert again.settings_json()["aircraft"] == "own"
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
@@ -65,7 +91,12 @@ def test_parameters_are_flown_with_and_saved() -> None:
         ({"limits": {"max_turn_deg": 400.0}}, 'limits.max_turn_deg: 400.0: allowed above 0..180, or "aircraft"'),
         ({"ceiling": -9999.0}, "area.ceiling_amsl_m: -9999.0: allowed -500..9000"),
         ({"wind_speed": 500.0}, "wind: speed_mps: 500.0: allowed 0..40"),
-        ({"airspeed": 2.0}, "airspeed_mps: 2.0: allowed 15..60"),
+        # One range on both sides, the aircraft's (its TOML); the Zagi flies from 11 m/s, and a scenario takes 15 m/s.
+        ({"airspeed": 2.0}, "airspeed 2: aerosonde flies 18..31 m/s"),
+        ({"airspeed": 60.5}, "airspeed 60.5: aerosonde flies 18..31 m/s"),
+        ({"airspeed": 13.0, "aircraft": "zagi"}, "airspeed 13: zagi flies 15..16.9 m/s"),
+        ({"airspeed": 60.0, "aircraft": "zagi"}, "airspeed 60: zagi flies 15..16.9 m/s"),
+        ({"aircraft": "zagi"}, "flight.airspeed_mps: 25: zagi flies 15..16.9 m/s"),
         ({"aircraft": "../x8"}, "aircraft"),
         ({"parameter": "WP_RADIUS=99999"}, "parameter:1: WP_RADIUS: 99999: allowed 0..32767"),
         ({"parameter": "WP_RADIUS=wide"}, "parameter:1: WP_RADIUS: 'wide': expected a finite number"),

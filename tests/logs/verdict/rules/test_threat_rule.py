@@ -50,7 +50,16 @@ def test_threats_out_of_reach_give_one_finding() -> None:
     setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 1300.0}])
     items = [item for item in judge(setup, fly_path(setup)).findings if item.rule == "threat"]
     assert [(item.place, item.ok) for item in items] == [(FLIGHT, True)]
-    assert "800 m away" in items[0].reason
+    assert (
+        items[0].reason == "the missile sphere of the only threat is not entered; the nearest, Alfa, stays 800 m away"
+    )
+    spotter = {key: value for key, value in MISSILE.items() if "kill" not in key} | {"east_m": 1300.0}
+    (item,) = (
+        one
+        for one in judge_geometry(make_setup([[0, 0, 300], [0, 2000, 300]], threats=[spotter])).findings
+        if one.rule == "threat"
+    )
+    assert item.reason == "the only threat is a radar"
 
 
 def test_a_flight_into_a_sphere_that_the_plan_avoids_fails() -> None:
