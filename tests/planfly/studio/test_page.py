@@ -462,7 +462,7 @@ def test_a_suggestion_of_the_flight_is_offered_once_it_was_flown_and_applied(pag
     apply = f"{own}?.nextElementSibling.querySelector('.apply')"
     page.wait_for(f"{apply} && document.getElementById('stop').hidden", 150.0)
     page.value(f"{apply}.click()")
-    page.wait_for("document.getElementById('undo').title === 'Undo: apply a suggestion of the flight'")
+    page.wait_for("document.getElementById('undo').title.includes('a suggestion of the flight: move item')")
     undo_all(page)
 
 
