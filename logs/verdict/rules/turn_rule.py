@@ -242,7 +242,7 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
         )
     max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
     if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
-        offset_text = f"still {measure.settled_distance:.1f} m off the next leg when that leg ends"
+        offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
         faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
     if measure.full_circles:
         faults["circles"] = message(f"{measure.full_circles} full circle(s) flown at the corner")
