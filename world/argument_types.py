@@ -69,10 +69,14 @@ def _allowed_classes(annotation: Any) -> tuple[tuple[type, ...], tuple[type, ...
 
     >>> _allowed_classes(str | None), _allowed_classes(float | None)
     (((<class 'str'>, <class 'NoneType'>), ()), ((), ()))
+    >>> [one.__name__ for one in _allowed_classes(Path | str)[0]]
+    ['str', 'Path', 'PathLike']
     """
     members = get_args(annotation) or (annotation,)
     sequences = [member for member in members if get_origin(member) is Sequence]
     classes = tuple(member for member in members if isinstance(member, type) and member not in sequences)
+    # The cache does not distinguish `str | Path` from `Path | str`.
+    classes = tuple(sorted(classes, key=lambda one: (one is NoneType, one is Path, one is str, one.__name__)))
     if get_origin(annotation) is Sequence or len(classes) + len(sequences) != len(members) or str not in classes:
         return (), ()
     item_classes = _allowed_classes(get_args(sequences[0])[0])[0] if sequences else ()
