@@ -1,4 +1,4 @@
-"""What is near a limit on the page: little of what the limit allows is left, or little room beside a missile."""
+"""States on the page: near a limit, if little of what the limit allows is left or a missile is close."""
 
 import numpy as np
 import pytest

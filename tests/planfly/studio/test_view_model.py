@@ -1,4 +1,4 @@
-"""What the page is told of a verdict and of the profile."""
+"""Page data of a verdict and of the profile."""
 
 from logs.verdict.findings import make_finding
 from logs.verdict.places import Place
