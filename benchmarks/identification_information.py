@@ -119,7 +119,7 @@ def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: 
     shifted: Any = SimpleNamespace(
         airspeed=signals.airspeed + step, throttle=signals.throttle, density=signals.density, smooth=signals.smooth
     )
-    by_speed = replace(forces, signals=shifted).predicted(unknown)[0] - forces.predicted(unknown)[0]
+    by_speed = replace(forces, signals=shifted).predict(unknown)[0] - forces.predict(unknown)[0]
     # Includes the drag of a gust: twice the relative change of the speed.
     drag = np.array(unknown[:2]) @ forces.drags / forces.base.mass
     by_speed = by_speed / step + 2.0 * drag / signals.airspeed

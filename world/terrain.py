@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from world.arrays import Floats, Heights
 from world.frames import PolyMap, PolyMapRecord, fit_polymap, polymap
-from world.kernels import compiled, inlined
+from world.kernels import compiled, inlined, inner
 
 # Longest piece of a segment that is treated as straight in the raster's grid, m: at 60 degrees latitude a 500 m piece
 # bends by 9 mm.
@@ -152,10 +152,46 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
     The position is a fraction of the segment. The ground is interpolated bilinearly. The height is NaN if the segment
     leaves the raster.
     """
+    col, row = polymap(to_pixel, a[0], a[1])
+    clearance, fraction, _, _ = _clearance_from_pixel(heights, to_pixel, a, b, col, row)
+    return clearance, fraction
+
+
+@inner
+def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
+    """Return the smallest height above ground of each segment of a path, m, and its position, (n - 1,) each.
+
+    points: ends of the segments, m, (n, 3).
+
+    The values are those of `segment_clearance`, computed with half of its map transformations.
+    """
+    count = max(0, points.shape[0] - 1)
+    clearance, fraction = np.empty(count), np.empty(count)
+    col, row = math.nan, math.nan
+    for k in range(count):
+        a, b = points[k], points[k + 1]
+        if math.isnan(col):
+            col, row = polymap(to_pixel, a[0], a[1])
+        clearance[k], fraction[k], col, row = _clearance_from_pixel(heights, to_pixel, a, b, col, row)
+        if a[0] + (b[0] - a[0]) != b[0] or a[1] + (b[1] - a[1]) != b[1]:
+            # The pixel of the segment's end, computed from its start, may differ from the pixel of `b` in the last bit.
+            col = math.nan
+    return clearance, fraction
+
+
+@inlined
+def _clearance_from_pixel(
+    heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats, start_col: float, start_row: float
+) -> tuple[float, float, float, float]:
+    """Return the results of `segment_clearance`, and the pixel coordinates of the segment's end.
+
+    start_col, start_row: pixel coordinates of `a`.
+    The end's column is NaN if the segment leaves the raster.
+    """
     piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE_M))
     min_clearance = math.inf
     min_fraction = 0.0
-    col1, row1 = polymap(to_pixel, a[0], a[1])
+    col1, row1 = start_col, start_row
     for piece in range(piece_count):
         start_fraction = piece / piece_count
         end_fraction = (piece + 1) / piece_count
@@ -165,11 +201,11 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
             heights, col0, row0, a[2] + start_fraction * (b[2] - a[2]), col1, row1, a[2] + end_fraction * (b[2] - a[2])
         )
         if math.isnan(clearance):
-            return math.nan, start_fraction + fraction * (end_fraction - start_fraction)
+            return math.nan, start_fraction + fraction * (end_fraction - start_fraction), math.nan, math.nan
         if clearance < min_clearance:
             min_clearance = clearance
             min_fraction = start_fraction + fraction * (end_fraction - start_fraction)
-    return min_clearance, min_fraction
+    return min_clearance, min_fraction, col1, row1
 
 
 @inlined

@@ -16,6 +16,7 @@ from typing import Any
 from benchmarks.campaigns.client_memory import client_memory
 from benchmarks.campaigns.compare_step_rates import compare_all
 from benchmarks.campaigns.winds_reference import winds_row
+from flight.simulation.setup import EngineChoice
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign, vary_flight
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
@@ -33,7 +34,7 @@ ROUNDS = 3
 _CORNERS = ((36.273, -84.28), (36.273, -84.23), (36.309, -84.23), (36.309, -84.28))
 
 
-def mission_13_km(folder: Path) -> CampaignBase:
+def mission_13_km(folder: Path, engine: EngineChoice = "auto") -> CampaignBase:
     """Make a mission of three legs of 4.0 to 4.5 km above the demo's ridges, in its wind."""
     lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.293\t-84.25\t1150\t1"]
     lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(_CORNERS, 1)]
@@ -46,6 +47,7 @@ def mission_13_km(folder: Path) -> CampaignBase:
         "seed": 1,
         "wind": (wind.speed, math.degrees(wind.from_course)),
         "turbulence": wind.turbulence,
+        "engine": engine,
     }
     return open_campaign(str(path), default_dispersions(), options)
 

@@ -36,7 +36,7 @@ def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) 
 
 def lead(flights: int, folder: Path) -> None:
     """Lead a campaign of so many flights, from its first to its report."""
-    base = open_campaign("jacksboro-air", default_dispersions(), seed=1)
+    base = open_campaign("jacksboro-air", default_dispersions(), {"seed": 1})
     goal = Goal(None, False, flights, 0.95)
     with open_store(base, goal, folder, resume=False) as store:
         estimate = fly_campaign(base, goal, Workers(1), store, fly=large_flight)

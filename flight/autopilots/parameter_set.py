@@ -8,6 +8,7 @@ autopilot's law reads.
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self, get_args
 
@@ -139,7 +140,7 @@ class ParameterTable:
         return values, notes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ParameterSet:
     """The parameters of an autopilot; each autopilot has a subclass with its own `table`.
 
@@ -267,7 +268,7 @@ class ParameterSet:
             parameter for parameter in map(find_value, cls.table.when_stated.values()) if parameter.origin != "default"
         ]
         parameter_set = cls((*map(find_value, cls.table.definitions), *stated_extras), unused, source, *fields)
-        value_by_name = {name: value for name, value, _ in parameter_set.values}
+        value_by_name = parameter_set._value_by_name
         for minimum, maximum in cls.table.pairs:
             if value_by_name[minimum] >= value_by_name[maximum]:
                 value, allowed = value_by_name[minimum], f"must be below {maximum} {value_by_name[maximum]:g}"
@@ -279,7 +280,12 @@ class ParameterSet:
     def __getitem__(self, name: str) -> float:
         """Return a parameter's value in SI and radians, by the autopilot's name; its default if the set lacks it."""
         definition = self.table.by_name[name]
-        return definition.to_si * next((value for known, value, _ in self.values if known == name), definition.default)
+        return definition.to_si * self._value_by_name.get(name, definition.default)
+
+    @cached_property
+    def _value_by_name(self) -> dict[str, float]:
+        """Values by name, in the autopilot's units."""
+        return {name: value for name, value, _ in self.values}
 
     def changed(self, origin: Origin = "file", /, **values: float) -> Self:
         """Return a copy with other values for some parameters, by the autopilot's names and in its units.

@@ -5,6 +5,7 @@ JSBSim provides latitudes and longitudes; all other code uses positions on the m
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,47 +41,62 @@ class LocalMap:
         The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raises FlightError if the map cannot be fitted, as
         for an area around a pole.
         """
-        origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.positions[:, :2], setup.scenario.bounds.T])
         min_corner, max_corner = points.min(axis=0) - MAP_MARGIN_M, points.max(axis=0) + MAP_MARGIN_M
-        outline = np.array(
-            [
-                [east, north]
-                for east in (min_corner[0], 0.5 * (min_corner[0] + max_corner[0]), max_corner[0])
-                for north in (min_corner[1], max_corner[1])
-            ]
+        return _fit_local_map(
+            setup.scenario.origin, tuple(min_corner.tolist()), tuple(max_corner.tolist()), setup.mission.source
         )
-        lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
-        # Longitudes relative to the origin, so that an area may include the 180th meridian.
-        origin_longitude = math.radians(origin.lon_deg)
-        lon = origin_longitude + (lon - origin_longitude + math.pi) % (2.0 * math.pi) - math.pi
-        bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
-        if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
-            raise FlightError(f"{setup.mission.source}: the area contains a pole", file=setup.mission.source)
-
-        def position(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
-            return to_map(origin, np.degrees(latitude), np.degrees(longitude))
-
-        def angle(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
-            step = 1e-5
-            east0, north0 = position(latitude - step, longitude)
-            east1, north1 = position(latitude + step, longitude)
-            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(latitude)
-
-        center_longitude = float((bounds[1, 0] + bounds[1, 1]) / 2)
-        local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), center_longitude)
-        if not (local.position.residual <= MAX_MAP_ERRORS[0] and local.angle.residual <= MAX_MAP_ERRORS[1]):
-            raise FlightError(
-                f"{setup.mission.source}: the area is too large to fly in: its map has an error "
-                f"of {local.position.residual:.2g} m; {MAX_MAP_ERRORS[0]:g} m is allowed",
-                file=setup.mission.source,
-            )
-        return local
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
         """Return the grid convergence at a position, rad: the map course of true north."""
         lon = self.center_longitude + math.remainder(math.radians(lon_deg) - self.center_longitude, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
+
+
+@lru_cache(maxsize=4)
+def _fit_local_map(
+    origin: GeoOrigin, min_corner: tuple[float, float], max_corner: tuple[float, float], source: str
+) -> LocalMap:
+    """Fit a local map over a rectangle of the map; the flights of a campaign share it.
+
+    min_corner, max_corner: corners of the rectangle, east and north, m.
+    source: file of the mission, for messages.
+
+    Raises FlightError if the map cannot be fitted.
+    """
+    outline = np.array(
+        [
+            [east, north]
+            for east in (min_corner[0], 0.5 * (min_corner[0] + max_corner[0]), max_corner[0])
+            for north in (min_corner[1], max_corner[1])
+        ]
+    )
+    lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+    # Longitudes relative to the origin, so that an area may include the 180th meridian.
+    origin_longitude = math.radians(origin.lon_deg)
+    lon = origin_longitude + (lon - origin_longitude + math.pi) % (2.0 * math.pi) - math.pi
+    bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
+    if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
+        raise FlightError(f"{source}: the area contains a pole", file=source)
+
+    def position(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+        return to_map(origin, np.degrees(latitude), np.degrees(longitude))
+
+    def angle(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+        step = 1e-5
+        east0, north0 = position(latitude - step, longitude)
+        east1, north1 = position(latitude + step, longitude)
+        return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(latitude)
+
+    center_longitude = float((bounds[1, 0] + bounds[1, 1]) / 2)
+    local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), center_longitude)
+    if not (local.position.residual <= MAX_MAP_ERRORS[0] and local.angle.residual <= MAX_MAP_ERRORS[1]):
+        raise FlightError(
+            f"{source}: the area is too large to fly in: its map has an error "
+            f"of {local.position.residual:.2g} m; {MAX_MAP_ERRORS[0]:g} m is allowed",
+            file=source,
+        )
+    return local
 
 
 class Ground:

@@ -136,8 +136,8 @@ TICK_S = 1.0 / 60.0
 BLOCK_DURATION_S = 1.0
 # The same for a flight that is neither recorded nor shown; 40 us are spent in Python for each block.
 LONG_BLOCK_DURATION_S = 10.0
-# Number of rows that are kept as they were flown, before they are stored in a track.
-_MAX_PENDING_ROWS = 36_000
+# Smallest number of rows by which a track under construction is enlarged.
+_MIN_ADDED_ROWS = 6_000
 # Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
 BANK_RESERVE_RAD = math.radians(3.0)
 # Time added to the time limit of a flight that takes off or lands, s.
@@ -232,33 +232,27 @@ class TrackBuilder:
     def __init__(self) -> None:
         no_rows = as_track(join_rows([]))
         self._columns = {name: getattr(no_rows, name).copy() for name in COLUMNS}
-        self._pending_rows: list[Rows] = []
-        self._pending_row_count = 0
+        self._row_count = 0
 
     def add(self, rows: Rows) -> None:
         """Add rows that follow the rows added before."""
-        self._pending_rows.append(rows)
-        self._pending_row_count += len(rows)
-        if self._pending_row_count >= _MAX_PENDING_ROWS:
-            self._store_pending_rows()
+        start, self._row_count = self._row_count, self._row_count + len(rows)
+        if self._row_count > len(self._columns["time"]):
+            self._set_capacity(max(self._row_count + _MIN_ADDED_ROWS, int(1.5 * self._row_count)))
+        for name, column in self._columns.items():
+            column[start : self._row_count] = rows[name]
 
     def track(self) -> Track:
         """Return the track of all rows; no rows can be added afterwards."""
-        self._store_pending_rows()
+        self._set_capacity(self._row_count)
         for column in self._columns.values():
             column.setflags(write=False)
         return Track(**self._columns)
 
-    def _store_pending_rows(self) -> None:
-        for name, column in self._columns.items():
-            row_count = len(column)
-            # Enlarge the array in place: a copy of a long flight takes as much memory again.
-            column.resize((row_count + self._pending_row_count, *column.shape[1:]), refcheck=False)
-            for rows in self._pending_rows:
-                column[row_count : row_count + len(rows)] = rows[name]
-                row_count += len(rows)
-        self._pending_rows.clear()
-        self._pending_row_count = 0
+    def _set_capacity(self, row_count: int) -> None:
+        for column in self._columns.values():
+            # Resize the array in place: a copy of a long flight takes as much memory again.
+            column.resize((row_count, *column.shape[1:]), refcheck=False)
 
 
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.

@@ -199,9 +199,7 @@ def quantise(rows: Rows) -> Rows:
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
-    numbers = _as_matrix(rows).copy()
-    _round_to_steps(numbers[:, 1:], _STEPS_PER_UNIT)
-    return numbers.view(TRACK_ROW)[:, 0]
+    return _round_to_steps(_as_matrix(rows), _STEPS_PER_UNIT).view(TRACK_ROW)[:, 0]
 
 
 def _as_matrix(rows: Rows) -> Floats:
@@ -210,17 +208,19 @@ def _as_matrix(rows: Rows) -> Floats:
 
 
 @compiled
-def _round_to_steps(values: Floats, steps: Floats) -> None:
-    """Round values in place to multiples of a step in each column.
+def _round_to_steps(values: Floats, steps: Floats) -> Floats:
+    """Return values (t, 1 + n) with each column but the first rounded to multiples of the column's step.
 
-    values: (t, n).
-    steps: number of steps per unit for each column, (n,).
+    steps: number of steps per unit for each rounded column, (n,).
     """
     units = 1.0 / steps
+    rounded = np.empty(values.shape)
     for row in range(values.shape[0]):
+        rounded[row, 0] = values[row, 0]
         for k in range(steps.size):
             # Adding 0.0 removes a negative zero.
-            values[row, k] = np.rint(values[row, k] * steps[k]) * units[k] + 0.0
+            rounded[row, k + 1] = np.rint(values[row, k + 1] * steps[k]) * units[k] + 0.0
+    return rounded
 
 
 def join_rows(parts: Sequence[Rows]) -> Rows:

@@ -136,8 +136,8 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
     for start, end in zip(legs[:-1, :2], legs[1:, :2], strict=True):
         leg_vector, offsets = end - start, points[:, :2] - start
         fractions = np.clip(offsets @ leg_vector / max(float(leg_vector @ leg_vector), 1e-12), 0.0, 1.0)
-        leg_offsets = offsets - fractions[:, None] * leg_vector
-        min_squared_distances = np.minimum(min_squared_distances, (leg_offsets * leg_offsets).sum(axis=1))
+        east, north = (offsets[:, axis] - fractions * leg_vector[axis] for axis in range(2))
+        min_squared_distances = np.minimum(min_squared_distances, east * east + north * north)
     row = int(np.argmax(min_squared_distances))
     return math.sqrt(float(min_squared_distances[row])), row
 

@@ -15,7 +15,7 @@ from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
 from world.kernels import compiled, inner, read_only
-from world.terrain import Terrain, segment_clearance
+from world.terrain import Terrain, path_clearances, segment_clearance
 
 # Number of segments that share one bounding box.
 _BLOCK_SEGMENTS = 256
@@ -30,18 +30,14 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
     points: ends of the segments, m, (n, 3).
     """
-    clearance, fraction = _segment_clearances(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
+    clearance, fraction = _path_clearances(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
     return clearance, fraction
 
 
 @compiled
-def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
+def _path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
     """Return each segment's minimum height above ground, and where it occurs; see `path_clearance`."""
-    count = max(0, points.shape[0] - 1)
-    clearance, fraction = np.empty(count), np.empty(count)
-    for k in range(count):
-        clearance[k], fraction[k] = segment_clearance(heights, to_pixel, points[k], points[k + 1])
-    return clearance, fraction
+    return path_clearances(heights, to_pixel, points)
 
 
 class SphereVisits(NamedTuple):
@@ -284,7 +280,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return clearances as `_segment_clearances` does, but NaN for segments with an implausible end."""
+    """Return clearances as `_path_clearances` does, but NaN for segments with an implausible end."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)

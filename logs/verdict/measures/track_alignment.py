@@ -274,8 +274,9 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
             ("wind", MAX_PLAUSIBLE_VALUE),
         )
     for name, bound in plausible_bounds:
-        # The comparison is False for NaN.
-        is_usable &= (np.abs(getattr(track, name)) <= bound).all(axis=1)
+        # Column by column: a reduction of rows of three takes four times as long.  The comparison is False for NaN.
+        for column in getattr(track, name).T:
+            is_usable &= np.abs(column) <= bound
     time = np.where(is_usable, track.time, -math.inf)
     latest_before = np.concatenate([[-math.inf], np.maximum.accumulate(time)[:-1]]) if time.size else time
     return np.asarray(is_usable & (time > latest_before))

@@ -1,6 +1,7 @@
 """Time, exposure and closest distance of a path inside spheres, against closed forms and the segments one by one."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from logs.verdict.measures.path_sweeps import passages, path_clearance, path_spheres, segment_clearances
 from tests.synthetic import make_scenario
 from world.geometry import segment_exposure
-from world.terrain import make_flat_terrain
+from world.terrain import make_flat_terrain, make_gridded_terrain
 
 STRAIGHT = np.column_stack([np.linspace(0.0, 4000.0, 1001), np.zeros(1001), np.full(1001, 300.0)])
 TIME = np.linspace(0.0, 160.0, 1001)
@@ -56,6 +57,23 @@ def test_heights_above_flat_ground() -> None:
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, STRAIGHT)
     assert low.shape == (1000,)
     np.testing.assert_allclose(low, 180.0, atol=1e-4)
+
+
+def test_a_path_has_the_heights_of_its_segments_bit_for_bit() -> None:
+    """Close and far points, points whose step is inexact in floating point, and a path that leaves the raster."""
+    random = np.random.default_rng(5)
+    heights = random.uniform(100.0, 900.0, (16, 25))
+    ground = make_gridded_terrain(
+        heights, np.linspace(-1e3, 1400.0, 25), np.linspace(-800.0, 700.0, 16), source="t", sha256="", datum="msl"
+    )
+    far = random.uniform([-900.0, -700.0, 500.0], [1300.0, 600.0, 900.0], (60, 3))
+    close = np.array([0.1, 0.3, 600.0]) + np.cumsum(random.normal(0.0, 0.4, (300, 3)), axis=0)
+    # 0.1 + (2000.1 - 0.1) is not 2000.1.
+    points = np.vstack([far, close, [[0.1, 0.3, 700.0], [2000.1, 0.3, 700.0]], far[:9]])
+    clearance, fraction = path_clearance(ground.heights, ground.to_pixel.record, points)
+    alone = [ground.clearance(start, end) for start, end in pairwise(points)]
+    np.testing.assert_array_equal(np.column_stack([clearance, fraction]), np.array(alone))
+    assert int(np.isnan(clearance).sum()) == 2
 
 
 # ----------------------------------------------------------------------
