@@ -309,8 +309,7 @@ def scenario_from_spec(
         raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from", file=source, field="area")
     if ground is None:
         if raster is not None:
-            require_covered(raster, origin, bounds)
-            ground = read_terrain(raster, origin, bounds, GROUND_BUFFER)
+            ground = _read_terrain_of_area(raster, origin, bounds)
         else:
             ground = _make_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
@@ -425,8 +424,7 @@ def _assemble_scenario(
     max_ground = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
     ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else max_ground + 1000.0
     if not replaced:
-        for name, table in (("start", spec.start), ("destination", spec.destination)):
-            check_in_area(name, np.array(map_coordinates(table, origin)), source, bounds, origin)
+        _check_ends_in_area(spec, source, origin, bounds)
     start = map_position(spec.start, "start", source, origin, ground)
     destination = map_position(spec.destination, "destination", source, origin, ground)
     # If the terrain was replaced, the verdict reports ends below the new ground.
@@ -438,10 +436,8 @@ def _assemble_scenario(
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start", file=source, field="destination")
-    weather, start_up = spec.wind, float(start[2])
-    wind = Wind(
-        weather.speed_mps, math.radians(weather.from_deg), weather.gradient, weather.turbulence, weather.seed, start_up
-    )
+    table, start_up = spec.wind, float(start[2])
+    wind = Wind(table.speed_mps, math.radians(table.from_deg), table.gradient, table.turbulence, table.seed, start_up)
     return Scenario(
         name=spec.name,
         spec=spec,
@@ -467,6 +463,18 @@ def _assemble_scenario(
         returns=make_return_requirements(spec.returns, source, origin, ground),
         link=make_link(spec.link, source, origin, ground),
     )
+
+
+def _read_terrain_of_area(raster: RasterFile, origin: GeoOrigin, bounds: Floats) -> Terrain:
+    """Read the terrain of a scenario's area. Raises TerrainError if the area extends beyond the elevation file."""
+    require_covered(raster, origin, bounds)
+    return read_terrain(raster, origin, bounds, GROUND_BUFFER)
+
+
+def _check_ends_in_area(spec: ScenarioFile, source: str, origin: GeoOrigin, bounds: Floats) -> None:
+    """Raise ScenarioError for a start or destination outside the area."""
+    for name, table in (("start", spec.start), ("destination", spec.destination)):
+        check_in_area(name, np.array(map_coordinates(table, origin)), source, bounds, origin)
 
 
 def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:

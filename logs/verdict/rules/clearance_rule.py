@@ -94,11 +94,14 @@ def _off_terrain_text(requirements: RouteRequirements, terrain: Terrain, places:
     if not is_off.any():
         return ""
     east, north = places[int(np.argmax(is_off)), :2].tolist()
+    place_text = f"east {east:.0f} m, north {north:.0f} m{_geographic_text(requirements, east, north)}"
+    return f"leaves the data of {terrain.source} at {place_text}"
+
+
+def _geographic_text(requirements: RouteRequirements, east: float, north: float) -> str:
+    """Return the latitude and longitude of a map position, m, in brackets."""
     lat, lon = to_geo(requirements.setup.scenario.origin, east, north)
-    return (
-        f"leaves the data of {terrain.source} at east {east:.0f} m, north {north:.0f} m"
-        f" (latitude {float(lat):.5f}, longitude {float(lon):.5f})"
-    )
+    return f" (latitude {float(lat):.5f}, longitude {float(lon):.5f})"
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
@@ -314,23 +317,15 @@ def _flown_finding(
             )
             k = first + row
             min_clearance = float(aligned.clearance[k])
-            reason = (
-                f"{min_clearance:.1f} m above ground"
-                f" {_time_and_place_text(aligned, k, float(aligned.clearance_fraction[k]))}"
-            )
+            fraction = float(aligned.clearance_fraction[k])
+            reason = f"{min_clearance:.1f} m above ground {_time_and_place_text(aligned, k, fraction)}"
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
         if not is_known.all():
             k = first + int(np.argmin(is_known))
-            east, north = aligned.track.position[k, :2].tolist()
-            lat, lon = to_geo(requirements.setup.scenario.origin, east, north)
-            off_text = (
-                f"flown outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
-                f" (latitude {float(lat):.5f}, longitude {float(lon):.5f})"
-            )
-            if ok is not False:
-                ok, reason = None, off_text if math.isnan(min_clearance) else f"{off_text}; {reason} elsewhere"
-            else:
-                reason = f"{reason}; outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
+            off_text = f"flown outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
+            off_text += _geographic_text(requirements, *aligned.track.position[k, :2].tolist())
+            reason = off_text if math.isnan(min_clearance) else f"{reason}; {off_text}"
+            ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)

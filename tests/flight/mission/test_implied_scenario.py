@@ -118,7 +118,7 @@ def test_a_mission_off_the_tile_is_refused() -> None:
 def test_the_ground_is_known_up_to_the_last_pixel_and_unknown_beyond() -> None:
     """Also close to the corner of the file, where no upright box of the map fits into it."""
     raster = open_raster("jacksboro")
-    west, north = (float(value) for value in raster.to_lon_lat(0.0, 0.0))
+    west, north = (float(values[0]) for values in raster.to_lon_lat(np.zeros(1), np.zeros(1)))
     # 1 m and 3 m inside the outer pixel centres; a degree of longitude is 89.6 km here.
     inside = f"0 16 0 0 0 0 {north - 1.0 / 110_960.0} {west + 3.0 / 89_600.0} 900"
     for_all = implied_scenario(mission(inside, "0 16 0 0 0 0 36.4 -84.3 900"), "jacksboro").scenario
