@@ -193,7 +193,7 @@ def make_home(
     if table is None:
         return None
     position = (float(start[0]), float(start[1])) if table.place == "start" else map_coordinates(table, origin)
-    return _position_on_ground("home", position, source, ground, bounds)
+    return _position_on_ground("home", position, source, ground, bounds, origin)
 
 
 def make_launch(table: LaunchTable | None) -> Launch | None:
@@ -215,7 +215,7 @@ def make_landing(
     if table is None:
         return None
     position = map_coordinates(table, origin)
-    _position_on_ground("landing", position, source, ground, bounds)
+    _position_on_ground("landing", position, source, ground, bounds, origin)
     course = None if isinstance(table.course_deg, str) else math.radians(table.course_deg)
     slope = None if table.slope_deg is None else math.radians(table.slope_deg)
     return LandingStrip(*position, course, table.length_m, table.width_m, table.approach_m, slope, table.height_sd_m)
@@ -240,10 +240,15 @@ def make_return_requirements(
 
 
 def _position_on_ground(
-    key: str, position: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats
+    key: str,
+    position: tuple[float, float],
+    source: str,
+    ground: Terrain | None,
+    bounds: Floats,
+    origin: GeoOrigin,
 ) -> Floats:
     """Return a position with its ground height added, (3,) m. Raises ScenarioError as `make_home` does."""
-    check_in_area(key, np.array(position), source, bounds)
+    check_in_area(key, np.array(position), source, bounds, origin)
     ground_height = float(ground.height(*position)) if ground is not None else math.nan
     if math.isnan(ground_height):
         message = (

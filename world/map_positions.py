@@ -6,7 +6,7 @@ import numpy as np
 
 from world.arrays import Floats
 from world.errors import ScenarioError
-from world.frames import GeoOrigin, to_map
+from world.frames import GeoOrigin, to_geo, to_map
 from world.scenario_tables import PointTable, PositionTable, ThreatTable
 from world.terrain import Terrain
 from world.threats import Threats, threat_label
@@ -33,17 +33,19 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
         return np.array([east, north, table.amsl_m])
     ground_height = float(ground.height(east, north)) if ground is not None else math.nan
     if math.isnan(ground_height):
+        lat, lon = to_geo(origin, east, north)
+        terrain = "no terrain there" if ground is None else f"no terrain there ({ground.source} has no data)"
         raise ScenarioError(
-            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m: no terrain there to "
-            "measure a height from; give amsl_m",
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m (latitude {float(lat):.5f}, longitude"
+            f" {float(lon):.5f}): {terrain} to measure a height from; give amsl_m",
             file=source,
             field=key,
         )
     return np.array([east, north, ground_height + (table.height_m or 0.0)])
 
 
-def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
-    """Raise ScenarioError for a position outside the area.
+def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: GeoOrigin) -> None:
+    """Raise ScenarioError for a position outside the area, with its distance from the area.
 
     point: (2,) or (3,) m.
     bounds: area, (2, 2) m.
@@ -51,24 +53,27 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
     for axis, name in enumerate(("east", "north")):
         min_coordinate, max_coordinate = bounds[axis]
         if not min_coordinate <= point[axis] <= max_coordinate:
-            value_text, allowed = (
-                f"{name} {point[axis]:.0f} m",
-                f"outside the area {min_coordinate:.0f}..{max_coordinate:.0f}",
+            outside = max(min_coordinate - point[axis], point[axis] - max_coordinate)
+            allowed = (
+                f"outside the area {min_coordinate:.0f}..{max_coordinate:.0f} by {outside:.0f} m"
+                f" (the area covers {_area_text(bounds, origin)})"
             )
-            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=value_text)
+            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=f"{name} {point[axis]:.0f} m")
 
 
-def check_inside(
-    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
-) -> None:
-    """Raise ScenarioError for a start or destination outside the area and its altitudes, or in the ground.
+def _area_text(bounds: Floats, origin: GeoOrigin) -> str:
+    """Return the range of latitudes and longitudes of an area, (2, 2) m, as text."""
+    lat, lon = to_geo(origin, bounds[0, [0, 1, 0, 1]], bounds[1, [0, 0, 1, 1]])
+    return f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
+
+
+def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: float, ground: Terrain | None) -> None:
+    """Raise ScenarioError for a start or destination outside the altitudes of the area, or in the ground.
 
     key, source: names of the point and its file in messages.
     point: (3,) m.
-    bounds: area, (2, 2) m.
     floor, ceiling: m AMSL.
     """
-    check_in_area(key, point, source, bounds)
     amsl = f"{point[2]:.0f} m AMSL"
     if not floor <= point[2] <= ceiling:
         allowed = f"outside floor..ceiling {floor:.0f}..{ceiling:.0f}"

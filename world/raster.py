@@ -22,7 +22,7 @@ from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
 from world.elevation_tiles import join_tiles, tile_files
 from world.errors import TerrainError
 from world.files import did_you_mean
-from world.frames import GeoOrigin, fit_polymap, to_geo, to_map
+from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
 from world.gdal_raster import PIXELS_AT_ONCE, open_geotiff, open_hgt
 from world.height_datum import HeightDatum, StatedDatum, height_datum
 from world.raster_file import (
@@ -259,9 +259,10 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     """Read the part of a raster that covers an area of the map and a buffer around it.
 
     bounds: area, [[e0, e1], [n0, n1]] m.
-    buffer: width of the buffer, m; it is clipped at the tile's edge without a message.
+    buffer: width of the buffer, m.
 
-    Raises TerrainError if the area extends beyond the tile, if data is missing inside it, or if it has too many pixels.
+    Ground beyond the tile, and ground without data, is unknown: `require_covered` and `require_no_holes` refuse it.
+    Raises TerrainError if no ground in the area is known, or if it has too many pixels.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -270,17 +271,14 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     """
     box = np.asarray(bounds, dtype=np.float64)
     rows, cols = raster.shape
-    if not is_covered(raster, origin, box):
-        raise TerrainError(
-            f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
-            f"reaches beyond the tile, which covers {_tile_extent_text(raster, origin)}",
-            file=raster.name,
-            field="area",
-            value=box.tolist(),
-        )
     c0, c1, r0, r1 = _outline_window(raster, origin, box, buffer)
+    # A coordinate system has no pixels far outside its region.
+    if not np.isfinite([c0, c1, r0, r1]).all():
+        raise _no_data_error(raster)
     left, right = max(0, math.floor(c0) - 1), min(cols, math.ceil(c1) + 2)
     top, bottom = max(0, math.floor(r0) - 1), min(rows, math.ceil(r1) + 2)
+    if right - left < 2 or bottom - top < 2:
+        raise _no_data_error(raster)
     if (right - left) * (bottom - top) > MAX_PIXELS:
         raise TerrainError(
             f"{raster.name}: the area needs {(right - left) * (bottom - top):,} pixels;"
@@ -299,14 +297,28 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
         raise TerrainError(
             f"{raster.name}: the area is too large to map: {to_pixel.residual:.2g} pixels of error", file=raster.name
         )
-    centre = box.mean(axis=1)
-    col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
-    # Columns and rows per metre of the map; the spacing is the length of the shorter pixel side.
-    per_metre = np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
-    spacing = float(np.min(np.linalg.norm(np.linalg.inv(per_metre), axis=0)))
-    terrain = Terrain(heights, to_pixel, spacing, raster.name, raster.sha256, raster.datum.text)
-    _check_holes(terrain, box, per_metre)
-    return terrain
+    # The length of the shorter pixel side.
+    spacing = float(np.min(np.linalg.norm(np.linalg.inv(_pixels_per_metre(to_pixel, box)), axis=0)))
+    if np.isnan(heights).all():
+        raise _no_data_error(raster)
+    return Terrain(heights, to_pixel, spacing, raster.name, raster.sha256, raster.datum.text)
+
+
+def _no_data_error(raster: RasterFile) -> TerrainError:
+    return TerrainError(f"{raster.name}: no data in the area; the file covers {cover_text(raster)}", file=raster.name)
+
+
+def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) -> None:
+    """Raise TerrainError if an area [[e0, e1], [n0, n1]], m, extends beyond the outer pixel centres of the tile."""
+    box = np.asarray(bounds, dtype=np.float64)
+    if not is_covered(raster, origin, box):
+        raise TerrainError(
+            f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
+            f"reaches beyond the tile, which covers {_tile_extent_text(raster, origin)} ({cover_text(raster)})",
+            file=raster.name,
+            field="area",
+            value=box.tolist(),
+        )
 
 
 def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
@@ -354,15 +366,20 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
         heights[row_slice] -= (upper + (lower - upper) * fraction[row_slice]).astype(np.float32)
 
 
-def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
-    """Raise TerrainError if a height inside the box depends on a pixel without data.
+def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
+    """Return columns and rows per metre of the map, (2, 2), in the centre of a box."""
+    centre = box.mean(axis=1)
+    col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
+    return np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
 
-    per_metre: (2, 2) columns and rows per metre of the map, in the centre of the box.
-    """
+
+def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
+    """Raise TerrainError if a height inside an area [[e0, e1], [n0, n1]], m, depends on a pixel without data."""
+    box = np.asarray(bounds, dtype=np.float64)
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:
         return
-    to_map_metres = np.linalg.inv(per_metre)
+    to_map_metres = np.linalg.inv(_pixels_per_metre(terrain.to_pixel, box))
     # Each height is interpolated from the four pixels around it.
     footprint = np.abs(to_map_metres).sum(axis=1)[:, None]
     for first_hole in range(0, rows.size, _HOLES_PER_STEP):
@@ -377,7 +394,8 @@ def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
             east, north = positions[:, int(np.argmax(is_inside))]
             raise TerrainError(
                 f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m ({rows.size:,} of "
-                f"{terrain.heights.size:,} pixels in and about the area have none); choose an area with data",
+                f"{terrain.heights.size:,} pixels in and about the area have none);"
+                " choose an area with data, or fill the holes of the file",
                 file=terrain.source,
             )
 

@@ -29,9 +29,9 @@ from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
-from world.map_positions import check_inside, make_threats, map_position
+from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
 from world.radio import RadioLink, make_link
-from world.raster import open_tiles, read_terrain, tile_bounds
+from world.raster import open_tiles, read_terrain, require_covered, tile_bounds
 from world.raster_file import RasterFile
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
@@ -309,7 +309,7 @@ def scenario_from_spec(
         raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from", file=source, field="area")
     if ground is None:
         if raster is not None:
-            ground = read_terrain(raster, origin, bounds, GROUND_BUFFER)
+            ground = _read_terrain_of_area(raster, origin, bounds)
         else:
             ground = _make_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
@@ -423,12 +423,14 @@ def _assemble_scenario(
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
     max_ground = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
     ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else max_ground + 1000.0
+    if not replaced:
+        _check_ends_in_area(spec, source, origin, bounds)
     start = map_position(spec.start, "start", source, origin, ground)
     destination = map_position(spec.destination, "destination", source, origin, ground)
     # If the terrain was replaced, the verdict reports ends below the new ground.
     ends = () if replaced else (("start", start), ("destination", destination))
     for name, point in ends:
-        check_inside(name, point, source, bounds, floor, ceiling, ground)
+        check_altitude(name, point, source, floor, ceiling, ground)
     zones = make_zones(_active_zones(spec), source, origin, ground)
     # The ends of an external mission are its own waypoints: the verdict reports zones that they violate.
     check_ends(zones, source, ends if zones and not external else (), ground)
@@ -461,6 +463,18 @@ def _assemble_scenario(
         returns=make_return_requirements(spec.returns, source, origin, ground),
         link=make_link(spec.link, source, origin, ground),
     )
+
+
+def _read_terrain_of_area(raster: RasterFile, origin: GeoOrigin, bounds: Floats) -> Terrain:
+    """Read the terrain of a scenario's area. Raises TerrainError if the area extends beyond the elevation file."""
+    require_covered(raster, origin, bounds)
+    return read_terrain(raster, origin, bounds, GROUND_BUFFER)
+
+
+def _check_ends_in_area(spec: ScenarioFile, source: str, origin: GeoOrigin, bounds: Floats) -> None:
+    """Raise ScenarioError for a start or destination outside the area."""
+    for name, table in (("start", spec.start), ("destination", spec.destination)):
+        check_in_area(name, np.array(map_coordinates(table, origin)), source, bounds, origin)
 
 
 def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:

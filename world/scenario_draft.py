@@ -12,7 +12,7 @@ from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import cover_text, is_covered, read_terrain, tile_bounds
+from world.raster import cover_text, is_covered, read_terrain, require_covered, require_no_holes, tile_bounds
 from world.raster_file import RasterFile
 
 # Width of terrain on either side of the straight line, for detours, as a fraction of the line's length.
@@ -146,7 +146,10 @@ def _survey_ground(
                 message = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
                 raise ArgumentError.of_argument(keyword, position, message, shown=_position_text(position))
         try:
-            return bounds, float(np.nanmax(read_terrain(raster, origin, bounds, 0.0).heights))
+            require_covered(raster, origin, bounds)
+            ground = read_terrain(raster, origin, bounds, 0.0)
+            require_no_holes(ground, bounds)
+            return bounds, float(np.nanmax(ground.heights))
         except TerrainError:
             if fraction == _MARGIN_REDUCTIONS[-1]:
                 raise

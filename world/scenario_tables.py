@@ -454,14 +454,15 @@ class FlightTable(ScenarioTable):
     arduplane_version: release of autopilot = "ardupilot", as releases fly differently; None for the release of the
         parameter file, or otherwise for the newest.
     px4_version: release of autopilot = "px4"; None for the release of the parameter file, or otherwise for the newest.
+    max_bank_deg: bank limit in turns; None for the lower limit of aircraft and autopilot.
     guidance: guidance law of "planfly".
     nav: navigation accuracy, see `flight.guidance.navigation_error`.
     """
 
     aircraft: FilePath = "aerosonde"  # the name of a built-in aircraft, or a folder if it has a slash
     aircraft_by_default: Literal[True] | None = None  # set if no aircraft was named for a mission
-    airspeed_mps: Annotated[float, in_range(15.0, 60.0)] | None = None
-    max_bank_deg: Annotated[float, in_range(5.0, 60.0)] = 30.0
+    airspeed_mps: Annotated[float, in_range(3.0, 150.0)] | None = None
+    max_bank_deg: Annotated[float, in_range(5.0, 60.0)] | None = None
     autopilot: Name | None = None
     autopilot_from: FilePath | None = None  # set if the autopilot was inferred from a file
     params: FilePath | None = None

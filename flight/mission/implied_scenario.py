@@ -13,7 +13,7 @@ from flight.mission.placing import MAX_ALTITUDE_M, PlacedMission, place_stops, p
 from world.arrays import Floats
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import open_raster, read_terrain, tile_bounds
+from world.raster import cover_text, open_raster, read_terrain
 from world.scenario import GROUND_BUFFER, Scenario, scenario_from_spec
 from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
@@ -23,11 +23,6 @@ AREA_MARGIN_M = 2000.0
 # Largest distance between home and the first position, m: ground stations write a default position if no home was set,
 # so that a more distant home does not belong to the mission.
 _MAX_HOME_DISTANCE_M = 100_000.0
-
-
-# Bank limit of a scenario that states none, degrees: the largest of any scenario, so that aircraft and autopilot
-# decide.
-_MAX_BANK_DEG = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,17 +38,17 @@ def implied_scenario(
 ) -> ImpliedScenario:
     """Build a scenario around a mission that came without one: an area, no threats and default limits.
 
-    The scenario's ``external`` is True, and it limits no bank unless ``flight`` states a limit.
+    The scenario's ``external`` is True.
 
     terrain_path: an elevation file or a built-in name; None for no terrain.
     flight: the scenario's [flight] table; None for the defaults.
     vertical_legs: see `flight.mission.placing.place_stops`.
 
-    The area is the bounding box of the mission's positions and loiters, with a margin of 2 km, clipped at the edge of
-    the terrain; for a mission that ends with an RTL it includes the nearest rally point. Start and destination are the
-    first and last of these positions. If they are not above ground, they are raised to 1 m above it, as a scenario
-    requires; the route and its verdict keep the mission's altitudes. Raises MissionError, or TerrainError if the
-    mission leaves the terrain.
+    The area is the bounding box of the mission's positions and loiters, with a margin of 2 km; for a mission that ends
+    with an RTL it includes the nearest rally point. Start and destination are the first and last of these positions. If
+    they are not above ground, they are raised to 1 m above it, as a scenario requires; the route and its verdict keep
+    the mission's altitudes. A part of the mission may lie where the terrain is unknown. Raises MissionError, or
+    TerrainError if the ground is unknown at all positions of the mission.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -65,12 +60,11 @@ def implied_scenario(
     (True, [[-2000.0, 2000.0], [-2000.0, 3110.0]])
     """
     flight = flight or FlightTable(aircraft_by_default=True)
-    if "max_bank_deg" not in flight.model_fields_set:
-        flight = flight.model_copy(update={"max_bank_deg": _MAX_BANK_DEG})
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
-    area, flown_box = _area_and_flown_box(mission, itinerary, origin)
-    terrain, table, area = _load_terrain(terrain_path, origin, area, flown_box)
+    points = project_stops(mission.source, itinerary.stops, origin)
+    area = _mission_area(mission, itinerary, origin, points)
+    terrain, table = _load_terrain(terrain_path, origin, area, points)
     placed_mission = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
     max_altitude = max(placed_stop.map_position[2] for placed_stop in placed_mission.stops)
     if terrain is not None:
@@ -115,10 +109,9 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
     return origin
 
 
-def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
-    """Return the area, and the bounding box of the mission's positions; both (2, 2) [[e0, e1], [n0, n1]] m."""
+def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, points: Floats) -> Floats:
+    """Return the area around a mission, (2, 2) [[e0, e1], [n0, n1]] m.  points: positions of its stops, (n, 2) m."""
     stops = itinerary.stops
-    points = project_stops(mission.source, stops, origin)
     flown_box = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     margin = AREA_MARGIN_M + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     area = flown_box
@@ -135,32 +128,35 @@ def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigi
                 ],
                 axis=1,
             )
-    return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT), flown_box
+    return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT)
 
 
 def _load_terrain(
-    path: str | None, origin: GeoOrigin, area: Floats, flown_box: Floats
-) -> tuple[Terrain | None, TerrainTable, Floats]:
-    """Return the terrain, the scenario's [terrain] table, and the area clipped at the edge of the terrain's file.
+    path: str | None, origin: GeoOrigin, area: Floats, points: Floats
+) -> tuple[Terrain | None, TerrainTable]:
+    """Return the terrain and the scenario's [terrain] table.
 
-    Raises TerrainError if the file does not cover ``flown_box``.
+    points: positions of the mission's stops, (n, 2) m.
+
+    Raises TerrainError if the ground is unknown at all of these positions, as in the file of another region.
     """
     if path is None:
-        return None, TerrainTable(kind="none"), area
+        return None, TerrainTable(kind="none")
     raster = open_raster(path)
-    tile = tile_bounds(raster, origin)
-    clipped_area = np.stack([np.maximum(area[:, 0], tile[:, 0]), np.minimum(area[:, 1], tile[:, 1])], axis=1)
-    if not ((clipped_area[:, 0] <= flown_box[:, 0]) & (flown_box[:, 1] <= clipped_area[:, 1])).all():
-        lons, lats = raster.corners.T
-        raise TerrainError(
-            f"{path}: the mission flies to {_position_text(*to_geo(origin, *flown_box))}; the terrain covers"
-            f" {_position_text(lats, lons)}",
-            file=path,
-        )
     file = Path(path)
-    terrain_path = str(file.resolve()) if file.is_file() else path
-    table = TerrainTable(kind="dem", path=terrain_path, sha256=raster.sha256)
-    return read_terrain(raster, origin, clipped_area, GROUND_BUFFER), table, clipped_area
+    table = TerrainTable(kind="dem", path=str(file.resolve()) if file.is_file() else path, sha256=raster.sha256)
+    lat, lon = to_geo(origin, *points.T)
+    (cols, rows), (row_count, col_count) = raster.to_pixels(lon, lat), raster.shape
+    # False for a position that the file's coordinate system cannot express (NaN or inf).
+    if ((cols >= 0.0) & (cols <= col_count - 1.0) & (rows >= 0.0) & (rows <= row_count - 1.0)).any():
+        terrain = read_terrain(raster, origin, area, GROUND_BUFFER)
+        if np.isfinite(terrain.height(points[:, 0], points[:, 1])).any():
+            return terrain, table
+    raise TerrainError(
+        f"{path}: no data at any position of the mission, which flies to {_position_text(lat, lon)};"
+        f" the terrain covers {cover_text(raster)}",
+        file=path,
+    )
 
 
 def _position_text(lats: Floats, lons: Floats) -> str:

@@ -385,8 +385,9 @@ def _draw_labels(
         """Write one label at a projected point."""
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
-    write("start", corners[0], "end")
-    write("destination", corners[last], "end")
+    # The same words as on the map.
+    write("0 start", corners[0], "end")
+    write(f"{last} destination", corners[last], "end")
     step = max(1, -(-len(route) // _MAX_NUMBERS))
     for k in range(1, last):
         if k % step == 0 or k in failed.waypoints:

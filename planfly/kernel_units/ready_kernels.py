@@ -1,7 +1,6 @@
 """Run a unit of work to compile its kernels, and report the kernels that are ready."""
 
 import functools
-import math
 import os
 import tomllib
 from collections.abc import Callable
@@ -87,9 +86,7 @@ def _compile_problem_kernels() -> None:
     """Compile the kernels that prepare a planning problem."""
     scenario = _make_scenario()
     aircraft, _ = find_aircraft_and_energy(scenario)
-    limits = make_limits(
-        scenario, load_envelope(aircraft), aircraft.airspeed, math.radians(scenario.flight.max_bank_deg)
-    )
+    limits = make_limits(scenario, load_envelope(aircraft), aircraft.airspeed, aircraft.max_bank)
     make_problem(scenario, limits)
 
 

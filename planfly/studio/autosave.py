@@ -14,6 +14,7 @@ from flight.mission.items import MAX_BYTES, Home, Mission, MissionItem, item_pro
 from planfly.flight_options import MissionOptions
 from planfly.studio.documents import Document, planned_mission
 from planfly.studio.edit_context import EditContext
+from planfly.studio.history import History
 from planfly.studio.settings import ChangedParameters
 from planfly.studio.view_model import Json
 from planfly.studio.worker_process import INTERNAL
@@ -24,7 +25,9 @@ from world.scenario import Scenario, scenario_from_spec
 
 _SCHEMA = "planfly.studio/1"
 # Maximum size of an autosave with two missions, a plan and the settings, bytes.
-_MAX_AUTOSAVE_BYTES = 4 * MAX_BYTES
+_MAX_AUTOSAVE_BYTES = 16 * MAX_BYTES
+# Maximum number of undone edits that are saved.
+_MAX_UNDONE_STEPS = 8
 # Tables of a scenario that the studio changes.
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
 _AUTOPILOT_KEYS = ("autopilot", "autopilot_from", "params", "arduplane_version", "px4_version", "guidance")
@@ -48,22 +51,28 @@ class Restored(NamedTuple):
 
     mission: the edited mission, which is the opened mission itself if it was not edited.
     context: editing context with the saved settings.
+    undone_steps: undone edits after the edited mission, each with its description, for redo.
     replaced: saved settings that are not restored, each with the reason or the value that replaces it.
+    by_options: True if options of the command line replaced them, which are then saved in their place.
     """
 
     mission: Mission
     context: EditContext
+    undone_steps: list[tuple[Mission, str]]
     replaced: tuple[str, ...] = ()
+    by_options: bool = False
 
 
 def autosave_text(
-    context: EditContext, document: Document, mission: Mission, plan: Plan | None, *, is_in_file: bool
+    context: EditContext, document: Document, history: History, plan: Plan | None, *, is_in_file: bool
 ) -> str:
     """Encode the state of a session as the JSON text of its autosave file.
 
+    The first `_MAX_UNDONE_STEPS` undone edits are saved; the edits in effect are saved as one, their result.
+
     context: editing context with the settings of the session.
     document: the opened document.
-    mission: the edited mission.
+    history: the edited mission, and the edits that were undone.
     plan: the plan of the mission, or None if the mission was changed after planning.
     is_in_file: True if the file of the document contains the edited mission.
     """
@@ -73,7 +82,10 @@ def autosave_text(
     data = {
         "schema": _SCHEMA,
         "name": document.name,
-        "mission": mission_data(mission),
+        "mission": mission_data(history.mission),
+        "undone": [
+            [mission_data(mission), text] for mission, text in history.steps[history.position :][:_MAX_UNDONE_STEPS]
+        ],
         "first": mission_data(document.setup.mission),
         "file": _file_digest(document),
         "in_file": is_in_file,
@@ -113,13 +125,18 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
         return None
     is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
     mission = first if is_opened else mission_from_data(data["mission"], first)
+    undone_steps = [(mission_from_data(step, first), str(text)) for step, text in data.get("undone", [])]
     try:
         new_context, replaced = _restore_settings(context, data, options)
         # The certificate of a plan applies only to the settings that it was made for.
-        return Restored(*((mission, new_context) if replaced else _restore_plan(new_context, mission, data)), replaced)
+        restored_mission, restored_context = (
+            (mission, new_context) if replaced else _restore_plan(new_context, mission, data)
+        )
+        by_options = bool(replaced) and data.get("scenario") == _scenario_name(context)
+        return Restored(restored_mission, restored_context, undone_steps, replaced, by_options)
     except (*INTERNAL, PlanflyError) as error:
         # If the settings cannot be restored, restore at least the edited mission.
-        return Restored(mission, context, (f"none of them can be restored: {error}",))
+        return Restored(mission, context, undone_steps, (f"none of them can be restored: {error}",))
 
 
 def sibling_autosave_path(file: Path, first: Mission) -> Path:
@@ -202,7 +219,7 @@ def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[M
         return mission, context
     plan = parse_plan(data["plan"], "kept", ground=context.scenario.terrain)
     plan = replace(plan, scenario=context.scenario)
-    mission_of_saved_plan = planned_mission(plan, context.airframe)
+    mission_of_saved_plan = planned_mission(plan, context.planning_airframe(mission))
     # The autosave keeps all digits, so items that differ mean that the mission was changed after planning.
     return (
         (mission_of_saved_plan, context.with_plan(plan, mission_of_saved_plan))

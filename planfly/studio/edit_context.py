@@ -3,13 +3,15 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
 from planfly.named_fences import NamedFences
 from planfly.studio.settings import ChangedParameters
-from planfly.workflow.airframe import Airframe, airframe_for_setup
+from planfly.workflow.airframe import Airframe, airframe_for_setup, with_tracking_error
 from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.open_flight import make_setup, with_landing_parameters
 from planner.plan import Plan
@@ -62,6 +64,22 @@ class EditContext(MissionContext):
         """Return the context with a new plan, whose certificate applies until the mission is changed."""
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
         return replace(self, opened_setup=setup, planned=True)
+
+    def planning_airframe(self, mission: Mission, index: int | None = None) -> Airframe:
+        """Return the airframe at the airspeed that a mission commands, at which a new path is planned.
+
+        index: index of the item from which the path leads; None for the airspeed of the first leg.
+        """
+        route, leg = self.route(mission), 0
+        if index is not None:
+            legs_from_item = np.flatnonzero(route.items[:-1] == mission.items[index].seq)
+            leg = int(legs_from_item[-1]) if legs_from_item.size else 0
+        airspeed = float(route.leg_airspeeds[leg])
+        # A mission states its airspeed in thousandths.
+        if abs(airspeed - self.airframe.airspeed) < 1e-3:
+            return self.airframe
+        limits = replace(self.airframe.limits, airspeed=airspeed)
+        return replace(self.airframe, limits=with_tracking_error(limits, self.airframe.autopilot, self.scenario))
 
     def with_area_around_mission(self, mission: Mission) -> "EditContext":
         """Return a context whose scenario has an area that contains the mission.

@@ -169,11 +169,14 @@ class Jobs:
 
         Raises PlanflyError for an unknown algorithm, and for items between which no path can be planned.
         """
-        scenario, airframe = session.context.scenario, session.context.airframe
+        scenario = session.context.scenario
         if message.algorithm is not None and message.algorithm not in ALGORITHMS:
             raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
         if message.algorithm is not None and message.ways > 1:
             raise PlanflyError.of_argument("ways", message.ways, "expected 1 if an algorithm is named")
+        if message.first is not None:
+            session.item_position(message.first)
+        airframe = session.context.planning_airframe(session.mission, message.first)
         request = PlanRequest(scenario, airframe, message.seed, message.algorithm, ways=message.ways)
         if message.first is None or message.last is None:
             if scenario.external:

@@ -65,6 +65,7 @@ class Session:
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
     replaced_settings: autosaved settings of this document that were not restored, each as text.
+    must_autosave: True if options of the command replaced autosaved settings, so that the autosave is written again.
     aircraft_folders: folders of the user's own aircraft that the session has flown, by name.
     """
 
@@ -86,6 +87,7 @@ class Session:
     earlier_states: list[_OpenedState] = field(default_factory=list)
     undone_states: list[_OpenedState] = field(default_factory=list)
     replaced_settings: tuple[str, ...] = ()
+    must_autosave: bool = False
     aircraft_folders: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -112,7 +114,7 @@ class Session:
         )
         self._restore_state((new_session.document, new_session.context, new_session.history))
         self.aircraft_folders |= new_session.aircraft_folders
-        self.replaced_settings = ()
+        self.replaced_settings, self.must_autosave = (), False
 
     def _opened_state(self) -> _OpenedState:
         """Return the document with its context and history, to restore it later."""
@@ -258,7 +260,7 @@ class Session:
 
     def _show_plan(self, plan: Plan) -> None:
         """Replace the current mission by the mission of a plan, whose certificate applies until the next edit."""
-        mission = planned_mission(plan, self.context.airframe)
+        mission = planned_mission(plan, self.context.planning_airframe(self.mission))
         self._set_mission(mission, self.context.with_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
 
@@ -460,7 +462,10 @@ class Session:
     @property
     def replaced_text(self) -> str:
         """Text on the autosaved settings that were not restored; "" if all were restored."""
-        return f"kept settings replaced: {'; '.join(self.replaced_settings)}" if self.replaced_settings else ""
+        if not self.replaced_settings:
+            return ""
+        verb = "replaced by the command, and kept as they are now" if self.must_autosave else "not used"
+        return f"kept settings {verb}: {'; '.join(self.replaced_settings)}"
 
     def world_message(self) -> Json:
         """Return the message with the map, threats, zones and settings."""
@@ -505,8 +510,9 @@ class Session:
 
     @property
     def needs_autosave(self) -> bool:
-        """True if the mission or the settings differ from the opened document."""
-        return self.is_changed or self.context.scenario is not self.document.setup.scenario
+        """True if the mission or the settings differ from the opened document, or from the autosave."""
+        is_edited = self.is_changed or bool(self.history.steps)
+        return is_edited or self.must_autosave or self.context.scenario is not self.document.setup.scenario
 
     def autosave_path(self, file: Path) -> Path:
         """Return the autosave path of the current document.
@@ -528,7 +534,7 @@ class Session:
         file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
         is_in_file = self.mission is self.file_mission
-        text = autosave_text(self.context, self.document, self.mission, plan, is_in_file=is_in_file)
+        text = autosave_text(self.context, self.document, self.history, plan, is_in_file=is_in_file)
         write_atomically(file, text)
         self.autosaved_rev = self.rev
 
@@ -543,19 +549,21 @@ class Session:
             autosave = read_autosave(file, self.context, self.document, self.options)
             if autosave is None:
                 return False
-            mission, context, replaced_settings = autosave
+            mission, context, undone_steps, replaced_settings, self.must_autosave = autosave
             is_edited = mission is not self.history.first
             if is_edited or context is not self.context:
                 self._set_mission(mission, context)
                 json.dumps(self.mission_message(), allow_nan=False)
         except (*INTERNAL, PlanflyError):
             self.context, self.judged, self.plans = previous_state
+            self.must_autosave = False
             self.unreadable.append(file)
             return False
         self.aircraft_folders |= own_aircraft(self.context.scenario)
         self.replaced_settings = replaced_settings
         if is_edited:
             self._add_to_history(mission, "the edits of the previous session")
+        self.history.steps += undone_steps
         return is_edited or context is not previous_state[0]
 
 

@@ -16,7 +16,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe, scenario_airspeed_range
+from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
@@ -106,9 +106,8 @@ def _check_airspeed(scenario: Scenario, options: FlightOptions) -> None:
         return
     new_scenario = scenario if name is None else with_flight(scenario, aircraft=str(name))
     aircraft, _ = find_aircraft_and_energy(new_scenario)
-    min_airspeed, max_airspeed = scenario_airspeed_range(aircraft)
-    if not min_airspeed <= airspeed <= max_airspeed:
-        allowed = f"{aircraft.name} flies {min_airspeed:g}..{max_airspeed:g} m/s"
+    if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
+        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
         raise PlanflyError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.edits import movable_indices
-from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
+from flight.mission.items import AMSL, OVER_HOME, Command, Mission, MissionItem, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
@@ -142,6 +142,7 @@ def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
     path = judged_mission.requirements.path
     return {
         "items": items_json(context, judged_mission.mission),
+        "commands": commands_json(judged_mission.mission),
         **route_json(judged_mission.mission, setup.route, 0, setup.route.legs),
         "path": _leg_paths(path.points, path.legs, 0, setup.route.legs),
         "states": states_json(states, 0, setup.route.legs),
@@ -195,6 +196,40 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
             }
         )
     return entries
+
+
+def commands_json(mission: Mission) -> list[Json]:
+    """Return page data of the items without a place on the map, such as speeds and jumps, which are only shown."""
+    places = set(movable_indices(mission))
+    return [
+        {"k": k, "seq": item.seq, "text": _command_text(item)}
+        for k, item in enumerate(mission.items)
+        if k not in places
+    ]
+
+
+def _command_text(item: MissionItem) -> str:
+    """Return what an item without a place on the map does.
+
+    >>> _command_text(MissionItem(3, 178, 3, (0.0, 21.0, -1.0, 0.0), 0.0, 0.0, 0.0))
+    'change speed: airspeed 21 m/s'
+    >>> _command_text(MissionItem(8, 177, 3, (4.0, -1.0, 0.0, 0.0), 0.0, 0.0, 0.0))
+    'jump to item 4, without end'
+    >>> _command_text(MissionItem(9, 206, 3, (25.0, 0.0, 1.0, 0.0), 0.0, 0.0, 0.0))
+    'set cam trigg dist (25, 0, 1, 0)'
+    """
+    first, second, third, _ = item.params
+    if item.command == Command.DO_CHANGE_SPEED:
+        kind = {0.0: "airspeed", 1.0: "ground speed"}.get(first, f"speed of type {first:g}")
+        texts = [f"{kind} {second:g} m/s"] if second >= 0.0 else []
+        texts += [f"throttle {third:g} %"] if third >= 0.0 else []
+        return f"change speed: {', '.join(texts) or 'no change'}"
+    if item.command == Command.DO_JUMP:
+        count_text = "without end" if second < 0.0 else f"{second:g} time{'s' * (second != 1.0)}"
+        return f"jump to item {first:g}, {count_text}"
+    name = command_name(item.command).removeprefix("NAV_").removeprefix("DO_").replace("_", " ").lower()
+    # Parameters of 0 and NaN are the defaults of a command.
+    return f"{name} ({', '.join(f'{value:g}' for value in item.params)})" if any(item.params) else name
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:

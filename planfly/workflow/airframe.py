@@ -18,9 +18,6 @@ from planner.search.lay_ground_ways import FinalModel, add_departure_and_approac
 from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 
-# Lowest and highest airspeed that the [flight] table of a scenario takes, m/s.
-_SCENARIO_AIRSPEEDS_MPS = 15.0, 60.0
-
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
@@ -119,8 +116,9 @@ def airframe_for_setup(setup: FlightSetup) -> Airframe:
 
 
 def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
-    """Return the bank limit in turns, rad: the lower limit of scenario and autopilot."""
-    return min(math.radians(scenario.flight.max_bank_deg), autopilot.turns.max_bank)
+    """Return the bank limit in turns, rad: the lower limit of scenario and autopilot; inf if neither states a limit."""
+    stated_bank = scenario.flight.max_bank_deg
+    return min(math.inf if stated_bank is None else math.radians(stated_bank), autopilot.turns.max_bank)
 
 
 def with_tracking_error(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
@@ -150,17 +148,6 @@ def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
     return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 
 
-def scenario_airspeed_range(aircraft: Aircraft) -> tuple[float, float]:
-    """Return the lowest and the highest airspeed of an aircraft that a scenario can state, m/s.
-
-    >>> from aircraft.catalog import load_aircraft
-    >>> scenario_airspeed_range(load_aircraft("zagi"))
-    (15.0, 16.9)
-    """
-    min_stated, max_stated = _SCENARIO_AIRSPEEDS_MPS
-    return max(aircraft.airspeed_min, min_stated), min(aircraft.airspeed_max, max_stated)
-
-
 def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
     """Return the initial cruise airspeed, m/s, from (in order) scenario, parameter file, aircraft.
 
@@ -175,11 +162,7 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
     else:
         airspeed, file, field = aircraft.airspeed, aircraft.name, "airspeed"
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        is_stated = scenario.flight.airspeed_mps is not None
-        min_airspeed, max_airspeed = (
-            scenario_airspeed_range(aircraft) if is_stated else (aircraft.airspeed_min, aircraft.airspeed_max)
-        )
-        allowed = f"{aircraft.name} flies {min_airspeed:g}..{max_airspeed:g} m/s"
+        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
         raise ScenarioError.at(file, field, airspeed, allowed, shown=f"{airspeed:g}")
     return airspeed
 

@@ -6,7 +6,7 @@ that do not have these margins both require less.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -336,7 +336,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified, certified.buffer))
     search = _shrink_area(
-        certified._replace(
+        _fill_unknown_ground(certified, terrain)._replace(
             buffer=buffer,
             airspace=airspace,
             kill_margin=SEARCH_KILL_MARGIN_M + limits.reserve_threats + across,
@@ -485,6 +485,22 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
     neighbourhood_max = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
     neighbourhood_max.setflags(write=False)
     return SlopeBounds(max_slope, neighbourhood_max, TILE_PIXELS * terrain.spacing)
+
+
+def _fill_unknown_ground(data: ProblemArrays, terrain: Terrain) -> ProblemArrays:
+    """Return the arrays with ground up to the ceiling where the ground is unknown, so that a search leads around it.
+
+    The certificate reads the terrain without this ground.
+    """
+    is_unknown = np.isnan(terrain.heights)
+    if not is_unknown.any():
+        return data
+    # A height depends on the four pixels around it, so a pixel next to an unknown one is filled too.
+    padded, (rows, cols) = np.pad(is_unknown, 1), is_unknown.shape
+    is_filled = np.any([padded[i : i + rows, j : j + cols] for i in range(3) for j in range(3)], axis=0)
+    filled = replace(terrain, heights=np.where(is_filled, np.float32(data.ceiling), terrain.heights))
+    slope_bounds = _make_slope_bounds(filled)._replace(steepest=data.slope_bounds.steepest)
+    return data._replace(heights=filled.heights, slope_bounds=slope_bounds)
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:

@@ -14,7 +14,9 @@ from world.scenario import Scenario
 
 def _limits_of(scenario: Scenario) -> Limits:
     flight = scenario.flight
-    return limits_with(scenario, falling_envelope(), flight.airspeed_mps or 25.0, math.radians(flight.max_bank_deg))
+    return limits_with(
+        scenario, falling_envelope(), flight.airspeed_mps or 25.0, math.radians(flight.max_bank_deg or 30.0)
+    )
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import pytest
 
 from world.errors import ScenarioError
 from world.frames import GeoOrigin
-from world.map_positions import check_inside, make_threats, map_position
+from world.map_positions import check_altitude, check_in_area, make_threats, map_position
 from world.scenario_tables import PointTable, ThreatTable
 from world.terrain import Terrain, make_gridded_terrain
 
@@ -45,10 +45,21 @@ def test_degrees_come_to_the_map() -> None:
 
 @pytest.mark.parametrize(("ground", "east"), [(None, 0.0), (ramp(), 9000.0)])
 def test_a_height_needs_ground_to_count_from(ground: Terrain | None, east: float) -> None:
-    message = rf"^s\.toml: start: east {east:.0f} m, north 0 m: no terrain there .*; give amsl_m$"
+    place = rf"east {east:.0f} m, north 0 m \(latitude 4[56]\.\d+, longitude 8\.\d+\)"
+    message = rf"^s\.toml: start: {place}: no terrain there .*; give amsl_m$"
     with pytest.raises(ScenarioError, match=message):
         placed(ground, east_m=east, north_m=0.0, height_m=50.0)
     assert placed(ground, east_m=east, north_m=0.0, amsl_m=50.0) == [east, 0.0, 50.0]
+
+
+def test_a_point_outside_the_area_says_by_how_far_and_where_the_area_is() -> None:
+    with pytest.raises(ScenarioError) as caught:
+        check_in_area("start", np.array([1250.0, 0.0, 400.0]), "s.toml", BOUNDS, ORIGIN)
+    # A degree of latitude at 46 degrees on WGS84 is 111.15 km, one of longitude 77.46 km.
+    assert str(caught.value) == (
+        "s.toml: start: east 1250 m: outside the area -1000..1000 by 250 m"
+        " (the area covers latitude 45.9820..46.0180, longitude 7.9871..8.0129)"
+    )
 
 
 @pytest.mark.parametrize(
@@ -71,7 +82,8 @@ def test_ends_stand_in_the_area_between_floor_and_ceiling_above_the_ground(
     point: tuple[float, float, float], message: str
 ) -> None:
     def check() -> None:
-        check_inside("start", np.array(point), "s.toml", BOUNDS, 150.0, 500.0, ramp())
+        check_in_area("start", np.array(point), "s.toml", BOUNDS, ORIGIN)
+        check_altitude("start", np.array(point), "s.toml", 150.0, 500.0, ramp())
 
     if not message:
         check()

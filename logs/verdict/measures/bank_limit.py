@@ -11,7 +11,7 @@ _SAME_BANK_RAD = 1e-6
 def bank_limit_text(setup: FlightSetup) -> str:
     """Return a text on a setup's bank limit and its source, such as "the aircraft's bank limit of 29°".
 
-    The source is the aircraft, the autopilot or the scenario, if there is a scenario.  The text begins with "a" if
+    The source is the aircraft, the autopilot or the scenario, if it states a limit.  The text begins with "a" if
     none of their limits equals the setup's limit.
 
     >>> from logs.recording.example_log import example_log
@@ -22,7 +22,7 @@ def bank_limit_text(setup: FlightSetup) -> str:
         ("the aircraft's", setup.envelope.max_bank),
         (f"{setup.autopilot.title}'s", setup.autopilot.turns.max_bank),
     ]
-    if not setup.scenario.external:
-        limits.append(("the scenario's", math.radians(setup.scenario.flight.max_bank_deg)))
+    if (stated_bank := setup.scenario.flight.max_bank_deg) is not None:
+        limits.append(("the scenario's", math.radians(stated_bank)))
     owner = next((owner for owner, limit in limits if abs(limit - setup.max_bank) <= _SAME_BANK_RAD), "a")
     return f"{owner} bank limit of {math.degrees(setup.max_bank):.0f}°"

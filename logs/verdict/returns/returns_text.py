@@ -102,7 +102,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
     parts = [f"to {ret.target.name}", outcome_text(ret, limit)]
     if ret.kind == "ground":
         parts[-1] += f" at {position_text}"
-    elif not math.isnan(ret.clearance):
+    elif math.isfinite(ret.clearance):
         parts.append(f"{ret.clearance:.0f} m above ground at the lowest, at {position_text}")
     if ret.threat >= 0 and ret.sphere_distance <= 0.0:
         parts.append(f"{-ret.sphere_distance:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flight.mission.items import OVER_HOME, Command
-from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -20,8 +20,9 @@ from logs.verdict.tolerances import (
     GROUND_LEG_CLEARANCE_M,
     HOME_ERROR_M,
 )
+from logs.verdict.wording import place_text_within
 from world.arrays import Floats
-from world.frames import to_map
+from world.frames import to_geo, to_map
 from world.terrain import Terrain
 
 
@@ -46,22 +47,61 @@ def clearance_findings(
         return [unknown, *_below_home_findings(requirements)]
     fields_by_leg = _fields_by_leg(requirements)
     legs, points = requirements.path.legs, requirements.path.points
-    heights, _ = path_clearance(terrain.heights, terrain.to_pixel.record, points)
+    heights, off_terrain = _known_heights(terrain, points)
     findings = []
     for leg in range(requirements.legs):
         requirement = _Requirement(limit, fields_by_leg.get(leg, ()))
         segments = np.flatnonzero(legs == leg)
         planned_height, required_height = requirement.worst_height(heights[segments], points[segments])
         if geometric:
-            findings.append(
-                _planned_finding(requirements, leg, planned_height, required_height, terrain.vertical_error)
-            )
+            off_text = _off_terrain_text(requirements, terrain, off_terrain[segments])
+            findings.append(_planned_finding(requirements, leg, planned_height, required_height, terrain, off_text))
         else:
             is_short = planned_height < required_height - CLEARANCE_TOLERANCE_M
             findings.append(
                 _flown_finding(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
             )
     return [*_home_above_ground_findings(requirements, terrain, findings), *findings]
+
+
+def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
+    """Return the lowest known height above ground of each segment of a path, and where the ground is first unknown.
+
+    points: (n, 3) m.
+
+    The heights are (n - 1,) m, NaN if the ground is unknown along a whole segment; where the ground is known along a
+    part of a segment only, this part is sampled. The places are (n - 1, 3) m, NaN for segments over known ground.
+    """
+    heights, fractions = path_clearance(terrain.heights, terrain.to_pixel.record, points)
+    off_terrain = np.full((len(heights), 3), np.nan)
+    for k in np.flatnonzero(np.isnan(heights)):
+        start, step = points[k], points[k + 1] - points[k]
+        off_terrain[k] = start + fractions[k] * step
+        sample_count = 2 + int(np.hypot(step[0], step[1]) / terrain.spacing)
+        samples = start + np.linspace(0.0, 1.0, sample_count)[:, None] * step
+        sampled_heights = samples[:, 2] - terrain.height(samples[:, 0], samples[:, 1])
+        if np.isfinite(sampled_heights).any():
+            heights[k] = np.nanmin(sampled_heights)
+    return heights, off_terrain
+
+
+def _off_terrain_text(requirements: RouteRequirements, terrain: Terrain, places: Floats) -> str:
+    """Return a clause on the first place of a leg where the ground is unknown; "" if it is known everywhere.
+
+    places: see `_known_heights`.
+    """
+    is_off = np.isfinite(places[:, 0])
+    if not is_off.any():
+        return ""
+    east, north = places[int(np.argmax(is_off)), :2].tolist()
+    place_text = f"east {east:.0f} m, north {north:.0f} m{_geographic_text(requirements, east, north)}"
+    return f"leaves the data of {terrain.source} at {place_text}"
+
+
+def _geographic_text(requirements: RouteRequirements, east: float, north: float) -> str:
+    """Return the latitude and longitude of a map position, m, in brackets."""
+    lat, lon = to_geo(requirements.setup.scenario.origin, east, north)
+    return f" (latitude {float(lat):.5f}, longitude {float(lon):.5f})"
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
@@ -140,9 +180,9 @@ class _Requirement(NamedTuple):
         heights: heights above ground at `points`, m, (n,).
         points: positions, m, (n, 3).
 
-        The returned height is NaN if any height is unknown, or if `heights` is empty.
+        The returned height is NaN if no height is known.
         """
-        if not heights.size or np.isnan(heights).any():
+        if not np.isfinite(heights).any():
             return math.nan, self.limit
         k, requirement = self.smallest_margin(heights, points)
         return float(heights[k]), requirement
@@ -214,32 +254,39 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
 
 
 def _planned_finding(
-    requirements: RouteRequirements, leg: int, planned_height: float, limit: float, error: float | None
+    requirements: RouteRequirements, leg: int, planned_height: float, limit: float, terrain: Terrain, off_text: str
 ) -> Finding:
     """Judge the minimum height above ground of a leg's planned path.
 
-    planned_height: minimum height above ground, m; NaN if the leg leaves the terrain data.
+    planned_height: minimum known height above ground, m; NaN if it is known nowhere on the leg.
     limit: required height, m.
-    error: the terrain's stated error, m; None if not stated.
+    off_text: where the leg leaves the terrain data; "" if it does not.
     """
+    is_short = planned_height < limit - CLEARANCE_TOLERANCE_M
     reason = f"{planned_height:.1f} m above ground at the lowest"
-    if math.isnan(planned_height):
-        reason = "the leg leaves the terrain data"
-    elif planned_height < limit - CLEARANCE_TOLERANCE_M:
+    if is_short:
         reason += f"; {limit:.0f} m are required"
+    reason += _terrain_error_text(planned_height, limit, terrain.vertical_error)
+    # A leg that is too low where the ground is known fails, whatever the rest is.
+    is_unknown = bool(off_text) and not is_short
+    if off_text:
+        reason = f"{off_text}; {reason} elsewhere" if math.isfinite(planned_height) else off_text
+    known_height = math.nan if is_unknown else planned_height
     return make_finding(
         "clearance",
         requirements.leg(leg),
-        ok=None if math.isnan(planned_height) else planned_height >= limit - CLEARANCE_TOLERANCE_M,
-        reason=reason + _terrain_error_text(planned_height, limit, error),
-        planned=planned_height,
+        ok=None if is_unknown else not is_short,
+        reason=reason,
+        faults=[_placed_message(requirements, leg, off_text)] if is_unknown else [],
+        planned=known_height,
         limit=limit,
         at_least=True,
         source=_limit_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
-        margin=planned_height - limit,
+        margin=known_height - limit,
         unit="m",
         method="exact along the fly-by path",
+        check=GROUND_PATH if is_unknown else "",
     )
 
 
@@ -257,6 +304,7 @@ def _flown_finding(
     is_planned_short: True if the planned path is lower than required.
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
+    terrain, off_text = requirements.setup.scenario.terrain, ""
     if aligned is not None and aligned.has_flown(leg):
         # The first leg includes the track before it, the last leg the track after it.
         first = 0 if leg == 0 else int(aligned.rows[leg])
@@ -269,20 +317,19 @@ def _flown_finding(
             )
             k = first + row
             min_clearance = float(aligned.clearance[k])
-            reason = (
-                f"{min_clearance:.1f} m above ground"
-                f" {_time_and_place_text(aligned, k, float(aligned.clearance_fraction[k]))}"
-            )
+            fraction = float(aligned.clearance_fraction[k])
+            reason = f"{min_clearance:.1f} m above ground {_time_and_place_text(aligned, k, fraction)}"
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
         if not is_known.all():
             k = first + int(np.argmin(is_known))
-            off_text = f"outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
+            off_text = f"flown outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
+            off_text += _geographic_text(requirements, *aligned.track.position[k, :2].tolist())
             reason = off_text if math.isnan(min_clearance) else f"{reason}; {off_text}"
             ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
-        terrain = requirements.setup.scenario.terrain
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
+    is_unknown = ok is None and bool(off_text)
     if is_planned_short:
         reason += f"; the planned path descends to {planned_height:.1f} m above ground"
     return make_finding(
@@ -290,16 +337,23 @@ def _flown_finding(
         requirements.leg(leg),
         ok=ok,
         reason=reason,
+        faults=[_placed_message(requirements, leg, off_text)] if is_unknown else [],
         planned=planned_height,
         flown=min_clearance,
         limit=limit,
         at_least=True,
         source=_limit_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE_M,
-        margin=min_clearance - limit,
+        margin=math.nan if is_unknown else min_clearance - limit,
         unit="m",
         method="exact along the flown track",
+        check=GROUND_PATH if is_unknown else "",
     )
+
+
+def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Message:
+    """Return a message that begins with the name of a leg."""
+    return message(f"{place_text_within(requirements.leg(leg))} {text}", placed=True)
 
 
 def _time_and_place_text(aligned: AlignedTrack, k: int, fraction: float) -> str:

@@ -199,7 +199,9 @@ export class Panel {
     box.append(element("div", { class: "bar" }, element("label", { for: "raise-by" }, "Heights of all"), by, " m",
       element("button", { type: "button", onclick: raise(1, true) }, "Raise"), element("button", { type: "button", onclick: raise(-1, true) }, "Lower")));
     const worst = cornerStates(now, true), grid = app.grid();
-    const rows = now.items.slice(0, MOST_ROWS).map((item) => this.row(item, worst, grid));
+    const places = now.items.slice(0, MOST_ROWS), last = places.length < now.items.length ? places[places.length - 1].k : Infinity;
+    const all = [...places, ...now.commands.filter((one) => one.k < last)].sort((a, b) => a.k - b.k);
+    const rows = all.map((item) => (item.at ? this.row(item, worst, grid) : commandRow(item)));
     const head = element("tr", {}, ...["#", "What", "Height, m AMSL", "Over ground", "Closest to a limit", ""].map((text) => element("th", { scope: "col" }, text)));
     box.append(element("div", { class: "scroll" }, element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows))));
     if (now.items.length > MOST_ROWS) box.append(element("p", {}, `The first ${MOST_ROWS} of ${now.items.length} items are listed.`));
@@ -249,7 +251,9 @@ export class Panel {
     const { now } = this;
     if (!now || !this.first) return;
     const places = now.items.slice(0, MOST_ROWS);
-    for (const [box, words] of [[this.first, "the scenario's start"], [this.last, "the scenario's destination"]]) {
+    // A mission without a scenario has only its own items.
+    const ends = this.about?.ends ? ["the scenario's start", "the scenario's destination"] : ["choose an item", "choose an item"];
+    for (const [box, words] of [[this.first, ends[0]], [this.last, ends[1]]]) {
       const kept = box.value;
       clear(box).append(element("option", { value: "" }, words), ...places.map((item) => element("option", { value: item.k }, `item ${item.seq}`)));
       if ([...box.options].some((one) => one.value === kept)) box.value = kept;
@@ -366,6 +370,11 @@ export class Panel {
     return element("section", { class: stale ? "card stale" : "card", "data-state": state }, element("h2", {}, title),
       stale ? element("p", { class: "more" }, "before the last change") : null, element("p", {}, headline), ...lines.slice(0, 6).map((line) => element("p", { class: "line" }, line)));
   }
+}
+
+// An item without a place on the map: a speed, a jump.
+function commandRow({ seq, text }) {
+  return element("tr", { class: "command" }, element("td", {}, String(seq)), element("td", { colspan: "5" }, text));
 }
 
 // Builds a box anew; what takes the place of what had the focus has it then, with what was typed and not yet entered.

@@ -33,6 +33,7 @@ function setGround() {
   now.grid = own(heights) ? heights : null;
   map.setPicture(own(picture) ? picture : null);
   scene?.show(now);
+  panel.drawItems();
 }
 
 function onSheet(sent) {

@@ -15,6 +15,7 @@ from tests.mission_lines import mission, wp
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin
 from world.geometry import leg_runs, leg_slopes, turning_angles
+from world.raster import open_raster
 from world.scenario import scenario_from_spec
 
 SAMPLES = Path(__file__).parents[1] / "missions"
@@ -105,10 +106,29 @@ def test_the_area_holds_the_nearest_rally_point_of_a_return() -> None:
 
 
 def test_a_mission_off_the_tile_is_refused() -> None:
-    # 9 km south of 36.5 degrees, where a degree is 110.96 km.
-    words = r"flies to latitude 36\.4189\.\.36\.5000, longitude -84\.2000\.\.-84\.2000; the terrain covers latitude 36"
+    # 4 km north of 36.5 degrees, where a degree is 110.96 km; the tile ends at 36.446 degrees.
+    words = r"flies to latitude 36\.5000\.\.36\.5360, longitude -84\.2000\.\.-84\.2000; the terrain covers latitude 36"
     with pytest.raises(TerrainError, match=words):
-        implied_scenario(mission(wp(0, 0), wp(0, -9000), home="40 -84 0"), "jacksboro")
+        implied_scenario(mission(wp(0, 0), wp(0, 4000), home="40 -84 0"), "jacksboro")
+    # On the other side of the world, where the file's coordinate system may have no pixels.
+    with pytest.raises(TerrainError, match="no data at any position"):
+        implied_scenario(mission("0 16 0 0 0 0 -36.3 95.7 900", "0 16 0 0 0 0 -36.31 95.7 900"), "jacksboro")
+
+
+def test_the_ground_is_known_up_to_the_last_pixel_and_unknown_beyond() -> None:
+    """Also close to the corner of the file, where no upright box of the map fits into it."""
+    raster = open_raster("jacksboro")
+    west, north = (float(values[0]) for values in raster.to_lon_lat(np.zeros(1), np.zeros(1)))
+    # 1 m and 3 m inside the outer pixel centres; a degree of longitude is 89.6 km here.
+    inside = f"0 16 0 0 0 0 {north - 1.0 / 110_960.0} {west + 3.0 / 89_600.0} 900"
+    for_all = implied_scenario(mission(inside, "0 16 0 0 0 0 36.4 -84.3 900"), "jacksboro").scenario
+    assert for_all.terrain is not None
+    assert np.isfinite(for_all.terrain.height(for_all.start[0], for_all.start[1]))
+    leaving = implied_scenario(mission("0 16 0 0 0 0 36.4 -84.3 900", "0 16 0 0 0 0 36.47 -84.3 900"), "jacksboro")
+    end = leaving.scenario.destination
+    assert leaving.scenario.terrain is not None
+    assert np.isnan(leaving.scenario.terrain.height(end[0], end[1]))
+    assert end[2] == 900.0
 
 
 def test_a_mission_through_a_hill_has_a_scenario() -> None:

@@ -58,7 +58,7 @@ def test_what_is_there_is_drawn_and_named() -> None:
     assert {"planned path", "flown track", "missile's reach", "waypoint above the ground"} <= legend(flown)
     assert "leg that fails a rule" in legend(flown)
     names = {text.get_text() for text in flown.axes[0].texts}
-    assert {"start", "destination", "1", "2"} <= names
+    assert {"0 start", "3 destination", "1", "2"} <= names
     planned = drawn(make_setup(terrain={"kind": "none"}, threats=[]), None, None)
     assert "no terrain: level at mid height" in legend(planned)
     assert not {"flown track", "missile's reach", "leg that fails a rule"} & legend(planned)

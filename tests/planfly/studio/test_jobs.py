@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from flight.mission.items import Command, Frame, Mission, MissionItem
 from planfly.flight_options import MissionOptions
 from planfly.studio import jobs as jobs_module
 from planfly.studio import messages
@@ -13,7 +14,7 @@ from planfly.studio.session import Session
 from planfly.studio.worker_process import Answer, Task
 from planfly.studio.worker_tasks import fly, try_suggestions
 from planner.search.plan_front import FrontPlan
-from tests.planfly.studio.drafts import drawn_session
+from tests.planfly.studio.drafts import drawn_session, session_of
 from world.errors import MissionError
 
 
@@ -40,6 +41,28 @@ def jobs(monkeypatch: pytest.MonkeyPatch) -> Jobs:
 
 def asked(jobs: Jobs, pilot: str) -> list[Task]:
     return jobs._workers[pilot].works  # type: ignore[attr-defined, no-any-return]
+
+
+@pytest.mark.parametrize(("ends", "airspeed"), [((None, None), 22.0), ((1, 2), 22.0), ((2, 4), 28.0)])
+def test_a_path_is_planned_at_the_speed_of_the_mission(
+    ends: tuple[int | None, int | None], airspeed: float, jobs: Jobs
+) -> None:
+    """Of a mission for an Aerosonde, which cruises at 25 m/s, in the scenario jacksboro-air."""
+    items = [
+        MissionItem(seq, 16, int(Frame.GLOBAL), (0.0,) * 4, 36.25 + 0.02 * seq, -84.2, 1200.0) for seq in (2, 3, 5)
+    ]
+    slow = MissionItem(1, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    fast = MissionItem(4, 178, 2, (0.0, 28.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    session = session_of(Mission(None, (slow, *items[:2], fast, items[2])), "jacksboro-air")
+    first, last = ends
+    jobs.plan(messages.Plan(kind="plan", seed=1, first=first, last=last), session)
+    request = asked(jobs, LONG_WORKER)[0].payload
+    assert request.airframe.airspeed == airspeed
+    # The path of the whole mission states this speed.
+    plan = straight_plan(session.context.scenario, 1)
+    session._show_plan(plan)
+    assert [item.params[1] for item in session.mission.items if item.command == Command.DO_CHANGE_SPEED] == [22.0]
+    assert session.judged.setup.route.leg_airspeeds.tolist() == [22.0]
 
 
 def test_a_work_that_another_replaces_is_said_to_have_stopped(jobs: Jobs) -> None:

@@ -256,6 +256,21 @@ def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
     assert page.problems == []
 
 
+def test_the_table_has_a_row_for_each_item_of_the_mission(page: Browser) -> None:
+    """Also for those without a place on the map, which have no field and no button, and the heights of the ground."""
+    page.value("document.getElementById('tab-items').click()")
+    rows = page.value(
+        "[...document.querySelectorAll('#panel-items tbody tr')].map((row) => "
+        "[row.cells[0].textContent, row.classList.contains('command'), row.querySelectorAll('input, button').length])"
+    )
+    items = drawn_session(8, 8).mission.items
+    assert [int(row[0]) for row in rows] == [item.seq for item in items]
+    assert [row[1] for row in rows] == [item.command in (177, 178) for item in items]
+    assert all(row[2] == (0 if row[1] else 3) for row in rows)
+    page.wait_for("!isNaN(Number(document.querySelector('#panel-items td.number').textContent.replace('\u2212', '-')))")
+    page.value("document.getElementById('tab-verdict').click()")
+
+
 def test_header_and_cards_say_the_same_words(page: Browser) -> None:
     words = "[...document.querySelectorAll({})].map((one) => one.textContent.replace(/[: ]+/, ': '))"
     header = page.value(words.format("'.answer'"))

@@ -16,10 +16,11 @@ from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
 from planfly.studio import messages
 from planfly.studio.autosave import mission_data, mission_from_data
-from planfly.studio.documents import open_document, open_dropped, straight_plan
+from planfly.studio.documents import Document, open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, open_session
 from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.suggestion_trials import with_tried_suggestions
+from tests.mission_lines import setup_of, wp
 from tests.own_aircraft import copy_aerosonde, write_mission, write_scenario
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from tests.soak import note, scaled
@@ -336,7 +337,9 @@ def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(tmp_p
     assert (shown["wind_speed"], shown["wind_from"], shown["turbulence"]) == (3.0, 90.0, "none")
     # What no option sets is kept.
     assert (shown["airspeed"], shown["parameters"]) == (26.0, {"WP_RADIUS": 55.0})
-    said = "kept settings replaced: wind 9 \u2192 3; turbulence light \u2192 none"
+    said = (
+        "kept settings replaced by the command, and kept as they are now: wind 9 \u2192 3; turbulence light \u2192 none"
+    )
     assert said in windy.mission_message()["notes"]
     # Another aircraft has another airspeed, another file of parameters replaces those that were set.
     (tmp_path / "mine.parm").write_text("WP_RADIUS 70\n", encoding="utf-8")
@@ -352,8 +355,71 @@ def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(tmp_p
     # The settings of one scenario are not those of another.
     third, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert not restored
-    assert third.replaced_text == "kept settings replaced: all of them, which belong to jacksboro-air"
+    assert third.replaced_text == "kept settings not used: all of them, which belong to jacksboro-air"
     assert not open_session(str(file), world, kept)[0].replaced_text
+
+
+@pytest.mark.parametrize("wind", [3.0, 5.0])
+def test_what_a_command_replaced_stays_replaced_without_an_edit(wind: float, tmp_path: Path) -> None:
+    """Also by the value of the scenario itself, whose wind is 5 m/s from 250 degrees."""
+    file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    world = MissionOptions(scenario="jacksboro-air")
+    session, _ = open_session(str(file), world, kept)
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, wind_from=250.0))
+    session.autosave(kept)
+    windy, _ = open_session(str(file), world | MissionOptions(wind=(wind, 250.0)), kept)
+    assert windy.needs_autosave
+    windy.autosave(kept)
+    again, _ = open_session(str(file), world, kept)
+    assert again.settings_json()["wind_speed"] == wind
+    assert again.replaced_text == ""
+
+
+def test_undone_edits_can_be_redone_after_the_server_died(tmp_path: Path) -> None:
+    file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    world = MissionOptions(scenario="jacksboro")
+    session, _ = open_session(str(file), world, kept)
+    for by in (10.0, 20.0, 30.0):
+        session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+    results = [mission.items for mission, _ in session.history.steps]
+    session.step_history("undo")
+    session.step_history("undo")
+    session.autosave(kept)
+    again, _ = open_session(str(file), world, kept)
+    assert again.mission.items == results[0]
+    assert again.redo_text == "raise all items by 20 m"
+    again.step_history("redo")
+    again.step_history("redo")
+    assert again.mission.items == results[2]
+    assert again.redo_text == ""
+    for _ in range(3):
+        again.step_history("undo")
+    assert again.mission is again.history.first
+    # Undone to the file itself.
+    again.autosave(kept)
+    unedited, _ = open_session(str(file), world, kept)
+    assert not unedited.is_changed
+    assert unedited.needs_autosave
+    unedited.step_history("redo")
+    assert unedited.mission.items == results[0]
+
+
+def test_speeds_and_jumps_are_shown_and_stay_through_edits() -> None:
+    lines = (wp(0, 0), "0 178 0 21 -1 0 0 0 0", wp(0, 1500), wp(1500, 1500), "0 177 3 2 0 0 0 0 0", wp(1500, 0))
+    document = Document("m.waypoints", "m", setup_of(*lines, home="36.5 -84.2 100"), "waypoints")
+    session = Session.from_document(document, MissionOptions())
+
+    def shown() -> list[tuple[int, str]]:
+        return [(one["seq"], one["text"]) for one in session.mission_message()["commands"]]
+
+    assert shown() == [(2, "change speed: airspeed 21 m/s"), (5, "jump to item 3, 2 times")]
+    session.edit(messages.Move(kind="move", rev=session.rev, k=2, east=100.0, north=1600.0))
+    assert shown() == [(2, "change speed: airspeed 21 m/s"), (5, "jump to item 3, 2 times")]
+    # An item inserted before the target renumbers both.
+    session.edit(messages.Insert(kind="insert", rev=session.rev, after=0, east=0.0, north=700.0))
+    assert [text for _, text in shown()] == ["change speed: airspeed 21 m/s", "jump to item 4, 2 times"]
 
 
 # Changes of a kept session: whole texts, and values of keys.

@@ -27,7 +27,7 @@ def test_the_scenario_goes_before_the_aircrafts_own_numbers() -> None:
 
 
 def test_without_a_scenario_aircraft_and_autopilot_limit_the_bank(tmp_path: Path) -> None:
-    """An X8 banks 35 degrees, and nobody else sets a limit; 30 is the default of a scenario's file."""
+    """An X8 banks 35 degrees, and nobody else sets a limit, neither without a scenario nor in one that states none."""
     file = tmp_path / "mine.params"
     world = implied_scenario(mission(wp(0, 0), wp(0, 900), wp(0, 1800)), None).scenario
     for roll_limit, bank in ((45.0, 35.0), (33.0, 33.0)):
@@ -37,7 +37,7 @@ def test_without_a_scenario_aircraft_and_autopilot_limit_the_bank(tmp_path: Path
     stated = FlightTable(aircraft="x8", max_bank_deg=25.0)
     limited = implied_scenario(mission(wp(0, 0), wp(0, 900)), None, stated).scenario
     assert math.degrees(load_airframe(limited).max_bank) == pytest.approx(25.0)
-    assert math.degrees(load_airframe(small_scenario(flight={"aircraft": "x8"})).max_bank) == pytest.approx(30.0)
+    assert math.degrees(load_airframe(small_scenario(flight={"aircraft": "x8"})).max_bank) == pytest.approx(35.0)
 
 
 def test_a_parameter_files_cruise_speed_goes_before_the_aircrafts(tmp_path: Path) -> None:
@@ -64,6 +64,12 @@ def test_a_parameter_files_cruise_speed_goes_before_the_aircrafts(tmp_path: Path
 def test_what_the_aircraft_cannot_fly_names_its_key(tables: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load_airframe(small_scenario(**tables))
+
+
+def test_a_scenario_states_any_airspeed_of_a_slow_aircraft() -> None:
+    """A Zagi, a foam wing, flies from 11 m/s on, by the limits of its folder."""
+    slow = small_scenario(flight={"aircraft": "zagi", "airspeed_mps": 11.0})
+    assert load_airframe(slow).airspeed == 11.0
 
 
 def test_no_wind_is_refused_here_as_what_it_leaves_is_for_the_verdict_to_say() -> None:

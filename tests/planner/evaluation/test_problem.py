@@ -28,6 +28,21 @@ from tests.planner.evaluation.violations import violations_of
 from world.scenario import Scenario
 from world.threats import Threats
 
+
+def test_a_search_takes_unknown_ground_for_ground_up_to_the_ceiling(scenario: Scenario, limits: Limits) -> None:
+    """So that it leads around, while the certificate knows nothing of the ground there."""
+    ground = scenario.terrain
+    assert ground is not None
+    heights = ground.heights.copy()
+    row, col = heights.shape[0] // 2, heights.shape[1] // 2
+    heights[row, col] = np.nan
+    problem = make_problem(replace(scenario, terrain=replace(ground, heights=heights)), limits)
+    assert np.isnan(problem.certified.heights[row, col])
+    # Each height is interpolated from four pixels, so all next to it are unknown, too.
+    assert (problem.search.heights[row - 1 : row + 2, col - 1 : col + 2] == np.float32(scenario.ceiling)).all()
+    assert int((problem.search.heights != ground.heights).sum()) == 9
+
+
 THREATS = Threats(
     names=("missile", "radar"),
     position=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),

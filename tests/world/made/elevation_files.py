@@ -14,7 +14,7 @@ from rasterio.transform import Affine
 from world.arrays import Floats
 from world.errors import TerrainError
 from world.frames import GeoOrigin
-from world.raster import open_raster, read_terrain
+from world.raster import open_raster, read_terrain, require_covered, require_no_holes
 from world.terrain import Terrain
 
 
@@ -101,10 +101,16 @@ def read_window(
     return read_terrain(open_raster(str(path)), origin, bounds, buffer)
 
 
+def _read_whole_window(path: Path | str, bounds: Floats = BOUNDS, origin: GeoOrigin = MIDDLE) -> None:
+    """Read a window that must lie inside the file and its data."""
+    require_covered(open_raster(str(path)), origin, bounds)
+    require_no_holes(read_window(path, bounds, origin), bounds)
+
+
 def assert_refused(path: Path | str, match: str, **options: Any) -> None:
     """A file is refused in one line that matches, and no warning is given."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(TerrainError, match=match) as caught:
-            read_window(path, **options)
+            _read_whole_window(path, **options)
     assert "\n" not in str(caught.value)

@@ -28,6 +28,7 @@ from tests.synthetic import (
 from world.airfield import LandingStrip
 from world.errors import ScenarioError
 from world.scenario_file import parse_scenario
+from world.terrain import make_gridded_terrain
 
 
 def test_clearance_is_exact_and_says_where() -> None:
@@ -50,6 +51,40 @@ def test_clearance_is_exact_and_says_where() -> None:
     assert of(judge_geometry(low), "clearance", leg(1)).reason.endswith("m are required")
     dive = fly_path(setup, up=bump(4500.0, -285.0, 300.0))
     assert ("departure", FLIGHT) in failing(judge(setup, edited(dive, position=dive.position - [0, 0, 20.0])))
+
+
+def with_hole(setup: FlightSetup) -> FlightSetup:
+    """The setup over ground without data 100 m around the line, from 3000 m to 3500 m north."""
+    ground = setup.scenario.terrain
+    assert ground is not None
+    east, north = np.linspace(-1000.0, 1000.0, 201), np.linspace(-1000.0, 8000.0, 901)
+    heights = np.zeros((901, 201))
+    heights[400:451, 90:111] = np.nan
+    holed = make_gridded_terrain(heights, east, north, source="holed.tif", sha256="", datum="mean sea level")
+    return replace(setup, scenario=replace(setup.scenario, terrain=holed))
+
+
+def test_a_leg_across_a_hole_of_the_terrain_is_not_judged_and_named() -> None:
+    setup = with_hole(make_setup([[0, 0, 300], [0, 2000, 300], [0, 6000, 300]]))
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        assert of(verdict, "clearance", leg(0)).ok
+        open_leg = of(verdict, "clearance", leg(1))
+        assert (open_leg.ok, open_leg.margin) == (None, None)
+        # The pixel before the hole is 2990 m north; heights between it and the hole depend on the hole.
+        assert int(re.findall(r"data .*?north (\d+) m", open_leg.reason)[0]) == pytest.approx(2995, abs=30)
+        assert re.search(r"\(latitude \d+\.\d{5}, longitude \d+\.\d{5}\)", open_leg.reason)
+        assert open_leg.brief.startswith("leg 1, to item ")
+        assert verdict.answer == "not judged in full"
+        assert not verdict.failed
+
+
+def test_a_leg_that_is_too_low_beside_a_hole_fails() -> None:
+    """10 m above level ground from 2000 m to 3000 m and from 3500 m to 6000 m, where 30 m are required."""
+    verdict = judge_geometry(with_hole(make_setup([[0, 0, 300], [0, 2000, 10], [0, 6000, 10]])))
+    low = of(verdict, "clearance", leg(1))
+    assert low.ok is False
+    assert low.planned == pytest.approx(10.0, abs=0.1)
+    assert low.reason.startswith("leaves the data of holed.tif at east 0 m, north 29")
 
 
 def test_terrain_that_is_not_there_is_not_judged(setup: FlightSetup, track: Track) -> None:
@@ -153,7 +188,9 @@ def test_where_a_flight_leaves_the_known_terrain_is_told(high: float, ok: bool |
     north = float(item.reason.split("outside the terrain data at ")[1].split("north ")[1].split(" m")[0])
     assert north == pytest.approx(int(np.flatnonzero(np.isnan(known))[0]), abs=2.0)
     planned = of(judge_geometry(cut), "clearance", leg(0))
-    assert (planned.ok, planned.planned) == (None, None)
+    assert planned.ok is ok
+    # Of an undecided leg no height is stated.
+    assert planned.planned == (None if ok is None else pytest.approx(high, abs=0.1))
 
 
 def test_less_height_is_asked_for_near_a_field_only_after_the_last_high_waypoint() -> None:

@@ -23,7 +23,7 @@ from planfly.workflow.open_flight import make_setup, open_flight
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some
-from world.scenario import scenario_from_spec
+from world.scenario import scenario_from_spec, with_flight
 
 SPEED = 25.0 * (1.0 - 0.0065 * 500.0 / 288.15) ** -2.128
 
@@ -196,9 +196,10 @@ def test_an_own_circle_of_a_low_roll_limit_keeps_its_corridor() -> None:
 
 def test_the_bank_limit_is_the_lesser_of_scenario_and_autopilot() -> None:
     setup = loiter(TURNS, {})
-    law = setup.autopilot
-    assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=20.0)) == math.radians(20.0)
-    assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=50.0)) == math.radians(30.0)
+    law, stated = setup.autopilot, with_flight(setup.scenario, max_bank_deg=30.0)
+    assert max_turn_bank(stated, law.with_parameters(ROLL_LIMIT_DEG=20.0)) == math.radians(20.0)
+    assert max_turn_bank(stated, law.with_parameters(ROLL_LIMIT_DEG=50.0)) == math.radians(30.0)
+    assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=50.0)) == math.radians(50.0)
 
 
 @pytest.mark.parametrize("from_deg", [0.0, 90.0, 180.0, 270.0])
