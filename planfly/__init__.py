@@ -24,6 +24,7 @@ returns                              whether the aircraft would come home from e
 link                                 the radio link to the ground station along a flight
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
+battery                              the smallest battery with which a mission and its returns keep the reserve
 serve                                a MAVLink vehicle for ground stations
 open_studio                          a page on which a mission is dragged, judged, flown and saved
 scenarios, aircraft                  the built-in scenarios and aircraft
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from planfly.api.aircraft import describe_aircraft as describe_aircraft
     from planfly.api.aircraft import new_aircraft as new_aircraft
     from planfly.api.campaigns import CampaignFlight as CampaignFlight
+    from planfly.api.campaigns import battery as battery
     from planfly.api.campaigns import campaign as campaign
     from planfly.api.campaigns import campaign_flight as campaign_flight
     from planfly.api.campaigns import winds as winds
@@ -118,6 +120,7 @@ if TYPE_CHECKING:
     from planfly.api.surveying import survey as survey
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
     from planfly.campaigns.dispersions import SpreadError as SpreadError
+    from planfly.campaigns.find_battery import BatteryResult as BatteryResult
     from planfly.campaigns.find_winds import WindsResult as WindsResult
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
     from planfly.planning.paper import PaperTables as PaperTables
@@ -166,6 +169,7 @@ _HOMES = {
         ),
         "planfly.api.campaigns": (
             "CampaignFlight",
+            "battery",
             "campaign",
             "campaign_flight",
             "winds",
@@ -246,6 +250,7 @@ _HOMES = {
         "planfly.studio.open_studio": ("open_studio",),
         "planfly.campaigns.campaign_result": ("CampaignResult",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
+        "planfly.campaigns.find_battery": ("BatteryResult",),
         "planfly.campaigns.find_winds": ("WindsResult",),
         "planfly.campaigns.dispersions": ("SpreadError",),
         "planfly.workflow.imported_flights": ("ImportedFlight",),

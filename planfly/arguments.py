@@ -77,6 +77,10 @@ RANGES: Mapping[str, Range] = {
     "prove": _PROBABILITY_RANGE,
     "at_least": _PROBABILITY_RANGE,
     "confidence": _PROBABILITY_RANGE,
+    "probability": _PROBABILITY_RANGE,
+    "battery_flights": Range(20, 100_000, "expected a whole number from 20 to 100,000", integer=True),
+    "reserve": Range(0.0, 0.9, "expected a fraction of the battery from 0 to 0.9"),
+    "specific_energy": Range(20.0, 2000.0, "expected an energy per battery mass from 20 to 2,000 Wh/kg"),
     "flights": Range(1, 10_000_000, "expected a whole number from 1 to 10,000,000", integer=True),
     "index": Range(0, 10**9 - 1, "expected the number of a flight, 0 or more", integer=True),
     "directions": Range(4, 72, "expected a whole number from 4 to 72", integer=True),
@@ -131,7 +135,7 @@ def check_arguments(**given: Any) -> None:
 
 
 # Keywords in messages, for entries of `RANGES` whose keyword has another range in other calls.
-_KEYWORDS_IN_MESSAGES = {"served_speed": "speed", "front": "count"}
+_KEYWORDS_IN_MESSAGES = {"served_speed": "speed", "front": "count", "battery_flights": "flights"}
 
 
 # Largest sensor size across and along the track, and longest focal length, mm.

@@ -156,6 +156,23 @@ class WindsOptions(MissionOptions, total=False):
     scheduler: str | None
 
 
+class BatteryOptions(MissionOptions, total=False):
+    """Options of the flights of a search for a battery.
+
+    spread: a TOML file of the quantities that vary; None takes planfly's default.
+    flights: number of flights.
+    confidence: confidence of the capacity's interval.
+    workers: number of processes on this machine; None for one per core.
+    scheduler: address of a running dask scheduler.
+    """
+
+    spread: str | Path | None
+    flights: Annotated[int, 100]
+    confidence: Annotated[float, 0.95]
+    workers: int | None
+    scheduler: str | None
+
+
 class FlyOptions(MissionOptions, SimulationOptions, total=False):
     """Options of `planfly.fly`."""
 

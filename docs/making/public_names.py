@@ -31,6 +31,7 @@ _ORDER = (
         "campaign",
         "campaign_flight",
         "winds",
+        "battery",
         "serve",
         "open_studio",
     ),

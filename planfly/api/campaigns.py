@@ -1,14 +1,16 @@
-"""Find the probability that a mission is flyable, and the strongest wind from each direction, by many flights."""
+"""Find the probability that a mission is flyable, its strongest winds and its smallest battery, by many flights."""
 
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Unpack
 
+from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
 from planfly.campaigns.campaign_result import CampaignResult, campaign_command_line, make_goal, winds_command_line
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
+from planfly.campaigns.find_battery import BatteryGoal, BatteryResult, find_battery
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
     WindsGoal,
@@ -25,6 +27,7 @@ from planfly.campaigns.summary import summarise_campaign
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_table
 from planfly.campaigns.worker_pool import Workers, check_scheduler_address
 from planfly.flight_options import (
+    BatteryOptions,
     CampaignOptions,
     MissionOptions,
     WindsOptions,
@@ -291,3 +294,61 @@ def winds(
             )
             write_winds(folder, base, winds_found, command_line)
     return winds_found
+
+
+# ----------------------------------------------------------------------
+# Find the smallest battery for a mission and its returns.
+
+
+@requires_extra("campaigns")
+@with_warm_up(*PLANNING_AND_FLYING)
+@takes_options
+def battery(
+    target: Plan | str | Path,
+    *,
+    probability: float = 0.95,
+    reserve: float = ENERGY_RESERVE_FRACTION,
+    specific_energy: float | None = None,
+    every: float = 10.0,
+    **options: Unpack[BatteryOptions],
+) -> BatteryResult:
+    """Find the smallest battery with which a mission and every return keep the reserve with a given probability.
+
+    The flights vary as in `planfly.campaign`.  From each flight, returns to launch are simulated as in
+    `planfly.returns`.
+
+    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    probability: the probability.
+    reserve: fraction of the battery that is to be left.
+    specific_energy: energy per battery mass, Wh/kg, with which the aircraft's mass changes with the battery; None
+    keeps the mass.
+    every: time between two returns, s.
+    flights: number of flights.  confidence: confidence of the capacity's interval.
+    spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
+    A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
+    Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
+
+    >>> battery("paper-07", reserve=1.5)
+    Traceback (most recent call last):
+    ...
+    world.errors.ArgumentError: reserve 1.5: expected a fraction of the battery from 0 to 0.9
+    """
+    check_arguments(
+        probability=probability,
+        reserve=reserve,
+        specific_energy=specific_energy,
+        every=every,
+        battery_flights=options["flights"],
+        confidence=options["confidence"],
+    )
+    workers_used = _make_workers(options["workers"], options["scheduler"], options["seed"])
+    dispersions = _read_spread(options["spread"])
+    campaign_target = target if isinstance(target, Plan) else str(target)
+    if isinstance(target, Plan) or is_mission_file(str(target)):
+        base = open_campaign(campaign_target, dispersions, select_mission_options(options))
+    else:
+        with stage("planning") as advance:
+            base = open_campaign(campaign_target, dispersions, select_mission_options(options), advance=advance)
+    goal = BatteryGoal(probability, options["confidence"], options["flights"], every, reserve, specific_energy)
+    with stage("flying", "flying for a battery") as advance:
+        return find_battery(base, goal, workers_used, advance)

@@ -114,6 +114,13 @@ def add_winds_parser(command_line: LineParser) -> None:
 
 def _add_shared_options(parser: CommandParser) -> None:
     """Add the arguments and options that campaigns and searches for winds have in common."""
+    add_flights_options(parser)
+    parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
+    add_result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")
+
+
+def add_flights_options(parser: CommandParser) -> None:
+    """Add the target of a command that flies many flights, and the options of these flights and of their workers."""
     with_completer(
         parser.add_argument(
             "target",
@@ -143,8 +150,6 @@ def _add_shared_options(parser: CommandParser) -> None:
         metavar="ADDRESS",
         help="fly on a running dask cluster: tls://HOST:PORT; requires planfly[cluster]",
     )
-    parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
-    add_result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")
 
 
 def campaign(args: argparse.Namespace) -> int:

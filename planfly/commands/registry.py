@@ -77,6 +77,7 @@ COMMANDS = (
     Command("predict", _AUTOPILOT_LOGS, "PredictAnswer"),
     Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
     Command("winds", _MANY_FLIGHTS, "WindsDocument", "campaigns"),
+    Command("battery", _MANY_FLIGHTS, "battery_answers.BatteryAnswer"),
     Command("paper", _MANY_FLIGHTS, "PaperAnswer"),
     Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
     Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),

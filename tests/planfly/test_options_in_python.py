@@ -32,6 +32,7 @@ FUNCTIONS = {
     "predict": ("predict",),
     "campaign": ("campaign", "campaign_flight"),
     "winds": ("winds",),
+    "battery": ("battery",),
     "paper": ("paper_tables",),
     "aircraft": ("aircraft", "describe_aircraft", "new_aircraft", "identify_aircraft"),
     "scenarios": ("scenarios",),
@@ -49,10 +50,10 @@ RENAMED = {
     ("campaign", "refly"): ("campaign_flight", "index"),
 }
 # What only a terminal has, and what Python has in `Verdict.to_junit`; of a replay, how the timeline is printed, and
-# that another function is meant; of a check, whether the file of --json is replaced.
+# that another function is meant; of a check and a battery, whether the file of --json is replaced.
 TERMINAL_ONLY = {
     *("help", "json", "junit", "quiet", "schema", "topic", "shell"),
-    *(("replay", "at_once"), ("replay", "foxglove"), ("check", "overwrite")),
+    *(("replay", "at_once"), ("replay", "foxglove"), ("check", "overwrite"), ("battery", "overwrite")),
 }
 
 

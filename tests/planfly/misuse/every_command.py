@@ -73,6 +73,10 @@ EVERY = {
         Given(("predict", "imported.mcap", "--aircraft", "aerosonde", "--out", "out"), (0, 3, 4), "out"),
         Given(("campaign", *_CAMPAIGN, "--flights", "2"), (0, 3, 4), "out"),
         Given(("winds", *_CAMPAIGN, "--flights", "8", "--directions", "4"), (0, 3, 4), "out"),
+        Given(
+            ("battery", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--json", "new.json"),
+            (0, 3, 4),
+        ),
         Given(("paper", "--problems", "7", "--runs", "1", "--jobs", "1", "--out", "out"), target="out"),
         Given(("aircraft", "aerosonde")),
         Given(("scenarios",)),

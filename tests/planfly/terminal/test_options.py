@@ -122,6 +122,9 @@ def test_a_signal_asks_to_stop_and_its_handler_comes_back(number: signal.Signals
         ("winds", "--directions", "73"),
         ("winds", "--most", "0.9"),
         ("winds", "--most", "41"),
+        ("battery", "--reserve", "0.91"),
+        ("battery", "--specific-energy", "19"),
+        ("battery", "--flights", "19"),
     ],
 )
 def test_bad_values_get_one_line(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

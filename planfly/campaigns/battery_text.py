@@ -1,0 +1,97 @@
+"""Describe the result of a search for a battery in lines."""
+
+import math
+
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.wording import place_text
+from planfly.campaigns.find_battery import MIN_MASS_FACTOR, BatteryResult
+
+# Number of parts that decide the battery, and of legs, in the lines.
+_MAX_LISTED = 3
+
+
+def answer_line(result: BatteryResult) -> str:
+    """Return the smallest battery in one line."""
+    goal = result.goal
+    keeps_text = f"{goal.reserve:.0%} in the mission and in every return with probability {goal.probability:g}"
+    if math.isinf(result.capacity):
+        return (
+            f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg its own mass needs too much of the"
+            f" energy that it adds (the aircraft would weigh {result.mass * result.mass_factor:.3g} kg)"
+        )
+    if math.isnan(result.capacity):
+        return f"not judged: {_unknown_reason(result)}"
+    low, high = result.interval
+    high_text = f"{high:.0f}" if math.isfinite(high) else "more"
+    volts_text = f", {1000.0 * result.capacity / result.volts:.0f} mAh at {result.volts:.1f} V" if result.volts else ""
+    return (
+        f"{result.capacity:.0f} Wh ({low:.0f} to {high_text} at {goal.confidence:.0%} confidence{volts_text})"
+        f" keep {keeps_text}"
+    )
+
+
+def _unknown_reason(result: BatteryResult) -> str:
+    """Return why the battery is unknown."""
+    count, completed = len(result.rows), len(result.completed)
+    endings = [row.ended for row in result.rows if row.ended != "completed"]
+    if not endings:
+        return "the aircraft's model states no power, so the energy is unknown"
+    most_frequent = max(set(endings), key=endings.count)
+    return f"{count - completed} of {count} flights do not complete the mission, most of them: {most_frequent}"
+
+
+def battery_lines(result: BatteryResult) -> list[str]:
+    """Return the lines below the answer: the aircraft's battery, what decides, and how it was found."""
+    if not result.completed:
+        return []
+    lines = [_own_battery_line(result), *_mass_lines(result)]
+    requirements, total = route_requirements(result.base.nominal_setup()), len(result.completed)
+    for decision in result.decisions[:_MAX_LISTED]:
+        part = "the end of the mission"
+        if decision.leg >= 0:
+            leg_text = place_text(requirements.leg(decision.leg))
+            part = f"the return that starts at {decision.time:.0f} s ({leg_text})"
+        lines.append(f"decided by {part}: in {decision.flights} of {total} flights")
+    energies = result.leg_energies
+    if float(energies.sum()) > 0.0:
+        largest = sorted(range(len(energies)), key=lambda leg: -float(energies[leg]))[:_MAX_LISTED]
+        parts = [f"{energies[leg]:.1f} Wh ({place_text(requirements.leg(leg))})" for leg in largest]
+        lines.append(f"the mission uses {float(energies.sum()):.1f} Wh (median); most of it: {', '.join(parts)}")
+    lost = sum(row.lost_returns > 0 for row in result.completed)
+    if result.base.mission.home is None:
+        lines.append("the mission has no home, so no returns were simulated")
+    elif lost:
+        lines.append(
+            f"in {lost} of {total} flights some returns do not arrive, and their energy is not counted:"
+            " see planfly returns"
+        )
+    lines.append(
+        f"{len(result.rows)} flights, {len(result.rows) - total} of them without completing the mission;"
+        f" a return every {result.goal.interval:g} s, up to its loiter: the reserve has to cover loiter and landing"
+    )
+    return lines
+
+
+def _own_battery_line(result: BatteryResult) -> str:
+    """Compare the aircraft's own battery with the smallest battery."""
+    if result.is_guessed:
+        return "the aircraft does not state its battery, so it is not compared: state battery_wh in the scenario"
+    verdict = {True: "is enough", False: "is too small", None: "may be enough, more flights would show it"}
+    low, high = result.own_probability
+    return (
+        f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve in"
+        f" {result.kept} of {len(result.rows)} flights (probability {low:.2f} to {high:.2f})"
+    )
+
+
+def _mass_lines(result: BatteryResult) -> list[str]:
+    """Return the mass of the aircraft with the found battery."""
+    if result.goal.specific_energy is None:
+        return ["the mass is kept: --specific-energy states the battery's energy per mass"]
+    if not math.isfinite(result.capacity):
+        return []
+    limit_text = f"; not less than {MIN_MASS_FACTOR:g} of it" if result.mass_factor == MIN_MASS_FACTOR else ""
+    return [
+        f"with {result.goal.specific_energy:g} Wh/kg the aircraft then weighs {result.mass * result.mass_factor:.2f} kg"
+        f" (now {result.mass:.2f} kg{limit_text})"
+    ]

@@ -1,0 +1,331 @@
+"""Find the smallest battery with which a mission and all its returns keep the energy reserve, by many flights.
+
+Each flight of a campaign is flown with a battery that does not run empty, and needs the largest of two energies: the
+energy used at the end of the mission, and the highest energy used at the end of any return to launch.  The capacity
+that covers a flight is this energy divided by the usable fraction of the battery and by the flight's drawn battery
+factor.  The battery is the quantile of the capacities of all flights.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from flight.simulation.simulate import Flight, fly_to_end
+from flight.simulation.track import Track
+from logs.verdict.measures.energy import predicted_energy
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world
+from logs.verdict.returns.return_starts import flown_starts
+from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, VariedFlight, vary_flight
+from planfly.campaigns.dispersions import draw_flight
+from planfly.campaigns.flight_requests import FlightRequest
+from planfly.campaigns.flight_row import FlightRow, Outcome
+from planfly.campaigns.statistics.decision import Interval
+from planfly.campaigns.worker_pool import Workers, worker_pool
+from planfly.runtime.stages import Advance
+from world.arrays import Floats
+
+# Default number of flights.
+DEFAULT_BATTERY_FLIGHTS = 100
+# Capacity with which no flight ends early, Wh.
+_ENDLESS_BATTERY_WH = 1e9
+# Largest relative change of the capacity from one campaign to the next at which its mass counts as found.
+_CAPACITY_TOLERANCE = 0.005
+# Largest number of campaigns in the search for the mass.
+_MAX_ROUNDS = 8
+# Range of the aircraft's mass relative to its stated mass.  A heavier aircraft would be another one; a lighter one is
+# flown with the lowest mass, which needs more energy and so is safe.
+MIN_MASS_FACTOR = 0.6
+_MAX_MASS_FACTOR = 1.5
+# End reason of a flight that flew its mission to the end.
+_COMPLETED = "completed"
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryGoal:
+    """Question of a search for a battery.
+
+    probability: probability with which the reserve is to be kept.
+    confidence: confidence of the interval of the capacity.
+    flights: number of flights of each campaign.
+    interval: time between two returns, s.
+    reserve: fraction of the battery that is to be left.
+    specific_energy: energy per battery mass, Wh/kg; None if the mass does not change with the battery.
+    """
+
+    probability: float = 0.95
+    confidence: float = 0.95
+    flights: int = DEFAULT_BATTERY_FLIGHTS
+    interval: float = 10.0
+    reserve: float = ENERGY_RESERVE_FRACTION
+    specific_energy: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyRow(FlightRow):
+    """Row of a flight with the energies that it needs.
+
+    mission_energy: energy used at the end of the mission, Wh.
+    return_energy: highest energy used at the end of a return, Wh; NaN if no return's energy is known.
+    return_time: start of this return, s.
+    return_leg: leg on which this return starts, from 0.
+    leg_energies: energy used on each leg, Wh.
+    battery_factor: drawn factor on the battery's capacity.
+    lost_returns: number of returns that do not arrive, whose energy is unknown.
+    """
+
+    mission_energy: float = math.nan
+    return_energy: float = math.nan
+    return_time: float = math.nan
+    return_leg: int = -1
+    leg_energies: tuple[float, ...] = ()
+    battery_factor: float = 1.0
+    lost_returns: int = 0
+
+    def required_capacity(self, reserve: float) -> float:
+        """Return the smallest nominal capacity that leaves a fraction of the battery unused, Wh."""
+        return float(np.fmax(self.mission_energy, self.return_energy)) / ((1.0 - reserve) * self.battery_factor)
+
+    @property
+    def is_decided_by_return(self) -> bool:
+        """True if a return needs more energy than the mission."""
+        return self.return_energy > self.mission_energy
+
+
+def fly_for_energy(
+    base: CampaignBase, index: int, wind: GivenWind | None = None, *, interval: float, mass_factor: float
+) -> EnergyRow:
+    """Fly one flight of a campaign with an endless battery, and simulate its returns.
+
+    index: number of the flight, from 0.
+    wind: mean wind that replaces the scenario's wind, or None.
+    interval: time between two returns, s.
+    mass_factor: mass of the aircraft with its battery, relative to the stated mass.
+    """
+    draw = draw_flight(base.dispersions, base.seed, index)
+    endless = replace(base, airframe=replace(base.airframe, battery=_ENDLESS_BATTERY_WH))
+    varied = vary_flight(endless, draw, wind)
+    variation = varied.off_nominal.variation
+    variation = replace(variation, mass=variation.mass * mass_factor)
+    flight = Flight(varied.setup, varied.airframe.aircraft, variation, start_offset=varied.off_nominal.start_offset)
+    flown = fly_to_end(flight)
+    track = flown.track
+    outcome: Outcome = "flyable" if flown.ended == _COMPLETED else "not flyable"
+    row = EnergyRow(draw=draw, outcome=outcome, ended=flown.ended, battery_factor=draw.values["battery"])
+    if flown.ended != _COMPLETED or not len(track):
+        return row
+    energy = track.energy.astype(np.float64)
+    row = replace(
+        row,
+        mission_energy=float(energy.max()),
+        duration=float(track.time[-1]),
+        leg_energies=tuple(np.bincount(track.leg[1:], weights=np.diff(energy)).tolist()),
+    )
+    return _with_returns(row, varied, track, interval)
+
+
+def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: float) -> EnergyRow:
+    """Return the row with the return that needs the most energy; without a home, return the row unchanged.
+
+    The energy of a return is that of the point mass, times the ratio of flown to predicted energy of this flight's
+    mission: the point mass does not know the drawn mass and drag, gusts and turns.
+    """
+    if varied.setup.mission.home is None:
+        return row
+    predicted, _ = predicted_energy(route_requirements(varied.setup))
+    ratio = row.mission_energy / predicted if predicted > 0.0 else 1.0
+    returns: Returns = judge_returns(
+        make_return_world(varied.setup), flown_starts(varied.setup, track, interval), interval
+    )
+    arriving = [one for one in returns.each if math.isfinite(one.time_to_loiter)]
+    row = replace(row, lost_returns=len(returns.each) - len(arriving))
+    if not arriving:
+        return row
+    worst = max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
+    leg = int(track.leg[min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))])
+    needed = worst.energy_used + ratio * worst.energy
+    return replace(row, return_energy=needed, return_time=worst.time, return_leg=leg)
+
+
+class CapacityRange(NamedTuple):
+    """Confidence interval of a capacity, Wh."""
+
+    low: float
+    high: float
+
+
+class BatteryDecision(NamedTuple):
+    """Part of the flight that needs the most energy, and the number of flights in which it does.
+
+    flights: number of flights.
+    leg: leg on which the deciding return starts, from 0; -1 for the end of the mission.
+    time: median start of these returns, s; NaN for the end of the mission.
+    """
+
+    flights: int
+    leg: int
+    time: float
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class BatteryResult:
+    """Result of `planfly.battery`.
+
+    capacity: smallest capacity that keeps the reserve with the probability, Wh; inf if no battery does, because the
+        energy that it adds is needed for its own mass; NaN if it is unknown.
+    interval: its interval with the goal's confidence, Wh; its upper end is inf if there are too few flights.
+    own_capacity: capacity of the aircraft's battery, Wh.
+    is_guessed: True if the aircraft does not state its battery.
+    kept: number of flights in which the aircraft's own battery keeps the reserve, at the stated mass.
+    rows: the flights with the found battery's mass.
+    mass_factor: mass of the aircraft with the found battery, relative to its stated mass.
+    mass: stated mass, kg.
+    volts: nominal voltage of the battery, V; 0 if unknown.
+    """
+
+    goal: BatteryGoal
+    base: CampaignBase
+    capacity: float
+    interval: CapacityRange
+    own_capacity: float
+    is_guessed: bool
+    kept: int
+    rows: tuple[EnergyRow, ...]
+    mass_factor: float
+    mass: float
+    volts: float
+
+    def __repr__(self) -> str:
+        return f"<BatteryResult {self.base.name}: {self.capacity:.0f} Wh>"
+
+    @property
+    def completed(self) -> tuple[EnergyRow, ...]:
+        """Flights that completed the mission with a known energy."""
+        return tuple(row for row in self.rows if row.mission_energy > 0.0)
+
+    @property
+    def own_probability(self) -> Interval:
+        """Bounds of the probability that the aircraft's own battery keeps the reserve, each with the confidence."""
+        from scipy import stats
+
+        two_sided = 1.0 - 2.0 * (1.0 - self.goal.confidence)
+        low, high = stats.binomtest(self.kept, max(1, len(self.rows))).proportion_ci(two_sided, method="exact")
+        return Interval(float(low), float(high))
+
+    @property
+    def is_enough(self) -> bool | None:
+        """True if the aircraft's own battery keeps the reserve with the probability; None if it is not known."""
+        if self.is_guessed or math.isnan(self.capacity):
+            return None
+        if self.own_probability.low >= self.goal.probability:
+            return True
+        return False if self.own_probability.high < self.goal.probability else None
+
+    @property
+    def decisions(self) -> tuple[BatteryDecision, ...]:
+        """Parts that decide the battery, the most frequent first."""
+        legs = Counter(row.return_leg if row.is_decided_by_return else -1 for row in self.completed)
+        times = {
+            leg: [row.return_time for row in self.completed if row.is_decided_by_return and row.return_leg == leg]
+            for leg in legs
+        }
+        return tuple(
+            BatteryDecision(count, leg, float(np.median(times[leg])) if leg >= 0 else math.nan)
+            for leg, count in legs.most_common()
+        )
+
+    @property
+    def leg_energies(self) -> Floats:
+        """Median energy of each leg over the flights, Wh, (legs,)."""
+        rows = [row.leg_energies for row in self.completed]
+        legs = max(map(len, rows), default=0)
+        padded = np.array([(*row, *[0.0] * (legs - len(row))) for row in rows]).reshape(len(rows), legs)
+        return np.median(padded, axis=0) if len(rows) else np.zeros(0)
+
+
+def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advance: Advance) -> BatteryResult:
+    """Find the smallest battery that keeps the reserve in the flights of a campaign.
+
+    If the mass changes with the battery, campaigns of the same draws are flown with the mass of the battery that the
+    campaign before has found, until the battery no longer changes.
+    """
+    aircraft = base.airframe.aircraft
+    own_capacity = base.airframe.battery
+    rows = fly_energy_campaign(base, goal, workers, 1.0, advance)
+    kept = sum(row.required_capacity(goal.reserve) <= own_capacity for row in rows)
+    capacity, interval = quantile_of_capacities(rows, goal)
+    mass_factor = 1.0
+    if goal.specific_energy is not None and math.isfinite(capacity):
+        for _ in range(_MAX_ROUNDS):
+            assumed = capacity
+            mass_factor = 1.0 + (assumed - own_capacity) / goal.specific_energy / aircraft.mass
+            mass_factor = max(MIN_MASS_FACTOR, mass_factor)
+            if mass_factor > _MAX_MASS_FACTOR:
+                capacity, interval = math.inf, CapacityRange(math.inf, math.inf)
+                break
+            rows = fly_energy_campaign(base, goal, workers, mass_factor, advance)
+            capacity, interval = quantile_of_capacities(rows, goal)
+            if not math.isfinite(capacity) or abs(capacity - assumed) <= _CAPACITY_TOLERANCE * assumed:
+                break
+    envelope = base.nominal_setup().envelope
+    return BatteryResult(
+        goal=goal,
+        base=base,
+        capacity=capacity,
+        interval=interval,
+        own_capacity=own_capacity,
+        is_guessed=envelope.battery_guessed and base.scenario.flight.battery_wh is None,
+        kept=kept,
+        rows=rows,
+        mass_factor=mass_factor,
+        mass=aircraft.mass,
+        volts=envelope.volts or 0.0,
+    )
+
+
+def fly_energy_campaign(
+    base: CampaignBase, goal: BatteryGoal, workers: Workers, mass_factor: float, advance: Advance
+) -> tuple[EnergyRow, ...]:
+    """Fly the flights of a campaign for their energy; return their rows in the order of the draws.
+
+    A flight whose worker died is left out of the rows.
+    """
+    indices: Iterator[int] = iter(range(goal.flights))
+
+    def next_request() -> FlightRequest | None:
+        index = next(indices, None)
+        return None if index is None else FlightRequest(index)
+
+    fly = partial(fly_for_energy, interval=goal.interval, mass_factor=mass_factor)
+    rows: dict[int, EnergyRow] = {}
+    with worker_pool(workers, base, fly) as pool:
+        for count, finished in enumerate(pool.fly(next_request), 1):
+            advance(count, goal.flights, f"{count} of {goal.flights} flights")
+            if isinstance(finished.row, EnergyRow):
+                rows[finished.request.index] = finished.row
+    return tuple(rows[index] for index in sorted(rows))
+
+
+def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tuple[float, CapacityRange]:
+    """Return the quantile of the capacities that the flights need, Wh, and its interval from the order statistics.
+
+    Both are NaN if a larger part of the flights than the goal leaves open did not complete the mission, or if the
+    aircraft's power is unknown.
+    """
+    from scipy import stats
+
+    needed = np.array([row.required_capacity(goal.reserve) for row in rows if row.mission_energy > 0.0])
+    if len(needed) < 2 or len(needed) < goal.probability * len(rows):
+        return math.nan, CapacityRange(math.nan, math.nan)
+    capacity = float(np.quantile(needed, goal.probability, method="median_unbiased"))
+    test = stats.quantile_test(needed, p=goal.probability)
+    low, high = test.confidence_interval(goal.confidence)
+    return capacity, CapacityRange(
+        float(low) if math.isfinite(low) else 0.0, float(high) if math.isfinite(high) else math.inf
+    )

@@ -1,0 +1,145 @@
+"""Batteries: arithmetic of capacities, quantile and interval, comparison with the aircraft's battery, flights."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import planfly
+from planfly.campaigns.battery_text import answer_line, battery_lines
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.dispersions import default_dispersions, draw_flight
+from planfly.campaigns.find_battery import (
+    BatteryGoal,
+    BatteryResult,
+    CapacityRange,
+    EnergyRow,
+    fly_for_energy,
+    quantile_of_capacities,
+)
+
+_DRAW = draw_flight(default_dispersions(), 1, 0)
+
+
+def energy_row(mission_energy: float = math.nan, **others: float) -> EnergyRow:
+    """Make the row of a flight that needs an energy for its mission, Wh."""
+    ended = "ground contact" if math.isnan(mission_energy) else "completed"
+    return replace(
+        EnergyRow(draw=_DRAW, outcome="flyable", ended=ended, mission_energy=mission_energy),
+        **others,  # type: ignore[arg-type]
+    )
+
+
+@pytest.fixture(scope="module")
+def base() -> CampaignBase:
+    return open_campaign("tight", default_dispersions(), {"seed": 1})
+
+
+def battery_result(base: CampaignBase, rows: list[EnergyRow], own: float, **goal: float) -> BatteryResult:
+    """Make the result for rows that were flown at the stated mass."""
+    question = BatteryGoal(**goal)  # type: ignore[arg-type]
+    capacity, interval = quantile_of_capacities(tuple(rows), question)
+    kept = sum(row.required_capacity(question.reserve) <= own for row in rows)
+    return BatteryResult(question, base, capacity, interval, own, False, kept, tuple(rows), 1.0, 11.0, 44.4)
+
+
+def test_a_flight_needs_the_larger_energy_over_the_usable_part_of_its_battery() -> None:
+    row = energy_row(80.0, return_energy=88.0, battery_factor=0.8)
+    assert row.required_capacity(0.2) == pytest.approx(88.0 / (0.8 * 0.8))
+    assert row.is_decided_by_return
+    alone = energy_row(80.0)
+    assert alone.required_capacity(0.5) == pytest.approx(160.0)
+    assert not alone.is_decided_by_return
+
+
+def test_the_capacity_is_the_median_unbiased_quantile() -> None:
+    rows = tuple(energy_row(0.8 * k) for k in range(100, 0, -1))
+    capacity, interval = quantile_of_capacities(rows, BatteryGoal())
+    # Position n p + (p + 1) / 3 of the sorted capacities 1 to 100 Wh (Hyndman and Fan 1996, definition 8).
+    assert capacity == pytest.approx(95.0 + 1.95 / 3.0)
+    assert interval.low < 95.0 < interval.high <= 100.0
+
+
+def test_the_interval_covers_the_true_quantile() -> None:
+    random = np.random.default_rng(3)
+    true_quantile = (100.0 + 1.6448536 * 8.0) / 0.8
+    covered = 0
+    for _ in range(300):
+        rows = tuple(energy_row(float(energy)) for energy in random.normal(100.0, 8.0, 100))
+        low, high = quantile_of_capacities(rows, BatteryGoal())[1]
+        covered += low <= true_quantile <= high
+    # At a true coverage of 0.95, fewer than 273 of 300 have a probability of 0.1 %.
+    assert covered >= 273
+
+
+def test_too_few_flights_have_no_upper_end() -> None:
+    rows = tuple(energy_row(80.0 + k) for k in range(40))
+    assert quantile_of_capacities(rows, BatteryGoal())[1].high == math.inf
+
+
+@pytest.mark.parametrize(("crashes", "is_known"), [(5, True), (6, False)])
+def test_flights_that_do_not_complete_leave_it_unknown(base: CampaignBase, crashes: int, is_known: bool) -> None:
+    rows = [energy_row(80.0) for _ in range(100 - crashes)] + [energy_row() for _ in range(crashes)]
+    result = battery_result(base, rows, own=200.0)
+    assert math.isfinite(result.capacity) == is_known
+    assert (
+        "6 of 100 flights do not complete the mission, most of them: ground contact" in answer_line(result)
+    ) != is_known
+    if not is_known:
+        assert result.is_enough is None
+
+
+@pytest.mark.parametrize(
+    ("flights", "kept", "is_enough"),
+    [
+        # 0.95^58 is above and 0.95^59 is below 0.05.
+        (58, 58, None),
+        (59, 59, True),
+        (100, 100, True),
+        (100, 95, None),
+        (100, 85, False),
+    ],
+)
+def test_the_own_battery_is_judged_by_the_binomial_bounds(
+    base: CampaignBase, flights: int, kept: int, is_enough: bool | None
+) -> None:
+    rows = [energy_row(80.0 if k < kept else 120.0) for k in range(flights)]
+    result = battery_result(base, rows, own=110.0)
+    assert result.is_enough is is_enough
+    assert any(f"in {kept} of {flights} flights" in line for line in battery_lines(result))
+
+
+def test_a_guessed_battery_is_not_compared(base: CampaignBase) -> None:
+    result = replace(battery_result(base, [energy_row(80.0)] * 100, own=888.0), is_guessed=True)
+    assert result.is_enough is None
+    assert any("does not state its battery" in line for line in battery_lines(result))
+
+
+def test_no_battery_carries_itself(base: CampaignBase) -> None:
+    none = CapacityRange(math.inf, math.inf)
+    result = replace(
+        battery_result(base, [energy_row(80.0)] * 100, own=888.0, specific_energy=30.0),
+        capacity=math.inf,
+        interval=none,
+    )
+    assert answer_line(result).startswith("no battery keeps 20%")
+
+
+def test_a_flight_uses_what_its_track_says(base: CampaignBase) -> None:
+    row = fly_for_energy(base, 0, interval=5.0, mass_factor=1.0)
+    assert sum(row.leg_energies) == pytest.approx(row.mission_energy, rel=1e-3)
+    assert row.battery_factor == draw_flight(base.dispersions, base.seed, 0).values["battery"]
+    heavier = fly_for_energy(base, 0, interval=5.0, mass_factor=1.3)
+    assert heavier.mission_energy > 1.02 * row.mission_energy
+
+
+def test_a_found_battery_keeps_the_reserve_in_other_flights(base: CampaignBase) -> None:
+    """A twentieth of fresh flights may need more; so many of 40 that the found probability is refuted do not."""
+    found = planfly.battery("tight", seed=1, flights=60, workers=2, every=5.0)
+    assert found.is_enough
+    fresh = [fly_for_energy(replace(base, seed=77), index, interval=5.0, mass_factor=1.0) for index in range(40)]
+    kept = sum(row.required_capacity(0.2) <= found.capacity for row in fresh)
+    # At a probability of 0.95, fewer than 33 of 40 have a probability of 0.1 %.
+    assert kept >= 33
+    assert repr(found).startswith("<BatteryResult tight: ")
