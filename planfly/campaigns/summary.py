@@ -4,14 +4,15 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from logs.verdict.conditions import Conditions, flown_lines
+from logs.verdict.junit import JunitCase, JunitSuite
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.wording import place_text
+from logs.verdict.wording import count_text, place_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
@@ -256,6 +257,26 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
             f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
         )
     return lines
+
+
+def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
+    """Return the JUnit suite of a campaign: a test case for its target, and one for each rule that a flight failed.
+
+    name: mission of the campaign.
+
+    All cases fail if the target is missed or undecided, and all are skipped without a target.  If the target is
+    reached, all pass, and those of rules have their failures as text.
+    """
+    answer, lines = summary.estimate.answer, campaign_lines(summary)
+    result: Literal["passed", "failure", "skipped"] = (
+        "passed" if answer == "reached" else "skipped" if answer == "no target" else "failure"
+    )
+    cases = [JunitCase("planfly", "verdict", result, lines[0])]
+    for failures in summary.by_rule:
+        text = f"{failures.flights} of {count_text(summary.estimate.tally.flown, 'flight')} failed"
+        (line,) = failure_lines([failures])
+        cases.append(JunitCase(f"planfly.{failures.rule}", "flights", result, text, line.strip()))
+    return JunitSuite(name, cases, "\n".join(lines))
 
 
 def _answer_text(summary: CampaignSummary) -> str:

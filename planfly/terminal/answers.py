@@ -135,7 +135,7 @@ def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
 
 
 # ----------------------------------------------------------------------
-# Answers of ``planfly campaign`` and ``planfly winds``, which are also the content of summary.json and winds.json.
+# Answers of ``planfly campaign`` and ``planfly winds``: the exit code, and the content of summary.json or winds.json.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -175,6 +175,7 @@ class CampaignDocument:
     """planfly campaign: the probability that a mission is flyable."""
 
     schema: Literal["planfly.campaign-summary/1"]
+    exit_code: int
     name: str
     seed: int
     target: float | None
@@ -223,6 +224,10 @@ class WindDirection:
     interval_mps: list[float]
     beyond: bool
     """True if the mission is flyable in every wind that was flown."""
+    judged: bool
+    """False if the boundary depends mostly on assumptions, because there are too few flights."""
+    reason: str
+    """Reason why the boundary is not judged; "" if it is judged."""
     flown: list[WindFlights]
     failed_by_rule: list[FailedRule]
     """Failures of the flights in winds up to the upper bound of the interval; the rule with most flights decides."""
@@ -242,10 +247,15 @@ class CalmFlights:
 class WindsDocument:
     """planfly winds: the largest wind from each direction."""
 
-    schema: Literal["planfly.winds/1"]
+    schema: Literal["planfly.winds/2"]
+    exit_code: int
     name: str
     seed: int
     target: float
+    answer: str
+    """judged, not judged in full, not judged, or "not flyable" if not flyable even in calm air with the target."""
+    reason: str
+    """Reason why the search or some of its directions are not judged; "" if all are judged."""
     confidence: float
     most: float
     """Strongest wind that was flown, m/s."""

@@ -3,12 +3,15 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
+from logs.verdict.junit import suites_text
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import count_failures
 from planfly.campaigns.report import campaign_page
-from planfly.campaigns.summary import campaign_lines, summary_json
+from planfly.campaigns.statistics.decision import Answer
+from planfly.campaigns.summary import campaign_lines, campaign_suite, summary_json
 from tests.planfly.campaigns.made_campaigns import made_flight
 from tests.planfly.campaigns.made_report import made_report
 
@@ -35,6 +38,24 @@ def test_it_counts_what_failed_and_names_what_was_lost(base: CampaignBase, tmp_p
         text = "\n".join(campaign_lines(summary))
         assert f"{59 - failed} of 60 flights are flyable" in text
         assert "lost    1" in text
+
+
+def test_the_target_and_each_failed_rule_are_cases_of_continuous_integration(
+    base: CampaignBase, tmp_path: Path
+) -> None:
+    with made_report(base, tmp_path) as (_, summary):
+        failed = summary.by_rule[0].flights
+        results = {"reached": "passed", "missed": "failure", "undecided": "failure", "no target": "skipped"}
+        for answer, result in results.items():
+            estimate = replace(summary.estimate, answer=cast(Answer, answer))
+            suite = campaign_suite("m.waypoints", replace(summary, estimate=estimate))
+            assert [(case.classname, case.name, case.result) for case in suite.cases] == [
+                ("planfly", "verdict", result),
+                ("planfly.clearance", "flights", result),
+            ]
+            assert suite.cases[1].message == f"{failed} of 60 flights failed"
+            assert suite.cases[1].text == f"failed  clearance in {failed}: leg 1 in {failed}"
+            assert suites_text([suite]).count("<failure") == (2 if result == "failure" else 0)
 
 
 def test_a_campaign_without_a_target_says_so_in_its_answer(base: CampaignBase, tmp_path: Path) -> None:
