@@ -24,6 +24,7 @@ returns                              whether the aircraft would come home from e
 link                                 the radio link to the ground station along a flight
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
+compare_campaigns                    whether flights of one campaign are more likely to be flyable than another's
 serve                                a MAVLink vehicle for ground stations
 open_studio                          a page on which a mission is dragged, judged, flown and saved
 scenarios, aircraft                  the built-in scenarios and aircraft
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from planfly.api.campaigns import CampaignFlight as CampaignFlight
     from planfly.api.campaigns import campaign as campaign
     from planfly.api.campaigns import campaign_flight as campaign_flight
+    from planfly.api.campaigns import compare_campaigns as compare_campaigns
     from planfly.api.campaigns import winds as winds
     from planfly.api.cutting_terrain import terrain as terrain
     from planfly.api.drafting import new_scenario as new_scenario
@@ -117,6 +119,7 @@ if TYPE_CHECKING:
     from planfly.api.surveying import SurveyResult as SurveyResult
     from planfly.api.surveying import survey as survey
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
+    from planfly.campaigns.compare_campaigns import CampaignComparison as CampaignComparison
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_winds import WindsResult as WindsResult
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
@@ -168,6 +171,7 @@ _HOMES = {
             "CampaignFlight",
             "campaign",
             "campaign_flight",
+            "compare_campaigns",
             "winds",
         ),
         "planfly.api.cutting_terrain": ("terrain",),
@@ -245,6 +249,7 @@ _HOMES = {
         ),
         "planfly.studio.open_studio": ("open_studio",),
         "planfly.campaigns.campaign_result": ("CampaignResult",),
+        "planfly.campaigns.compare_campaigns": ("CampaignComparison",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsResult",),
         "planfly.campaigns.dispersions": ("SpreadError",),

@@ -35,7 +35,7 @@ class FindingDocument(DocumentConfig):
     """The values that pass in words, with the tolerance: "≤ 8.29 m"; "" without a limit."""
     tolerance: float | None
     margin: float | None
-    """Distance inside the limit; negative beyond the limit."""
+    """Distance inside the limit, without the tolerance; negative beyond the limit, even within the tolerance."""
     unit: str
     """Unit of planned, flown, limit, tolerance and margin."""
     method: str

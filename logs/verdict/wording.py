@@ -173,6 +173,29 @@ def count_text(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
+def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
+    """Return a margin with its sign and unit; a negative margin that passes is within the tolerance.
+
+    tolerance: the tolerance, in `unit`; None or 0 if it is not known.
+
+    >>> margin_text(12.0, "m", passed=True), margin_text(-3.04, "m", passed=False)
+    ('+12.0 m', '-3.0 m')
+    >>> margin_text(-0.3, "m", passed=True), margin_text(-0.3, "m", passed=True, tolerance=0.5)
+    ('-0.3 m, within the tolerance', '-0.3 m, within the tolerance of 0.5 m')
+    """
+    text = f"{margin:+.1f} {unit}"
+    return f"{text}, {within_tolerance_text(tolerance, unit)}" if passed and margin < 0.0 else text
+
+
+def within_tolerance_text(tolerance: float | None, unit: str) -> str:
+    """Return the words for a value beyond its limit that passes.  tolerance: in `unit`; None if it is not known.
+
+    >>> within_tolerance_text(0.5, "m/s"), within_tolerance_text(None, "")
+    ('within the tolerance of 0.5 m/s', 'within the tolerance')
+    """
+    return "within the tolerance" + (f" of {quantity_text(tolerance, unit)}" if tolerance else "")
+
+
 def moves_text(moves: Sequence[ItemMove]) -> str:
     """List moves of items; items that move alike are named together.
 

@@ -61,10 +61,14 @@ def _add_outcome(tally: Tally, outcome: str) -> Tally:
     return Tally(flyable + (outcome == "flyable"), not_flyable + (outcome == "not flyable"), lost + (outcome == "lost"))
 
 
-def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
+def resumed_goal(
+    requested: Goal | None, folder: Path, confidence: float | None = None, *, keeps_flights: bool = False
+) -> Goal:
     """Return the goal of a resumed campaign: the requested goal, or the stored goal if none is requested.
 
     confidence: confidence of the goal; None keeps the stored confidence.
+    keeps_flights: True keeps the stored number of flights, if both goals have a fixed number or both stop by
+        themselves.
     Raises StoreError for a folder without a campaign.
     """
     path = folder / CAMPAIGN_DATABASE
@@ -73,6 +77,8 @@ def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None 
         raise StoreError(f"{path}: there is no campaign to continue", file=path)
     old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
     goal = old_goal if requested is None else requested
+    if keeps_flights and goal.stops == old_goal.stops:
+        goal = replace(goal, flights=old_goal.flights)
     is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)
     return replace(goal, confidence=confidence or old_goal.confidence, changed=old_goal.changed or not is_same)
 

@@ -62,7 +62,8 @@ def add_campaign_parser(command_line: LineParser) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="number of flights (default: 300); with --prove, the maximum (default: 5000)",
+        help="number of flights (default: 300); with --prove, the maximum (default: 5000); with --resume, the default "
+        "is the number of the resumed campaign",
     )
     parser.add_argument(
         "--confidence",

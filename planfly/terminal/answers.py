@@ -171,6 +171,19 @@ class SensitivityEntry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ClosestRule:
+    """Rule by how close the flights came to failing it."""
+
+    rule: str
+    failed: int
+    """Number of flights that failed the rule."""
+    smallest_margin: float | None
+    """Negative beyond the limit; a rule that no flight failed then passed within its tolerance."""
+    margin_of_one_in_twenty: float | None
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CampaignDocument:
     """planfly campaign: the probability that a mission is flyable."""
 
@@ -197,6 +210,8 @@ class CampaignDocument:
     deciding_rule: str
     margin_of_one_in_twenty: float | None
     margin_unit: str
+    closest_rules: list[ClosestRule]
+    """Rules that flights failed, the most flights first, then the others, the closest to their limits first."""
     sensitivities: list[SensitivityEntry]
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
@@ -398,6 +413,58 @@ class CompareAnswer:
     quantities: list[QuantityPair]
     notes: list[str]
     files: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ComparedCampaignEntry:
+    """One of two campaigns."""
+
+    name: str
+    flights: int
+    flyable: int
+    probability: float
+    interval: list[float]
+    """Two-sided interval of the probability, at 95 % confidence."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ChangedRule:
+    """Number of flights of each campaign that failed a rule."""
+
+    rule: str
+    first: int
+    second: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class CompareCampaignsAnswer:
+    """planfly compare: the probabilities of two campaigns."""
+
+    schema: Literal["planfly.compare-campaigns/1"] = "planfly.compare-campaigns/1"
+    exit_code: int
+    answer: str
+    """Flights of the second campaign are "more likely" or "less likely" to be flyable, or "no difference shown"."""
+    campaigns: list[ComparedCampaignEntry]
+    difference: float
+    """Probability of the second campaign minus that of the first."""
+    interval: list[float]
+    """Two-sided interval of the difference, at 95 % confidence."""
+    p_value: float
+    """Of McNemar's exact test if the flights are pairs, otherwise of Fisher's exact test."""
+    pairs: int
+    """Number of flights with the same draws in both campaigns; 0 if the draws differ."""
+    only_first: int
+    """Number of pairs that are flyable only in the first campaign."""
+    only_second: int
+    rules: list[ChangedRule]
+    """The largest change first."""
+    inputs: list[str]
+    """Options that differ."""
+    notes: list[str]
+
+
+# Answer of ``planfly compare``, of two logs or of two campaigns.
+CompareDocument = CompareAnswer | CompareCampaignsAnswer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
