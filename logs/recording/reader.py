@@ -50,6 +50,7 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.reference_flights import parse_reference_flights
 from world.argument_types import checks_types
 from world.errors import LogError
+from world.files import missing_text
 from world.html_table import html_table
 
 # ----------------------------------------------------------------------
@@ -300,7 +301,7 @@ def read_log(path: Path | str) -> FlightLog:
     messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
-            raise LogError(f"{path}: not a file; expected a flight log (.mcap)", file=path)
+            raise LogError(f"{path}: {missing_text(path)}; expected a flight log (.mcap)", file=path)
         with path.open("rb") as file:
             _check_magic(file.read(len(MAGIC)), path)
             for data in read_chunks(file, container):

@@ -230,6 +230,7 @@ def summary_lines(
     lines += _terrain_error_lines(findings, setup)
     if setup.plan is not None and setup.plan.unmet_margins:
         lines.append(f"Planner's margins not met: {'; '.join(setup.plan.unmet_margins)}")
+    lines += [f"Note: {warning}" for warning in setup.mission.warnings]
     if setup.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":

@@ -77,7 +77,10 @@ def _open_base(
         with stage("planning") as advance:
             return make_base(advance=advance)
 
-    return folder.open_base_and_clear(open_with_plan)
+    base = folder.open_base_and_clear(open_with_plan)
+    for warning in base.mission.warnings:
+        report_line(f"note: {warning}")
+    return base
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:

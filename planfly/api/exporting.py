@@ -41,7 +41,7 @@ from planner.plan import Plan, plan_json
 from world.argument_types import checks_types
 from world.errors import MissionError, ParameterError, PlanflyError
 from world.extras import require_extra
-from world.files import temporary_folder, write_atomically
+from world.files import missing_text, temporary_folder, write_atomically
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
@@ -309,7 +309,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     needs_returns: True to add returns from a few points of the planned path.
     """
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
+        raise MissionError(f"{path}: {missing_text(path)}; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     has_own_parameters = is_plan or options["scenario"] is not None or options["params"] is not None
     if not (needs_world or has_own_parameters or fences.zones or options["at"] is not None):

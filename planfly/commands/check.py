@@ -91,7 +91,7 @@ def check(args: argparse.Namespace) -> int:
         return _check_for_each_autopilot(args)
     result = call_api(planfly.judge, args)
     if not result.is_log:
-        print_warnings([*result.setup.mission.warnings, *result.setup.scenario.notes])
+        print_warnings(result.setup.scenario.notes)
     code = INCOMPLETE if result.lossy else verdict_code(result.verdict)
     write_json_if_requested(args, lambda: _verdict_answer(result.verdict, code))
     write_junit_if_requested(args, {args.what: result.verdict})

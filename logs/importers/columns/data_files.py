@@ -10,6 +10,7 @@ import numpy as np
 
 from logs.importers.columns.file_names import DATA_SUFFIXES
 from world.errors import LogError
+from world.files import missing_text
 
 Column = np.ndarray[Any, Any]
 # First bytes of a MAT file of version 7.3, which is an HDF5 file.
@@ -50,7 +51,7 @@ def read_data_file(path: Path) -> DataFile:
         raise LogError.at(path, "suffix", suffix or "none", f"expected {', '.join(DATA_SUFFIXES)}")
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file; expected {', '.join(DATA_SUFFIXES)}", file=path)
+            raise LogError(f"{path}: {missing_text(path)}; expected {', '.join(DATA_SUFFIXES)}", file=path)
         if not path.stat().st_size:
             raise LogError(f"{path}: empty; expected columns of numbers", file=path)
         data = readers[suffix](path)
