@@ -107,7 +107,7 @@ class VerdictDocument(DocumentConfig):
     flyable: bool
     complete: bool
     answer: str
-    """flyable, not flyable, incomplete or not judged in full; for an imported flight flown as planned or not."""
+    """flyable, not flyable or not judged in full; of an imported flight flown, or not flown, as planned."""
     undecided: bool
     """True if nothing failed, but something that had to be judged was not."""
     summary: str

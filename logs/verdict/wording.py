@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, Suggestion
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
+from world.wording import count_text as count_text
 
 # Text of a unit after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "dB": " dB", "legs": " legs", "%": " %"}
@@ -164,15 +165,6 @@ def suggestion_text(suggestion: Suggestion) -> str:
     return f"{text} (move {moves_text(moves)})" if moves else text
 
 
-def count_text(count: int, noun: str) -> str:
-    """Return a number with its noun.
-
-    >>> count_text(1, "threat"), count_text(2, "threat")
-    ('1 threat', '2 threats')
-    """
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
-
-
 def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
     """Return a margin with its sign and unit; a negative margin that passes is within the tolerance.
 
@@ -309,7 +301,12 @@ def quantity_text(value: float, unit: str) -> str:
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')
     """
-    return _significant_digits(value, 3) + _unit_suffix(unit)
+    return _with_unit(_significant_digits(value, 3), unit)
+
+
+def _with_unit(digits: str, unit: str) -> str:
+    """Return the digits of a number with its unit, a counted unit in the singular after 1."""
+    return digits + (" leg" if (digits, unit) == ("1", "legs") else _unit_suffix(unit))
 
 
 def _unit_suffix(unit: str) -> str:
@@ -336,8 +333,7 @@ def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
         and _significant_digits(value, digits) == _significant_digits(limit, digits)
     ):
         digits += 1
-    suffix = _unit_suffix(unit)
-    return _significant_digits(value, digits) + suffix, _significant_digits(limit, digits) + suffix
+    return _with_unit(_significant_digits(value, digits), unit), _with_unit(_significant_digits(limit, digits), unit)
 
 
 def _significant_digits(value: float, digits: int) -> str:

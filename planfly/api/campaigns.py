@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Unpack
 
-from logs.verdict.wording import count_text
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
 from planfly.campaigns.campaign_result import CampaignResult, campaign_command_line, make_goal, winds_command_line
@@ -40,6 +39,7 @@ from planfly.runtime.stages import report_line, stage
 from planner.plan import Plan
 from world.errors import PlanflyError
 from world.extras import require_extra, requires_extra
+from world.wording import count_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +246,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
-            allowed = f"no such flight: the campaign has {store.tally().flown} flights, numbered from 0"
+            allowed = f"no such flight: the campaign has {count_text(store.tally().flown, 'flight')}, numbered from 0"
             raise PlanflyError.of_argument("index", index, allowed, file=store.path)
     return row
 

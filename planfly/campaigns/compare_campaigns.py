@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.wording import count_text
 from planfly.campaigns.campaign_inputs import difference_texts
 from planfly.campaigns.dispersions import NAMES
 from planfly.campaigns.flight_row import parse_failed_findings
@@ -17,6 +16,7 @@ from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Estimator,
 from planfly.campaigns.statistics.proportions import ProportionDifference, independent_difference, paired_difference
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, read_stored_settings, read_table
 from world.html_table import html_table
+from world.wording import count_text
 
 
 @dataclass(frozen=True, repr=False)
@@ -192,4 +192,4 @@ def _change_text(first: int, second: int, comparison: CampaignComparison) -> str
     """Return the number of flights that failed a rule in each campaign, and the change of their share."""
     change = 100.0 * (second / comparison.second.tally.flown - first / comparison.first.tally.flown)
     word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
-    return f"{word}, in {first} and {second} flights ({change:+.1f} %)"
+    return f"{word}, in {first} and {count_text(second, 'flight')} ({change:+.1f} %)"

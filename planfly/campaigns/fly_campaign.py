@@ -10,6 +10,7 @@ from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, Store, StoreError, read_stored_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
+from world.wording import count_text
 
 Advance = Callable[[float, float, str], None]
 
@@ -155,7 +156,7 @@ class _ProgressReport:
         if advance is not None:
             # Report before the workers start, because the start takes seconds.
             total = self._min_total_flights(stored_tally)
-            remark = f"{stored_tally.flown} of {total} flights" + (" at least" if goal.stops else "")
+            remark = f"{stored_tally.flown} of {count_text(total, 'flight')}" + (" at least" if goal.stops else "")
             advance(float(stored_tally.flown), float(total), remark)
 
     def start_timing(self, stored_tally: Tally) -> None:
@@ -178,7 +179,7 @@ class _ProgressReport:
         total = self._min_total_flights(tally)
         seconds_left = (total - tally.flown) / flights_per_second if flights_per_second > 0.0 else 0.0
         remark = (
-            f"{tally.flown} flights, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"
+            f"{count_text(tally.flown, 'flight')}, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"
             f" {60.0 * flights_per_second:.0f} a minute, {seconds_left:.0f} s left"
         )
         self._advance(float(tally.flown), float(total), remark)

@@ -19,7 +19,7 @@ from logs.theme import css_variables
 from logs.verdict.conditions import flown_lines
 from logs.verdict.junit import JunitCase, JunitSuite, answer_case
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.wording import count_text, place_text
+from logs.verdict.wording import place_text
 from logs.views.drawing import page_svg, png_bytes
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
@@ -62,6 +62,7 @@ from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_atomically
+from world.wording import count_text
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
 _MAX_DRAWN_FLIGHTS = 3000
@@ -567,8 +568,9 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
         return []
     min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
-        f"no flight failed in {len(counts)} of {len(winds.boundaries)} directions: {min_count} flights in"
-        f" {max_speed:g} m/s from each of them show P >= {probability_text} by themselves"
+        f"no flight failed in {len(counts)} of {count_text(len(winds.boundaries), 'direction')}:"
+        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"
+        " by themselves"
     ]
 
 
@@ -578,7 +580,10 @@ def _calm_lines(winds: WindsResult) -> list[str]:
     if calm is None:
         return []
     wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
-    return [f"in {wind}, {calm.failed_count} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
+    return [
+        f"in {wind}, {calm.failed_count} of {count_text(calm.flights, 'flight')} fail",
+        *failure_lines(calm.by_rule),
+    ]
 
 
 def _boundary_line(winds: WindsResult) -> str:
@@ -617,9 +622,9 @@ def wind_lines(winds: WindsResult) -> list[str]:
         *_deciding_lines(winds),
         *_lines_without_failures(winds),
         *_lost_lines(winds),
-        f"{len(winds.flights)} flights; no wind was tried, because every flight in calm air fails"
+        f"{count_text(len(winds.flights), 'flight')}; no wind was tried, because every flight in calm air fails"
         if _is_only_calm(winds)
-        else f"{len(winds.flights)} flights; intervals at {percent}, from the flights in each direction",
+        else f"{count_text(len(winds.flights), 'flight')}; intervals at {percent}, from the flights in each direction",
     ]
 
 

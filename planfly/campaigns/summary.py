@@ -12,7 +12,7 @@ from logs.verdict.conditions import Conditions, flown_lines
 from logs.verdict.junit import JunitCase, JunitSuite
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.wording import count_text, margin_text, place_text
+from logs.verdict.wording import margin_text, place_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
@@ -21,10 +21,12 @@ from planfly.campaigns.statistics.decision import (
     MIN_FLIGHTS_FOR_INDEX,
     Estimate,
     Goal,
+    Tally,
     first_order_index,
     rank_slope,
 )
 from planfly.campaigns.tables import Store
+from world.wording import count_text
 
 # Schema of ``summary.json``.
 SUMMARY_SCHEMA = "planfly.campaign-summary/1"
@@ -101,7 +103,7 @@ class CampaignSummary:
 
     def __repr__(self) -> str:
         tally = self.estimate.tally
-        return f"<CampaignSummary {self.name}: {tally.flyable} of {tally.flown} flights are flyable>"
+        return f"<CampaignSummary {self.name}: {_flyable_text(tally)}>"
 
 
 def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
@@ -313,7 +315,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     estimate, goal = summary.estimate, summary.goal
     tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
     lines = [
-        f"{_answer_text(summary)}: {tally.flyable} of {tally.flown} flights are flyable, P = {tally.share:.4f}",
+        f"{_answer_text(summary)}: {_flyable_text(tally)}, P = {tally.share:.4f}",
         f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
         f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
         *(f"  {line}" for line in flown_lines(summary.conditions)),
@@ -354,6 +356,11 @@ def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
         (line,) = failure_lines([failures])
         cases.append(JunitCase(f"planfly.{failures.rule}", "flights", result, text, line.strip()))
     return JunitSuite(name, cases, "\n".join(lines))
+
+
+def _flyable_text(tally: Tally) -> str:
+    """Return the number of flyable flights as text, such as "1 of 4 flights is flyable"."""
+    return f"{tally.flyable} of {count_text(tally.flown, 'flight')} {'is' if tally.flyable == 1 else 'are'} flyable"
 
 
 def _answer_text(summary: CampaignSummary) -> str:

@@ -37,6 +37,7 @@ from planfly.campaigns.statistics.decision import Tally
 from planfly.campaigns.table_repair import LOCKED_CODES, checksum, copy_undamaged_rows, examine_table, stored_value
 from planfly.runtime.stages import report_line
 from world.errors import PlanflyError
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # Convert a flight's row to values of the table's columns and back; `FlightRow`, `RULE_WORDS` and `NAMES` define these.
@@ -438,7 +439,7 @@ class Store(LockedTable):
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
         """Raise StoreError if the table contains more flights than requested."""
         if (flight_count := self.tally().flown) > settings.get("flights", math.inf):
-            reason = f"flights {settings['flights']}: the table already contains {flight_count} flights"
+            reason = f"flights {settings['flights']}: the table already contains {count_text(flight_count, 'flight')}"
             raise StoreError(f"{self.path}: {reason}", file=self.path)
 
     def add(self, row: FlightRow) -> None:

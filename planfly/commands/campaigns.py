@@ -232,8 +232,8 @@ def _report_stored_flights(args: argparse.Namespace, folder: Path, table: str) -
     try:
         yield lambda: code
     except KeyboardInterrupt as interruption:
-        from logs.verdict.wording import count_text
         from planfly.campaigns.tables import count_flights
+        from world.wording import count_text
 
         if not (folder / table).is_file():
             raise

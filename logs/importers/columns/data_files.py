@@ -11,6 +11,7 @@ import numpy as np
 from logs.importers.columns.file_names import DATA_SUFFIXES
 from world.errors import LogError
 from world.files import missing_text
+from world.wording import count_text
 
 Column = np.ndarray[Any, Any]
 # First bytes of a MAT file of version 7.3, which is an HDF5 file.
@@ -126,7 +127,12 @@ def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width
         # A separator at the end of each row adds an empty cell; quoted cells may contain separators.
         if cells != width and '"' not in line and not (cells == width + 1 and line.rstrip().endswith(separator)):
             allowed = f"expected {width}, as in the header"
-            raise LogError(f"{path}: line {number}: {cells} cells: {allowed}", file=path, value=cells, allowed=allowed)
+            raise LogError(
+                f"{path}: line {number}: {count_text(cells, 'cell')}: {allowed}",
+                file=path,
+                value=cells,
+                allowed=allowed,
+            )
 
 
 def _numbers_as_float64(values: Column) -> Column:

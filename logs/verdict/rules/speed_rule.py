@@ -109,6 +109,8 @@ def _speed_finding(
     if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, max_speed)):
         ok, check = None, UNKNOWN_AIRCRAFT
         notes.insert(0, uncertainty)
+    elif faults and commanded > max_speed and requirements.setup.envelope.fastest_sd:
+        notes.append(_fastest_text(requirements, max_speed))
     return make_finding(
         "speed",
         requirements.leg(leg),
@@ -192,8 +194,14 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     altitudes = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
+    return f"{commanded:.1f} m/s is commanded; {_fastest_text(requirements, max_speed)}"
+
+
+def _fastest_text(requirements: RouteRequirements, max_speed: float) -> str:
+    """State the maximum airspeed (m/s) of an uncertain aircraft, with its standard deviation."""
+    envelope = requirements.setup.envelope
     limit_text = f"the fastest level flight according to {envelope.source} is {max_speed:.1f} m/s"
-    return f"{commanded:.1f} m/s is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
+    return f"{limit_text} ± {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
