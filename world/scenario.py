@@ -620,7 +620,8 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
     spec = _with_file_zones(scenario.spec, file_zones, source, scenario.origin, scenario.bounds)
     added_tables = (spec.zones or [])[previous_count:]
     if previous_count + len(added_tables) > MAX_ZONES:
-        raise ScenarioError(f"{source}: {len(added_tables):,} zones more: at most {MAX_ZONES:,} in all", file=source)
+        added_text = count_text(len(added_tables), "zone")
+        raise ScenarioError(f"{source}: {added_text} more: at most {MAX_ZONES:,} in all", file=source)
     active_tables = _active_zones(spec.model_copy(update={"zones": added_tables}))
     zones = make_zones(active_tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))

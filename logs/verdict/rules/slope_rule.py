@@ -79,16 +79,10 @@ def _leg_finding(
             method = f"{method_text} over {fit.length:.0f} m"
     ok: bool | None = not faults
     check = ""
-    if not faults and (uncertainty := _uncertainty_text(requirements, leg)):
+    uncertainty = _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
+    if not faults and uncertainty:
         ok, check = None, UNKNOWN_AIRCRAFT
-        facts.insert(0, uncertainty)
-    elif (
-        faults
-        and abs(planned_slope) <= limit
-        and (certain_text := _certain_limit_text(requirements, leg, limit, source))
-    ):
-        # The fault is the flight's; the limit is stated by no other text.
-        facts.append(certain_text)
+    facts = [uncertainty, *facts] if uncertainty else facts
     if measure is not None and not measure.is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
@@ -148,6 +142,17 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
         return ""
     slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned_slope), limit, deviation))
     return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°"
+
+
+def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
+    """Explain by the aircraft's uncertainty why a slope is undecided, or on which slope the suggestions are based.
+
+    Return "" for a certain aircraft, and for a planned slope that is too steep, whose message states the limit (rad).
+    """
+    if not has_failed:
+        return _uncertainty_text(requirements, leg)
+    is_planned_steep = abs(float(requirements.slopes[leg])) > limit
+    return "" if is_planned_steep else _certain_limit_text(requirements, leg, limit, source)
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:

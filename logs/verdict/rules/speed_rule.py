@@ -104,18 +104,14 @@ def _speed_finding(
                 margin, tolerance = allowed_error - abs(mean_speed - commanded), held_speed.tolerance
                 faults.append(message(f"{mean_speed:.1f} m/s held instead of the commanded {commanded:.1f} m/s"))
         facts.append(Fact("speed error", mean_speed - commanded, "m/s"))
-    ok: bool | None = not faults
-    check = ""
-    if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, max_speed)):
-        ok, check = None, UNKNOWN_AIRCRAFT
-        notes.insert(0, uncertainty)
-    elif faults and commanded > max_speed and requirements.setup.envelope.fastest_sd:
-        notes.append(_fastest_text(requirements, max_speed))
+    uncertainty = _uncertainty_text(requirements, leg, commanded, max_speed)
+    check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
+    ok = None if check else not faults
     return make_finding(
         "speed",
         requirements.leg(leg),
         ok=None if ok and is_unflown else ok,
-        reason=finding_reason(faults, notes),
+        reason=finding_reason(faults, [*filter(None, [uncertainty]), *notes]),
         faults=faults,
         planned=commanded,
         flown=mean_speed,
@@ -186,7 +182,7 @@ def _find_held_speed(
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
-    """Explain why an uncertain maximum airspeed leaves a commanded speed undecided; return "" if decided."""
+    """State an uncertain maximum airspeed, if it leaves a commanded speed undecided or impossible; otherwise ""."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
@@ -194,14 +190,8 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     altitudes = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""
-    return f"{commanded:.1f} m/s is commanded; {_fastest_text(requirements, max_speed)}"
-
-
-def _fastest_text(requirements: RouteRequirements, max_speed: float) -> str:
-    """State the maximum airspeed (m/s) of an uncertain aircraft, with its standard deviation."""
-    envelope = requirements.setup.envelope
     limit_text = f"the fastest level flight according to {envelope.source} is {max_speed:.1f} m/s"
-    return f"{limit_text} ± {envelope.fastest_sd:.1f} m/s"
+    return f"{commanded:.1f} m/s is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
 
 
 def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
