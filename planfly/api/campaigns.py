@@ -37,6 +37,7 @@ from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_line, stage
 from planner.plan import Plan
+from world.argument_types import checks_types
 from world.errors import PlanflyError
 from world.extras import require_extra, requires_extra
 from world.wording import count_text
@@ -252,6 +253,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 
 
 @requires_extra("campaigns")
+@checks_types
 def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparison:
     """Compare two campaigns: the probability of each, their difference, rules that fail more often, and options.
 
