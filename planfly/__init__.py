@@ -25,6 +25,7 @@ link                                 the radio link to the ground station along 
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
 battery                              the smallest battery with which a mission and its returns keep the reserve
+compare_campaigns                    whether flights of one campaign are more likely to be flyable than another's
 serve                                a MAVLink vehicle for ground stations
 open_studio                          a page on which a mission is dragged, judged, flown and saved
 scenarios, aircraft                  the built-in scenarios and aircraft
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from planfly.api.campaigns import battery as battery
     from planfly.api.campaigns import campaign as campaign
     from planfly.api.campaigns import campaign_flight as campaign_flight
+    from planfly.api.campaigns import compare_campaigns as compare_campaigns
     from planfly.api.campaigns import winds as winds
     from planfly.api.cutting_terrain import terrain as terrain
     from planfly.api.drafting import new_scenario as new_scenario
@@ -119,6 +121,7 @@ if TYPE_CHECKING:
     from planfly.api.surveying import SurveyResult as SurveyResult
     from planfly.api.surveying import survey as survey
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
+    from planfly.campaigns.compare_campaigns import CampaignComparison as CampaignComparison
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_battery import BatteryResult as BatteryResult
     from planfly.campaigns.find_winds import WindsResult as WindsResult
@@ -172,6 +175,7 @@ _HOMES = {
             "battery",
             "campaign",
             "campaign_flight",
+            "compare_campaigns",
             "winds",
         ),
         "planfly.api.cutting_terrain": ("terrain",),
@@ -249,6 +253,7 @@ _HOMES = {
         ),
         "planfly.studio.open_studio": ("open_studio",),
         "planfly.campaigns.campaign_result": ("CampaignResult",),
+        "planfly.campaigns.compare_campaigns": ("CampaignComparison",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_battery": ("BatteryResult",),
         "planfly.campaigns.find_winds": ("WindsResult",),

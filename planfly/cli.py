@@ -11,14 +11,15 @@ from collections.abc import Sequence
 from planfly.commands.registry import build_parser, find_command
 from planfly.runtime.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import COMPLETION_VARIABLE, complete_for_shell
-from planfly.terminal.command_parser import colour_text, error_text
+from planfly.terminal.command_parser import CommandParser, UsageExit, colour_text, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.output import (
     open_standard_streams,
     printable,
     redirect_output,
     safe_streams,
-    write_junit_error_if_requested,
+    write_error_if_requested,
+    write_usage_error_if_requested,
 )
 from planfly.terminal.signal_watch import end_on_signals, end_process
 from world.errors import CrashError, PlanflyError
@@ -52,41 +53,58 @@ def main(argv: Sequence[str] | None = None) -> int:
     end_process(code)
 
 
+# Errors that end a command with one line: bad input, errors of the machine, and interruptions.
+_REPORTED_ERRORS = (PlanflyError, OSError, MemoryError, KeyboardInterrupt)
+
+
 def _run_and_report(argv: Sequence[str] | None) -> int:
-    """Run one command, report errors of the machine and interruptions in one line.
+    """Run one command, report bad input, errors of the machine and interruptions in one line.
 
     Returns the exit code.
     """
     try:
         with safe_streams():
             return _run_command(argv)
-    except OSError as error:
-        return _report_error(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
-    except MemoryError as error:
-        text = str(error)
-        return _report_error(
-            FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory"
-        )
-    except Interrupted as interrupted:
-        return _report_error(128 + interrupted.number, "interrupted")
-    except KeyboardInterrupt:
-        return _report_error(INTERRUPTED, "interrupted")
+    except _REPORTED_ERRORS as error:
+        return _report_error(*_exit_code_and_text(error))
 
 
 def _run_command(argv: Sequence[str] | None) -> int:
-    """Parse the command line, run its command, report bad input in one line, and return the exit code."""
+    """Parse the command line, run its command, and return the exit code.
+
+    An error is written to the files of --json and --junit, so that none of an earlier run is taken for this one's.
+    """
     parser = build_parser()
-    args = parser.parse_args(argv)
+    try:
+        args = parser.parse_args(argv)
+    except UsageExit as usage:
+        write_usage_error_if_requested(sys.argv[1:] if argv is None else argv, usage.line, parser.commands)
+        raise
     try:
         with redirect_output(args):
             try:
                 return find_command(args.command)(args)
-            except PlanflyError as error:
-                write_junit_error_if_requested(args, error_text(error, parser.commands[args.command]))
+            except _REPORTED_ERRORS as error:
+                write_error_if_requested(args, *_exit_code_and_text(error, parser.commands[args.command]))
                 raise
     except PlanflyError as error:
+        return _report_error(*_exit_code_and_text(error, parser.commands[args.command]))
+
+
+def _exit_code_and_text(error: BaseException, parser: CommandParser | None = None) -> tuple[int, str]:
+    """Return the exit code and the line of one of `_REPORTED_ERRORS`.
+
+    parser: parser of the command, whose options replace keywords in the text of a PlanflyError.
+    """
+    if isinstance(error, PlanflyError):
         code = FAULT if isinstance(error, CrashError) or _is_machine_error(error.__cause__) else BAD_INPUT
-        return _report_error(code, error_text(error, parser.commands[args.command]))
+        return code, str(error) if parser is None else error_text(error, parser)
+    if isinstance(error, OSError):
+        return FAULT, f"{error.filename or 'file'}: {error.strerror or error}"
+    if isinstance(error, MemoryError):
+        text = str(error)
+        return FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory"
+    return 128 + error.number if isinstance(error, Interrupted) else INTERRUPTED, "interrupted"
 
 
 def _is_machine_error(cause: BaseException | None) -> bool:

@@ -10,6 +10,7 @@ from planfly.flight_options import FencePaths
 from world.airspace.zone_files import FileZones, is_zone_file, read_zone_file
 from world.frames import GeoOrigin
 from world.scenario import Scenario, with_zones
+from world.wording import count_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,7 @@ class NamedFences:
             return mission
         warnings = mission.warnings
         if mission.fences:
-            own_fence = f"the mission's own fence of {len(mission.fences)} items"
+            own_fence = f"the mission's own fence of {count_text(len(mission.fences), 'item')}"
             warnings = (*warnings, f"{own_fence} applies in addition to the named fence")
         return replace(mission, fences=number_items([*mission.fences, *self.items]), warnings=warnings)
 

@@ -43,7 +43,6 @@ LONGER = {
     "logs/verdict/rules/climbout_approach_rule.py:approach_findings": 77,
     "logs/verdict/rules/climbout_approach_rule.py:climbout_findings": 62,
     "logs/verdict/rules/loiter_rule.py:_loiter_finding": 63,
-    "logs/verdict/rules/speed_rule.py:_speed_finding": 62,
     "logs/views/exports/log_files.py:_make_topics": 91,
     "logs/views/profile.py:profile_chart": 64,
     "planfly/api/drafting.py:new_scenario": 61,

@@ -60,6 +60,37 @@ def read_small_file(path: Path, max_bytes: int, kind: str, error: type[PlanflyEr
         raise error(f"{path}: {problem}", file=path) from None
 
 
+# Suffixes of missions and flight logs, which the message on a folder lists.
+_LISTED_SUFFIXES = (".waypoints", ".plan", ".mcap")
+# Maximum number of files that the message on a folder lists.
+_MAX_LISTED_FILES = 4
+# Commands for a folder, by the file that it holds.
+_FOLDER_COMMANDS = {
+    "campaign.sqlite": "a campaign: planfly compare reads it, planfly campaign --resume --out continues it",
+    "winds.sqlite": "a search for winds: planfly winds --resume --out continues it",
+}
+
+
+def missing_text(path: Path) -> str:
+    """Return the reason why a path is not a file: there is none, or it is a folder, with what the folder holds.
+
+    >>> missing_text(Path("missing.plan")), missing_text(Path("/proc/self/task"))
+    ('no such file', 'is a folder')
+    """
+    try:
+        if not path.is_dir():
+            return "not a file" if path.exists() else "no such file"
+        names = sorted(entry.name for entry in path.iterdir())
+    except OSError:
+        names = []
+    for name, commands in _FOLDER_COMMANDS.items():
+        if name in names:
+            return f"is a folder that holds {commands}"
+    listed = [name for name in names if name == "plan.json" or name.endswith(_LISTED_SUFFIXES)]
+    more = f" and {len(listed) - _MAX_LISTED_FILES} more" if len(listed) > _MAX_LISTED_FILES else ""
+    return "is a folder" + (f" that holds {', '.join(listed[:_MAX_LISTED_FILES])}{more}" if listed else "")
+
+
 def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     """Return the bytes of a file that has at most ``max_bytes`` bytes.
 
@@ -74,8 +105,10 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     status = path.stat()
     if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
         raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {max_bytes:,}")
+    if stat.S_ISDIR(status.st_mode):
+        raise ValueError(f"{missing_text(path)}; expected a {kind} file")
     is_shell_pipe = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
-    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or is_shell_pipe):
+    if not (stat.S_ISREG(status.st_mode) or is_shell_pipe):
         raise ValueError(f"not a plain file; expected a {kind} file")
     with path.open("rb") as file:
         data = file.read(max_bytes + 1)

@@ -54,6 +54,7 @@ from world.scenario_tables import (
 from world.terrain import Peak, Terrain, make_flat_terrain, make_peaks_terrain
 from world.threats import Threats
 from world.wind import Wind
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # The scenario, from a built-in name, a file, a plan or a log.
@@ -173,7 +174,8 @@ class Scenario:
 
     def __repr__(self) -> str:
         distance = math.dist(self.start, self.destination) / 1000.0
-        return f"<Scenario {self.name}: {distance:.1f} km, {len(self.threats)} threats, {len(self.zones)} zones>"
+        counts = f"{count_text(len(self.threats), 'threat')}, {count_text(len(self.zones), 'zone')}"
+        return f"<Scenario {self.name}: {distance:.1f} km, {counts}>"
 
     def _repr_html_(self) -> str:
         """Return an HTML table for notebooks."""
@@ -372,7 +374,7 @@ def _with_file_zones(
     notes = [*(spec.zone_notes or ()), *file_zones.notes]
     if far_count := len(file_zones.zones) - len(zones_nearby):
         notes.append(
-            f"{source}: {far_count:,} of {len(file_zones.zones):,} zones lie more than "
+            f"{source}: {far_count:,} of {count_text(len(file_zones.zones), 'zone')} lie more than "
             f"{MAX_ZONE_DISTANCE / 1000.0:g} km from the area: ignored"
         )
     changes = {"zones": [*(spec.zones or ()), *zones_nearby] or None, "zone_notes": notes or None}
@@ -632,7 +634,8 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
     spec = _with_file_zones(scenario.spec, file_zones, source, scenario.origin, scenario.bounds)
     added_tables = (spec.zones or [])[previous_count:]
     if previous_count + len(added_tables) > MAX_ZONES:
-        raise ScenarioError(f"{source}: {len(added_tables):,} zones more: at most {MAX_ZONES:,} in all", file=source)
+        added_text = count_text(len(added_tables), "zone")
+        raise ScenarioError(f"{source}: {added_text} more: at most {MAX_ZONES:,} in all", file=source)
     active_tables = _active_zones(spec.model_copy(update={"zones": added_tables}))
     zones = make_zones(active_tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))

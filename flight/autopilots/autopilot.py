@@ -32,6 +32,7 @@ from flight.mission.route import RouteRules
 from world.errors import ScenarioError
 from world.json_schema import DocumentConfig
 from world.scenario_tables import FlightTable, Guidance
+from world.wording import count_text
 
 # Question that a flight answers: whether the aircraft can fly the mission ("airframe"), or whether the aircraft with
 # its autopilot can ("autopilot").
@@ -327,7 +328,8 @@ def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
     remainder = f", +{len(changed) - max_named} more" if len(changed) > max_named else ""
+    parameters_text = count_text(len(program.parameters), "parameter")
     return (
-        f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
+        f"{program.version} (sha256 {program.sha256[:8]}...), {parameters_text} set for"
         f" {Path(aircraft).name}, changed: {', '.join(changed[:max_named]) or 'none'}{remainder}"
     )

@@ -15,7 +15,7 @@ from flight.mission_files.wpl import (
     waypoints_text,
 )
 from world.errors import MissionError
-from world.files import read_small_file, utf8_text
+from world.files import missing_text, read_small_file, utf8_text
 
 # Forms of a mission file.
 FileKind = Literal["waypoints", "plan", "fence", "rally"]
@@ -50,6 +50,8 @@ def mission_kind(path: Path) -> FileKind:
         return KINDS[path.suffix.lower()]
     except KeyError:
         allowed = ", ".join(KINDS)
+        if path.is_dir():
+            raise MissionError(f"{path}: {missing_text(path)}; expected one of {allowed}", file=path) from None
         raise MissionError(
             f"{path}: suffix {path.suffix!r}: expected one of {allowed}",
             file=path,

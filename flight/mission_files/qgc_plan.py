@@ -547,10 +547,10 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
 def plan_file_text(mission: Mission) -> str:
     """Return a mission as the text of a `.plan` file; the same mission always gives the same bytes.
 
-    cruiseSpeed is the mission's speed, or a DO_CHANGE_SPEED before its second position, or QGC's default. It is written
-    in whole m/s, as hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses
-    "25.0"; QGC reads both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0
-    for planfly's own guidance, which no ground station knows.
+    cruiseSpeed is `stated_cruise_speed`, or QGC's default if the mission states none. It is written in whole m/s, as
+    hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC reads
+    both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for planfly's own
+    guidance, which no ground station knows.
     """
     mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
@@ -560,7 +560,7 @@ def plan_file_text(mission: Mission) -> str:
         "geoFence": _fence_json(mission.fences),
         "groundStation": "planfly",
         "mission": {
-            "cruiseSpeed": round(_cruise_speed(mission)),
+            "cruiseSpeed": round(stated_cruise_speed(mission) or _CRUISE_SPEED_MPS),
             "firmwareType": next((number for number, name in _FIRMWARES.items() if name == mission.autopilot), 0),
             # 0: mixed.
             "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
@@ -589,8 +589,11 @@ def _altitude_modes(items: tuple[MissionItem, ...]) -> list[int]:
     return sorted({_altitude_mode(item.frame) for item in items if is_located(item.command, item.frame)})
 
 
-def _cruise_speed(mission: Mission) -> float:
-    """Return the cruise speed to write, m/s; see `plan_file_text`."""
+def stated_cruise_speed(mission: Mission) -> float | None:
+    """Return the cruise speed that a mission states, m/s, or None.
+
+    It is the cruiseSpeed of its `.plan`, or a DO_CHANGE_SPEED before its second position.
+    """
     if mission.cruise_speed is not None:
         return mission.cruise_speed
     position_count = 0
@@ -600,7 +603,7 @@ def _cruise_speed(mission: Mission) -> float:
             break
         if item.command == Command.DO_CHANGE_SPEED and 0.0 < item.params[1] <= _MAX_SPEED_MPS:
             return item.params[1]
-    return _CRUISE_SPEED_MPS
+    return None
 
 
 def _item_json(item: MissionItem) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 from world.files import TextLine
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # The QGC WPL 110 text form of a mission (`.waypoints`): read leniently, written for the strictest reader.
@@ -134,7 +135,8 @@ def _parse_row(location: TextLine, line: str) -> _Row:
     fields = line.split()
     if len(fields) != len(_COLUMNS):
         raise MissionError(
-            f"{location}: {len(fields)} columns: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})", file=location.file
+            f"{location}: {count_text(len(fields), 'column')}: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})",
+            file=location.file,
         )
     values = dict(zip(_COLUMNS, fields, strict=True))
     integers = {name: _parse_integer(location, name, values[name]) for name in _ALLOWED_RANGES}
@@ -354,12 +356,12 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     """
     points = [_parse_point(TextLine(source, number), line) for number, line in _content_lines(text)]
     if len(points) > MAX_POINTS:
-        raise MissionError(f"{source}: {len(points)} points: at most {MAX_POINTS} are read", file=source)
+        raise MissionError(f"{source}: {count_text(len(points), 'point')}: at most {MAX_POINTS} are read", file=source)
     ring = points if points[0] == points[-1] else points[1:]
     if len(ring) < 4 or ring[0] != ring[-1]:
         raise MissionError(
-            f"{source}: {len(points)} points: expected a return point and a closed ring of three or more corners,"
-            " with the first corner repeated at the end",
+            f"{source}: {count_text(len(points), 'point')}: expected a return point and a closed ring of three or more"
+            " corners, with the first corner repeated at the end",
             file=source,
         )
     params = (float(len(ring) - 1), 0.0, 0.0, 0.0)

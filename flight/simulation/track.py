@@ -18,6 +18,7 @@ from world.extras import require_extra
 from world.files import write_atomically
 from world.html_table import html_table
 from world.kernels import compiled, field_names, record_dtype
+from world.wording import count_text
 
 Ints = NDArray[np.int32]
 Rows = NDArray[np.record]
@@ -376,7 +377,7 @@ def track_title(track: Track) -> str:
     """Return a title with the number of rows and the time span of a track."""
     if not len(track):
         return "Track: no rows"
-    return f"Track: {len(track):,} rows, {track.time[0]:.1f} to {track.time[-1]:.1f} s"
+    return f"Track: {count_text(len(track), 'row')}, {track.time[0]:.1f} to {track.time[-1]:.1f} s"
 
 
 # ----------------------------------------------------------------------

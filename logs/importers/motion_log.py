@@ -13,6 +13,7 @@ from logs.importers.dataflash_log import logged_home, program_and_vehicle
 from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_ground_position, sort_samples
 from world.errors import LogError
 from world.extras import require_extra
+from world.files import missing_text
 
 _DEGREE = math.pi / 180.0
 _NAMES = (
@@ -44,7 +45,8 @@ def read_motion(path: Path) -> MotionLog:
     """
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file; expected a log (.BIN, .tlog, .ulg or a table of columns)", file=path)
+            expected = "expected a log (.BIN, .tlog, .ulg or a table of columns)"
+            raise LogError(f"{path}: {missing_text(path)}; {expected}", file=path)
         if is_column_table_name(path) or path.suffix.lower() in DATA_SUFFIXES:
             require_extra("data-logs", f"{path}: reading {path.suffix.lower()} needs")
             from logs.importers.columns.column_motion import read_column_motion

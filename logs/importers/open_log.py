@@ -10,6 +10,7 @@ from logs.importers.columns.file_names import DATA_SUFFIXES, TABLE_SUFFIX, is_co
 from world.address_space import AddressSpaceError
 from world.errors import LogError
 from world.extras import require_extra
+from world.files import missing_text
 
 if TYPE_CHECKING:
     from logs.importers.raw_log import RawLog
@@ -89,7 +90,7 @@ def open_log(path: Path) -> "RawLog":
 
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file; expected a log ({', '.join(SUFFIXES)})", file=path)
+            raise LogError(f"{path}: {missing_text(path)}; expected a log ({', '.join(SUFFIXES)})", file=path)
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read", file=path)

@@ -26,6 +26,7 @@ from flight.simulation.setup import Damage, VerticalDatum
 from flight.simulation.track import MAX_TIME_S
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, RawLog
 from world.errors import LogError
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # Text of a track file, with checks of its size and of dangerous XML.
@@ -325,9 +326,10 @@ def read_kml(path: Path) -> RawLog:
                 rows.append(row)
     if len(rows) < 2:
         lines = sum(_local_name(element) == "LineString" for element in root.iter())
-        reason = f"; its {lines} lines have no times" if lines else ""
+        reason = f"; {count_text(lines, 'line')} without times" if lines else ""
         raise LogError(
-            f"{path}: only {len(rows)} position(s) with a time (gx:Track); at least 2 are needed{reason}", file=path
+            f"{path}: only {count_text(len(rows), 'position')} with a time (gx:Track); at least 2 are needed{reason}",
+            file=path,
         )
     table = np.array(rows)
     start = _earliest_time(table[:, 0])
@@ -364,8 +366,8 @@ def _time_position_pairs(track: ElementTree.Element, path: Path) -> tuple[list[t
     if all(name == "when" for name, _ in elements[: last_time + 1]):
         if len(times) != len(positions):
             raise LogError(
-                f"{path}: a track of {len(times)} times (when) and {len(positions)} positions (gx:coord): expected"
-                " equal numbers",
+                f"{path}: a track of {count_text(len(times), 'time')} (when) and"
+                f" {count_text(len(positions), 'position')} (gx:coord): expected equal numbers",
                 file=path,
             )
         return list(zip(times, positions, strict=True)), 0

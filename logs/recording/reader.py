@@ -50,7 +50,9 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.reference_flights import parse_reference_flights
 from world.argument_types import checks_types
 from world.errors import LogError
+from world.files import missing_text
 from world.html_table import html_table
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # Messages of a log as they were written, for viewers that accept them unchanged.
@@ -201,8 +203,8 @@ class FlightLog:
         rows = [
             ("scenario", setup.scenario.name),
             ("aircraft", Path(setup.aircraft).name),
-            ("mission", f"{setup.mission.source}: {len(setup.mission.items)} items"),
-            ("flown", f"{self.end_time:.1f} s, {len(self.track):,} rows, {self.track.energy[-1]:.1f} Wh"),
+            ("mission", f"{setup.mission.source}: {count_text(len(setup.mission.items), 'item')}"),
+            ("flown", f"{self.end_time:.1f} s, {count_text(len(self.track), 'row')}, {self.track.energy[-1]:.1f} Wh"),
             ("ended", self.ended or "not recorded"),
             *([("incomplete", self.problem)] if self.problem else []),
         ]
@@ -300,7 +302,7 @@ def read_log(path: Path | str) -> FlightLog:
     messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
-            raise LogError(f"{path}: not a file; expected a flight log (.mcap)", file=path)
+            raise LogError(f"{path}: {missing_text(path)}; expected a flight log (.mcap)", file=path)
         with path.open("rb") as file:
             _check_magic(file.read(len(MAGIC)), path)
             for data in read_chunks(file, container):

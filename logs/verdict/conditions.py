@@ -18,6 +18,7 @@ from world.json_schema import DocumentConfig
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, Navigation
 from world.wind import Turbulence
+from world.wording import count_text
 
 _NAVIGATION_TEXTS = {
     "perfect": "exact",
@@ -186,9 +187,7 @@ def _world_line(conditions: Conditions) -> str:
         if conditions.terrain is None
         else f"terrain {conditions.terrain}, heights above {conditions.height_datum}"
     )
-    zones_text = (
-        "" if not conditions.zones else "; 1 zone" if conditions.zones == 1 else f"; {conditions.zones:,} zones"
-    )
+    zones_text = f"; {count_text(conditions.zones, 'zone')}" if conditions.zones else ""
     return f"Conditions: {wind_text}{turbulence_text}{navigation_text}; {terrain_text}{zones_text}"
 
 

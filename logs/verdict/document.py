@@ -35,7 +35,7 @@ class FindingDocument(DocumentConfig):
     """The values that pass in words, with the tolerance: "≤ 8.29 m"; "" without a limit."""
     tolerance: float | None
     margin: float | None
-    """Distance inside the limit; negative beyond the limit."""
+    """Distance inside the limit, without the tolerance; negative beyond the limit, even within the tolerance."""
     unit: str
     """Unit of planned, flown, limit, tolerance and margin."""
     method: str
@@ -107,7 +107,7 @@ class VerdictDocument(DocumentConfig):
     flyable: bool
     complete: bool
     answer: str
-    """flyable, not flyable, incomplete or not judged in full; for an imported flight flown as planned or not."""
+    """flyable, not flyable or not judged in full; of an imported flight flown, or not flown, as planned."""
     undecided: bool
     """True if nothing failed, but something that had to be judged was not."""
     summary: str

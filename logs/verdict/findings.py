@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from logs.verdict.places import Place, Suggestion
-from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text
+from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text, within_tolerance_text
 from world.json_schema import DocumentConfig
 
 # Values of `Finding.check` for unjudged findings that leave the verdict undecided.
@@ -118,6 +118,17 @@ class Finding:
         else:
             texts = list(compared_texts(value, limit, self.unit))
         return texts[0], f"{self.limit_sign} {texts[1]}" if texts[1] else ""
+
+    @property
+    def tolerance_note(self) -> str:
+        """Note on a value beyond its limit that passes, within the tolerance; "" for any other finding.
+
+        >>> place = Place("leg", 1)
+        >>> make_finding("stall", place, ok=True, reason="", tolerance=0.2, margin=-0.1, unit="m/s").tolerance_note
+        'within the tolerance of 0.2 m/s'
+        """
+        is_beyond_limit = self.ok is True and self.margin is not None and self.margin < 0.0
+        return within_tolerance_text(self.tolerance, self.unit) if is_beyond_limit else ""
 
     @property
     def where(self) -> str:

@@ -1,12 +1,77 @@
-"""Write verdicts as JUnit XML for continuous integration, with a test case for each finding and for the answer."""
+"""Write answers as JUnit XML for continuous integration: of a verdict, a case for each finding and for the answer."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
 from logs.verdict.findings import Finding
 from logs.verdict.presentation import Presentation
 from logs.verdict.rule_words import rule_word
+
+
+class JunitCase(NamedTuple):
+    """Test case of a JUnit file.
+
+    classname: "planfly" for an answer, "planfly.RULE" for a rule.
+    message: reason of a result other than "passed".
+    text: further text.
+    """
+
+    classname: str
+    name: str
+    result: Literal["passed", "failure", "skipped", "error"] = "passed"
+    message: str = ""
+    text: str = ""
+
+
+class JunitSuite(NamedTuple):
+    """Test suite of a JUnit file.
+
+    name: name of the plan or flight.
+    output: lines for a person.
+    """
+
+    name: str
+    cases: Sequence[JunitCase]
+    output: str = ""
+
+
+def suites_text(suites: Iterable[JunitSuite]) -> str:
+    """Return the text of a JUnit file."""
+    root = ElementTree.Element("testsuites")
+    for suite in suites:
+        counts = Counter(case.result for case in suite.cases)
+        element = ElementTree.SubElement(
+            root,
+            "testsuite",
+            name=_without_control_characters(suite.name),
+            tests=str(len(suite.cases)),
+            failures=str(counts["failure"]),
+            errors=str(counts["error"]),
+            skipped=str(counts["skipped"]),
+        )
+        element.extend(map(_case_element, suite.cases))
+        if suite.output:
+            ElementTree.SubElement(element, "system-out").text = _without_control_characters(suite.output, keep="\n")
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _case_element(case: JunitCase) -> ElementTree.Element:
+    """Make the XML element of a test case."""
+    element = ElementTree.Element(
+        "testcase",
+        classname=_without_control_characters(case.classname),
+        name=_without_control_characters(case.name),
+    )
+    text = _without_control_characters(case.text, keep="\n") or None
+    if case.result != "passed":
+        result = ElementTree.SubElement(element, case.result, message=_without_control_characters(case.message))
+        result.text = text
+    elif text:
+        ElementTree.SubElement(element, "system-out").text = text
+    return element
 
 
 def junit_text(verdicts: Mapping[str, Presentation]) -> str:
@@ -19,24 +84,17 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
 
     `logs.verdict.verdict.Verdict.to_junit` writes one verdict.
     """
-    root = ElementTree.Element("testsuites")
-    for name, verdict in verdicts.items():
-        cases = [_answer_case(verdict), *_finding_cases(verdict.findings)]
-        counts = Counter(child.tag for case in cases for child in case)
-        suite = ElementTree.SubElement(
-            root,
-            "testsuite",
-            name=_without_control_characters(name),
-            tests=str(len(cases)),
-            failures=str(counts["failure"]),
-            errors="0",
-            skipped=str(counts["skipped"]),
+    return suites_text(
+        JunitSuite(
+            name,
+            [
+                answer_case("" if verdict.state == "ok" else verdict.headline),
+                *_finding_cases(verdict.findings),
+            ],
+            "\n".join([verdict.headline, *verdict.details]),
         )
-        suite.extend(cases)
-        ElementTree.SubElement(suite, "system-out").text = _without_control_characters(
-            "\n".join([verdict.headline, *verdict.details]), keep="\n"
-        )
-    return _document_text(root)
+        for name, verdict in verdicts.items()
+    )
 
 
 def junit_error_text(name: str, message: str) -> str:
@@ -45,30 +103,15 @@ def junit_error_text(name: str, message: str) -> str:
     name: name of the plan or flight.
     message: reason in one line.
     """
-    root = ElementTree.Element("testsuites")
-    suite = ElementTree.SubElement(
-        root, "testsuite", name=_without_control_characters(name), tests="1", failures="0", errors="1", skipped="0"
-    )
-    case = ElementTree.SubElement(suite, "testcase", classname="planfly", name="verdict")
-    ElementTree.SubElement(case, "error", message=_without_control_characters(message))
-    return _document_text(root)
+    return suites_text([JunitSuite(name, [JunitCase("planfly", "verdict", "error", message)])])
 
 
-def _document_text(root: ElementTree.Element) -> str:
-    """Return the indented XML text of a document."""
-    ElementTree.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+def answer_case(reason: str) -> JunitCase:
+    """Return the test case of an answer.  reason: reason why it fails; "" if it passes."""
+    return JunitCase("planfly", "verdict", "failure" if reason else "passed", reason)
 
 
-def _answer_case(verdict: Presentation) -> ElementTree.Element:
-    """Make the test case of the verdict's answer, which fails if the answer is not "flyable"."""
-    case = ElementTree.Element("testcase", classname="planfly", name="verdict")
-    if verdict.state != "ok":
-        ElementTree.SubElement(case, "failure", message=_without_control_characters(verdict.headline))
-    return case
-
-
-def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
+def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
     """Make a test case with a unique name for each finding: failed, skipped if it was not judged, or passed."""
     counts: Counter[tuple[str, str]] = Counter()
     cases = []
@@ -77,17 +120,13 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
         counts[finding.rule, place] += 1
         # Names of cases must be unique.
         number = counts[finding.rule, place]
-        name = place if number == 1 else f"{place} ({number})"
-        case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)
+        case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
         if finding.ok is False:
-            message = _without_control_characters(f"{rule_word(finding.rule)}: {finding.reason}")
-            failure = ElementTree.SubElement(case, "failure", message=message)
-            if finding.suggestions:
-                failure.text = _without_control_characters(f"would pass: {finding.suggestion}")
+            message = f"{rule_word(finding.rule)}: {finding.reason}"
+            text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
+            case = case._replace(result="failure", message=message, text=text)
         elif finding.ok is None:
-            ElementTree.SubElement(
-                case, "skipped", message=_without_control_characters(f"not judged: {finding.reason}")
-            )
+            case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
         cases.append(case)
     return cases
 

@@ -476,10 +476,9 @@ def suggest_level_flight_speed(
         return ()
     commanded = float(requirements.setup.demanded_route.leg_airspeeds[leg])
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
-    envelope = requirements.setup.envelope
-    certain_envelope = envelope.with_margin() if finding.check == UNKNOWN_AIRCRAFT else envelope
     min_speed, max_speed = (
-        speed / _true_airspeed_ratio(requirements, leg) for speed in certain_envelope.level_speeds(altitude)
+        speed / _true_airspeed_ratio(requirements, leg)
+        for speed in requirements.setup.envelope.with_margin().level_speeds(altitude)
     )
     if min_speed <= commanded <= max_speed:
         return ()

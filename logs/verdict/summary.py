@@ -21,6 +21,7 @@ from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
+from world.wording import count_text
 
 # Maximum number of failed findings that the first line names.
 _MAX_NAMED_FINDINGS = 4
@@ -77,7 +78,9 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     other_briefs = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
     item_briefs = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
     rest_texts = (
-        [f"{len(item_briefs) - _MAX_NAMED_FINDINGS} more items"] if len(item_briefs) > _MAX_NAMED_FINDINGS else []
+        [f"{count_text(len(item_briefs) - _MAX_NAMED_FINDINGS, 'more item')}"]
+        if len(item_briefs) > _MAX_NAMED_FINDINGS
+        else []
     )
     return "; ".join(
         filter(None, [aircraft_text, path_text, *item_briefs[:_MAX_NAMED_FINDINGS], *rest_texts, *other_briefs])
@@ -230,6 +233,7 @@ def summary_lines(
     lines += _terrain_error_lines(findings, setup)
     if setup.plan is not None and setup.plan.unmet_margins:
         lines.append(f"Planner's margins not met: {'; '.join(setup.plan.unmet_margins)}")
+    lines += [f"Note: {warning}" for warning in setup.mission.warnings]
     if setup.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":

@@ -20,6 +20,7 @@ from logs.verdict.notebook import verdict_html
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.presentation import Presentation, findings_by_rule
 from world.extras import require_extra
+from world.wording import count_text
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -72,7 +73,9 @@ class Verdict:
 
     @property
     def answer(self) -> str:
-        """The verdict in a few words.
+        """The verdict in a few words: "flyable", "not flyable" or "not judged in full".
+
+        For an imported flight they are "flown as planned", "not flown as planned" or "not judged in full".
 
         >>> Verdict((), flyable=False, complete=True, lines=(), level="flown", imported=True).answer
         'not flown as planned'
@@ -80,7 +83,7 @@ class Verdict:
         if self.undecided:
             return "not judged in full"
         success = "flown as planned" if self.imported else "flyable"
-        return success if self.flyable else f"not {success}" if self.complete else "incomplete"
+        return success if self.flyable else f"not {success}"
 
     @property
     def state(self) -> str:
@@ -162,7 +165,8 @@ class Verdict:
         return frame.astype(dict.fromkeys(numbers, float))
 
     def __repr__(self) -> str:
-        return f"<Verdict {self.level}: {self.answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
+        counts = f"{count_text(len(self.findings), 'finding')}, {len(self.failed)} failed"
+        return f"<Verdict {self.level}: {self.answer}; {counts}>"
 
     def document(self) -> VerdictDocument:
         """Return the content of ``verdict.json``: the verdict with its places and suggestions in words."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, Suggestion
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
+from world.wording import count_text as count_text
 
 # Text of a unit after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "dB": " dB", "legs": " legs", "%": " %"}
@@ -164,13 +165,27 @@ def suggestion_text(suggestion: Suggestion) -> str:
     return f"{text} (move {moves_text(moves)})" if moves else text
 
 
-def count_text(count: int, noun: str) -> str:
-    """Return a number with its noun.
+def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
+    """Return a margin with its sign and unit; a negative margin that passes is within the tolerance.
 
-    >>> count_text(1, "threat"), count_text(2, "threat")
-    ('1 threat', '2 threats')
+    tolerance: the tolerance, in `unit`; None or 0 if it is not known.
+
+    >>> margin_text(12.0, "m", passed=True), margin_text(-3.04, "m", passed=False)
+    ('+12.0 m', '-3.0 m')
+    >>> margin_text(-0.3, "m", passed=True), margin_text(-0.3, "m", passed=True, tolerance=0.5)
+    ('-0.3 m, within the tolerance', '-0.3 m, within the tolerance of 0.5 m')
     """
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+    text = f"{margin:+.1f} {unit}"
+    return f"{text}, {within_tolerance_text(tolerance, unit)}" if passed and margin < 0.0 else text
+
+
+def within_tolerance_text(tolerance: float | None, unit: str) -> str:
+    """Return the words for a value beyond its limit that passes.  tolerance: in `unit`; None if it is not known.
+
+    >>> within_tolerance_text(0.5, "m/s"), within_tolerance_text(None, "")
+    ('within the tolerance of 0.5 m/s', 'within the tolerance')
+    """
+    return "within the tolerance" + (f" of {quantity_text(tolerance, unit)}" if tolerance else "")
 
 
 def moves_text(moves: Sequence[ItemMove]) -> str:
@@ -286,7 +301,12 @@ def quantity_text(value: float, unit: str) -> str:
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')
     """
-    return _significant_digits(value, 3) + _unit_suffix(unit)
+    return _with_unit(_significant_digits(value, 3), unit)
+
+
+def _with_unit(digits: str, unit: str) -> str:
+    """Return the digits of a number with its unit, a counted unit in the singular after 1."""
+    return digits + (" leg" if (digits, unit) == ("1", "legs") else _unit_suffix(unit))
 
 
 def _unit_suffix(unit: str) -> str:
@@ -313,8 +333,7 @@ def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
         and _significant_digits(value, digits) == _significant_digits(limit, digits)
     ):
         digits += 1
-    suffix = _unit_suffix(unit)
-    return _significant_digits(value, digits) + suffix, _significant_digits(limit, digits) + suffix
+    return _with_unit(_significant_digits(value, digits), unit), _with_unit(_significant_digits(limit, digits), unit)
 
 
 def _significant_digits(value: float, digits: int) -> str:

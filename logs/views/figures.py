@@ -27,6 +27,7 @@ from logs.views.scene import SceneView, scene_data
 from logs.views.surveys import survey_chart
 from logs.views.time_series import control_chart, energy_chart, exposure_chart, time_chart
 from logs.views.turns import turn_chart
+from world.wording import count_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,9 +54,8 @@ class Subject:
         """Text that lists what a figure shows: ground, threats and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
-        return (
-            f"{ground}, {threats} threats, the planned path of {legs} legs{self.text_if_flown(' and the flown track')}."
-        )
+        track_text = self.text_if_flown(" and the flown track")
+        return f"{ground}, {count_text(threats, 'threat')}, the planned path of {count_text(legs, 'leg')}{track_text}."
 
     def text_if_flown(self, flight_text: str, plan_text: str = "") -> str:
         """Return ``flight_text`` for a flight, and ``plan_text`` for a plan that was not flown."""

@@ -8,6 +8,7 @@ import numpy as np
 from logs.views.charts import Chart, Label, Layer, Panel
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
 from planner.search.plan_front import Front
+from world.wording import count_text
 
 # One watt hour, J.
 _WATT_HOUR = 3600.0
@@ -64,7 +65,7 @@ def front_map(front: Front) -> MapChart:
     shortest = paths[0]
     return scenario_map(
         scenario,
-        f"front of {len(paths)} plans from above",
+        f"front of {count_text(len(paths), 'plan')} from above",
         layers,
         [*labels, *end_labels(scenario, None)],
         map_extent(scenario, None, paths),

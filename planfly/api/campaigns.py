@@ -9,6 +9,7 @@ from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
 from planfly.campaigns.campaign_result import CampaignResult, campaign_command_line, make_goal, winds_command_line
+from planfly.campaigns.compare_campaigns import CampaignComparison, campaign_table, compare_tables
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
 from planfly.campaigns.find_battery import BatteryGoal, BatteryResult, find_battery
 from planfly.campaigns.find_winds import (
@@ -24,7 +25,7 @@ from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goa
 from planfly.campaigns.report import OutputDirectory, campaign_folder, finish_campaign, fly_row_again, write_winds
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.summary import summarise_campaign
-from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_table
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_stored_settings, read_table
 from planfly.campaigns.worker_pool import Workers, check_scheduler_address
 from planfly.flight_options import (
     BatteryOptions,
@@ -37,10 +38,12 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
-from planfly.runtime.stages import stage
+from planfly.runtime.stages import report_line, stage
 from planner.plan import Plan
+from world.argument_types import checks_types
 from world.errors import PlanflyError
 from world.extras import require_extra, requires_extra
+from world.wording import count_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +81,10 @@ def _open_base(
         with stage("planning") as advance:
             return make_base(advance=advance)
 
-    return folder.open_base_and_clear(open_with_plan)
+    base = folder.open_base_and_clear(open_with_plan)
+    for warning in base.mission.warnings:
+        report_line(f"note: {warning}")
+    return base
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
@@ -125,13 +131,19 @@ def continued_goal(
 ) -> Goal:
     """Return the goal of a resumed campaign.
 
-    It is the requested goal, or the earlier goal if none is requested.  Raises PlanflyError for numbers outside their
-    ranges, and for a folder without a campaign.
+    It is the requested goal, or the earlier goal if none is requested.  Without a requested number of flights, the
+    earlier number is kept.  Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
     requested_goal = make_goal(flights, prove, at_least, confidence)
-    return resumed_goal(
-        None if (flights, prove, at_least) == (None, None, None) else requested_goal, folder, confidence
-    )
+    is_requested = (flights, prove, at_least) != (None, None, None)
+    return resumed_goal(requested_goal if is_requested else None, folder, confidence, keeps_flights=flights is None)
+
+
+def _report_flight_count(goal: Goal, folder: Path) -> None:
+    """Report the number of flights of a campaign that is resumed without a number, and where it comes from."""
+    stored_count = read_stored_settings(folder / CAMPAIGN_DATABASE).get("flights")
+    origin = "the number of the resumed campaign" if goal.flights == stored_count else "the default"
+    report_line(f"flies {'at most ' if goal.stops else ''}{count_text(goal.flights, 'flight')}, {origin}")
 
 
 @requires_extra("campaigns")
@@ -151,8 +163,8 @@ def campaign(
 
     target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
-    flights: number of flights; None takes 300, or, with ``prove``, at most 5,000.  Without flights, ``prove`` and
-    ``at_least``, a resumed campaign keeps its earlier goal.
+    flights: number of flights; None takes 300, or, with ``prove``, at most 5,000; for a resumed campaign its earlier
+    number.  Without flights, ``prove`` and ``at_least``, a resumed campaign keeps its earlier goal.
     prove: a probability; flights are flown until they show whether the mission reaches it.
     at_least: a probability to judge after all flights.  Only one of the two may be given.
     confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.
@@ -175,6 +187,8 @@ def campaign(
     with campaign_folder(out, CAMPAIGN_DATABASE, resume=resume, overwrite=overwrite) as directory:
         if resume:
             goal = continued_goal(directory.folder, *requested)
+            if options["flights"] is None:
+                _report_flight_count(goal, directory.folder)
         base = _open_base(target, options, _read_spread(spread), directory)
         command_line = campaign_command_line(
             _command_line_target(target, directory.folder), goal, _command_line_options(base, options, spread)
@@ -236,9 +250,35 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
-            allowed = f"no such flight: the campaign has {store.tally().flown} flights, numbered from 0"
+            allowed = f"no such flight: the campaign has {count_text(store.tally().flown, 'flight')}, numbered from 0"
             raise PlanflyError.of_argument("index", index, allowed, file=store.path)
     return row
+
+
+@requires_extra("campaigns")
+@checks_types
+def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparison:
+    """Compare two campaigns: the probability of each, their difference, rules that fail more often, and options.
+
+    If the flights of both have the same draws (the same seed, dispersions and numbers of flights), they are compared in
+    pairs.
+
+    first, second: folders of the campaigns, or their files ``campaign.sqlite``.
+    Raises a `planfly.PlanflyError` for bad input.
+
+    >>> compare_campaigns("nowhere", "nowhere")
+    Traceback (most recent call last):
+    ...
+    world.errors.PlanflyError: nowhere: no campaign; expected a folder with a campaign.sqlite
+    """
+    tables = []
+    for path in (Path(first), Path(second)):
+        table = campaign_table(path)
+        if table is None:
+            allowed = f"no campaign; expected a folder with a {CAMPAIGN_DATABASE}"
+            raise PlanflyError(f"{path}: {allowed}", file=path)
+        tables.append(table)
+    return compare_tables(*tables)
 
 
 # ----------------------------------------------------------------------

@@ -4,17 +4,18 @@ import contextlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from aircraft.catalog import load_aircraft
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parameter_files import parameters_text
 from flight.autopilots.parameter_origin import TITLES, read_origin
 from flight.mission.fences import number_items, zone_fences
 from flight.mission.items import Command, Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
+from flight.mission_files.qgc_plan import stated_cruise_speed
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.measures.mission_ends import missing_ends_text
-from logs.verdict.wording import count_text
 from logs.views.exports.map_files import (
     MapLine,
     MapZone,
@@ -41,9 +42,10 @@ from planner.plan import Plan, plan_json
 from world.argument_types import checks_types
 from world.errors import MissionError, ParameterError, PlanflyError
 from world.extras import require_extra
-from world.files import temporary_folder, write_atomically
+from world.files import missing_text, temporary_folder, write_atomically
 from world.scenario import Scenario
-from world.scenario_tables import DEFAULT_AUTOPILOT
+from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable
+from world.wording import count_text
 
 # Function that returns the text of a map, by suffix.
 MAP_WRITERS = {".kml": kml_text, ".gpx": gpx_text}
@@ -90,6 +92,7 @@ class _SourceContent:
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
     has_own_parameters: True if the parameters are those of a log, a plan, a scenario or a parameter file.
+    airspeed, aircraft: airspeed until the mission sets one, m/s, and its aircraft; None and "" if no target needs them.
     """
 
     mission: Mission
@@ -103,6 +106,8 @@ class _SourceContent:
     log: FlightLog | None = None
     autopilot: Autopilot | None = None
     has_own_parameters: bool = True
+    airspeed: float | None = None
+    aircraft: str = ""
 
 
 @with_warm_up()
@@ -295,7 +300,11 @@ def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
         lines["flown"] = track_line(log.setup, log.track)
     setup = log.setup
     source = _SourceContent(
-        setup.mission, setup.scenario.name, lines, map_zones(setup), log=log, autopilot=setup.autopilot
+        *(setup.mission, setup.scenario.name, lines, map_zones(setup)),
+        log=log,
+        autopilot=setup.autopilot,
+        airspeed=setup.airspeed,
+        aircraft=Path(setup.aircraft).name,
     )
     return _with_returns(source, log.setup, log.track) if needs_returns else source
 
@@ -309,7 +318,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     needs_returns: True to add returns from a few points of the planned path.
     """
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
+        raise MissionError(f"{path}: {missing_text(path)}; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     has_own_parameters = is_plan or options["scenario"] is not None or options["params"] is not None
     if not (needs_world or has_own_parameters or fences.zones or options["at"] is not None):
@@ -322,6 +331,8 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
         *(setup.mission, setup.scenario.name, lines, zones),
         autopilot=setup.autopilot,
         has_own_parameters=has_own_parameters,
+        airspeed=setup.airspeed,
+        aircraft=Path(setup.aircraft).name,
     )
     source = _with_returns(source, setup, None) if needs_returns else source
     if not is_plan:
@@ -362,7 +373,24 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {count_text(len(mission.fences), 'fence item')}, {count_text(len(mission.rally), 'rally point')}"
+    if kind == "plan":
+        airspeed, origin = _cruise_speed(source)
+        mission, extra = replace(mission, cruise_speed=airspeed), f"{extra}, cruiseSpeed {airspeed:.0f} m/s: {origin}"
     return mission_text(mission, kind), f"{count_text(len(mission.items), 'item')}{extra}"
+
+
+def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
+    """Return the cruiseSpeed of a .plan, m/s, and where it comes from.
+
+    It is the mission's, or else the airspeed with which planfly flies the mission; without a scenario or a plan, that
+    is the cruise airspeed of the default aircraft.
+    """
+    if (stated := stated_cruise_speed(source.mission)) is not None:
+        return stated, "the mission's"
+    if source.airspeed is not None:
+        return source.airspeed, f"that of {source.aircraft}"
+    aircraft = load_aircraft(FlightTable().aircraft)
+    return aircraft.airspeed, f"that of the default aircraft {aircraft.name}; --scenario names yours"
 
 
 def judging_parameters_text(
@@ -396,7 +424,7 @@ def judging_parameters_text(
 
 def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """Return a flight in the log format with this suffix, and a description of the content."""
-    description = f"{len(log.track):,} rows, {log.end_time:.0f} s"
+    description = f"{count_text(len(log.track), 'row')}, {log.end_time:.0f} s"
     if suffix == ".tlog":
         require_extra("live", ".tlog needs")
         from logs.views.exports.telemetry_file import telemetry_bytes

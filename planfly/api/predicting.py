@@ -35,6 +35,7 @@ from world.errors import LogError, PlanflyError
 from world.extras import requires_extra
 from world.files import read_toml, write_atomically
 from world.scenario_tables import names_folder
+from world.wording import count_text
 
 # Inputs with which the model flies: the logged controls, or the autopilot's model with the logged mission.
 PredictBy = Literal["controls", "mission"]
@@ -197,8 +198,9 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
     before, count = prediction.windows
     end = float(judged[-1].time[-1])
     heading = (
-        f"{motion.source} by the logged controls: {count} windows of 2 s from {start:.1f} s to {end:.1f} s, {DRAWS}"
-        f" flights each; their errors are drawn from {before} windows before {start:.1f} s"
+        f"{motion.source} by the logged controls: {count_text(count, 'window')} of 2 s from {start:.1f} s to"
+        f" {end:.1f} s, {DRAWS} flights each; their errors are drawn from"
+        f" {count_text(before, 'window')} before {start:.1f} s"
     )
     lines = (heading, *_band_lines(bands))
     return Predicted("controls", bands, DRAWS, count, start, end, motion.source, aircraft.name, heading, lines)

@@ -46,6 +46,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Plan
 from world.files import write_atomically
 from world.scenario import with_terrain
+from world.wording import count_text
 
 if TYPE_CHECKING:
     from planfly.workflow.imported_flights import ImportedFlight
@@ -141,8 +142,9 @@ class ReturnsResult:
         notes = ["by the simulated ArduPlane flying a point-mass model, in the mean wind"]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
+            reflown_text = count_text(len(self.returns.jsbsim_differences), "return")
             notes.append(
-                f"{len(self.returns.jsbsim_differences)} returns close to a limit were flown again in JSBSim; both"
+                f"{reflown_text} close to a limit flown again in JSBSim; both"
                 f" simulations differ by up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
@@ -284,7 +286,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
     """Simulate and judge returns from points of a flight, with glides and requested remedies and files."""
     world = make_return_world(setup)
     starts = return_starts(setup, track, request.every)
-    with stage(f"flying {len(starts)} returns", "flying returns"):
+    with stage(f"flying {count_text(len(starts), 'return')}", "flying returns"):
         judged_returns = judge_returns(world, starts, request.every, fly_return)
     with TemporaryDirectory(prefix="planfly-returns-") as log_folder:
         program_returns = None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from flight.mission_files.formats import mission_kind, mission_text
+from flight.mission_files.qgc_plan import stated_cruise_speed
 from flight.simulation.setup import EngineChoice
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
@@ -258,8 +259,9 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
     mission = mission_of_plan(plan, airframe, "mission.waypoints")
     mission = replace(mission, autopilot=airframe.autopilot.name)
     rally = [folder / "mission.rally"] if mission.rally else []
+    written = replace(mission, cruise_speed=stated_cruise_speed(mission) or airframe.airspeed)
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
-        write_atomically(target, mission_text(mission, mission_kind(target)))
+        write_atomically(target, mission_text(written, mission_kind(target)))
     if plan.ways is not None and airframe.autopilot.parameters is not None:
         write_atomically(folder / "mission.parm", judging_parameters_text(mission, airframe.autopilot)[0])
     if not plan.feasible:

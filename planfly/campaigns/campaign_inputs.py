@@ -39,13 +39,17 @@ def describe_differences(stored: Mapping[str, Any], current: Mapping[str, Any]) 
     >>> describe_differences({"seed": 1, "wind.speed_mps": 5.0}, {"seed": 1, "wind.speed_mps": 8.0, "landing": "a"})
     'wind.speed_mps 8.0 instead of 5.0, landing a (not stated before)'
     """
+    texts = difference_texts(stored, current)
+    more = [f"and {len(texts) - _MAX_DESCRIBED} more"] if len(texts) > _MAX_DESCRIBED else []
+    return ", ".join([*texts[:_MAX_DESCRIBED], *more])
+
+
+def difference_texts(stored: Mapping[str, Any], current: Mapping[str, Any]) -> list[str]:
+    """Return a text for each input that differs, as in `describe_differences`."""
     names = [name for name in dict.fromkeys((*stored, *current)) if stored.get(name) != current.get(name)]
     # A number that was converted between units differs by rounding: name it only if nothing else differs.
     names = [name for name in names if not _differs_by_rounding(stored.get(name), current.get(name))] or names
-    texts = [_difference_text(name, stored.get(name), current.get(name)) for name in names[:_MAX_DESCRIBED]]
-    if len(names) > _MAX_DESCRIBED:
-        texts.append(f"and {len(names) - _MAX_DESCRIBED} more")
-    return ", ".join(texts)
+    return [_difference_text(name, stored.get(name), current.get(name)) for name in names]
 
 
 def _differs_by_rounding(stored: Any, current: Any) -> bool:

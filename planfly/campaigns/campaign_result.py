@@ -16,6 +16,7 @@ from planfly.campaigns.summary import CampaignSummary, campaign_lines
 from planfly.campaigns.tables import read_path_arrays
 from world.errors import ArgumentError
 from world.html_table import html_table
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # Write the command line that repeats a campaign or a search for winds, for its page.
@@ -139,9 +140,8 @@ class CampaignResult:
 
     def __repr__(self) -> str:
         tally, (low, high) = self.summary.estimate.tally, self.interval
-        return (
-            f"<CampaignResult {self.probability:.4f} ({low:.4f} to {high:.4f}) of {tally.flown} flights; {self.answer}>"
-        )
+        flights_text = count_text(tally.flown, "flight")
+        return f"<CampaignResult {self.probability:.4f} ({low:.4f} to {high:.4f}) of {flights_text}; {self.answer}>"
 
     def _repr_html_(self) -> str:
         """Return the HTML for a notebook."""

@@ -30,6 +30,7 @@ from planfly.campaigns.tables import (
     read_stored_settings,
 )
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
+from world.wording import count_text
 
 # Target for half the width of a boundary's interval, m/s.
 BOUNDARY_ACCURACY_MPS = 0.25
@@ -133,8 +134,8 @@ class WindsResult:
     def __repr__(self) -> str:
         min_speed = min(boundary.estimate for boundary in self.boundaries)
         return (
-            f"<WindsResult {len(self.boundaries)} directions, {min_speed:.1f} m/s the lowest;"
-            f" {len(self.flights)} flights>"
+            f"<WindsResult {count_text(len(self.boundaries), 'direction')}, {min_speed:.1f} m/s the lowest;"
+            f" {count_text(len(self.flights), 'flight')}>"
         )
 
 
@@ -405,7 +406,7 @@ class _ProgressReport:
         """Report the minimum number of flights before the first flight."""
         if self._advance is not None:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
-            remark = f"{flight_count} of {total} flights at least"
+            remark = f"{flight_count} of {count_text(total, 'flight')} at least"
             self._advance(float(flight_count), float(total), remark)
 
     def report(self, flight_count: int, is_last: bool = False) -> None:
@@ -421,7 +422,7 @@ class _ProgressReport:
         remaining = len(search.flown) + search.min_remaining_flights() - flight_count
         settled_count, total = search.goal.directions - len(search.open), search.goal.directions
         remark = (
-            f"{settled_count} of {total} directions settled, {flight_count} flights,"
+            f"{settled_count} of {total} directions settled, {count_text(flight_count, 'flight')},"
             f" {60.0 * flights_per_second:.0f} a minute"
         )
         if remaining > 0 and flights_per_second > 0.0:

@@ -10,6 +10,7 @@ from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, Store, StoreError, read_stored_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
+from world.wording import count_text
 
 Advance = Callable[[float, float, str], None]
 
@@ -61,10 +62,14 @@ def _add_outcome(tally: Tally, outcome: str) -> Tally:
     return Tally(flyable + (outcome == "flyable"), not_flyable + (outcome == "not flyable"), lost + (outcome == "lost"))
 
 
-def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
+def resumed_goal(
+    requested: Goal | None, folder: Path, confidence: float | None = None, *, keeps_flights: bool = False
+) -> Goal:
     """Return the goal of a resumed campaign: the requested goal, or the stored goal if none is requested.
 
     confidence: confidence of the goal; None keeps the stored confidence.
+    keeps_flights: True keeps the stored number of flights, if both goals have a fixed number or both stop by
+        themselves.
     Raises StoreError for a folder without a campaign.
     """
     path = folder / CAMPAIGN_DATABASE
@@ -73,6 +78,8 @@ def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None 
         raise StoreError(f"{path}: there is no campaign to continue", file=path)
     old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
     goal = old_goal if requested is None else requested
+    if keeps_flights and goal.stops == old_goal.stops:
+        goal = replace(goal, flights=old_goal.flights)
     is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)
     return replace(goal, confidence=confidence or old_goal.confidence, changed=old_goal.changed or not is_same)
 
@@ -149,7 +156,7 @@ class _ProgressReport:
         if advance is not None:
             # Report before the workers start, because the start takes seconds.
             total = self._min_total_flights(stored_tally)
-            remark = f"{stored_tally.flown} of {total} flights" + (" at least" if goal.stops else "")
+            remark = f"{stored_tally.flown} of {count_text(total, 'flight')}" + (" at least" if goal.stops else "")
             advance(float(stored_tally.flown), float(total), remark)
 
     def start_timing(self, stored_tally: Tally) -> None:
@@ -172,7 +179,7 @@ class _ProgressReport:
         total = self._min_total_flights(tally)
         seconds_left = (total - tally.flown) / flights_per_second if flights_per_second > 0.0 else 0.0
         remark = (
-            f"{tally.flown} flights, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"
+            f"{count_text(tally.flown, 'flight')}, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"
             f" {60.0 * flights_per_second:.0f} a minute, {seconds_left:.0f} s left"
         )
         self._advance(float(tally.flown), float(total), remark)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from logs.theme import css_variables
 from logs.verdict.conditions import flown_lines
+from logs.verdict.junit import JunitCase, JunitSuite, answer_case
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
 from logs.views.drawing import page_svg, png_bytes
@@ -61,6 +62,7 @@ from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_atomically
+from world.wording import count_text
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
 _MAX_DRAWN_FLIGHTS = 3000
@@ -132,7 +134,7 @@ def winds_page(name: str, figure: Figure, winds: WindsResult, rows: Sequence[tup
         "winds.html",
         name=name,
         picture=picture,
-        answer=answer_state(winds),
+        answer=_ANSWER_STYLES[winds_answer(winds)],
         lines=wind_lines(winds),
         rows=rows,
         command=command,
@@ -357,7 +359,16 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 # Write the data, picture and page of a go/no-go chart.
 
 # Schema of ``winds.json``.
-WINDS_SCHEMA = "planfly.winds/1"
+WINDS_SCHEMA = "planfly.winds/2"
+# Answer of a search for winds.
+WindsAnswer = Literal["judged", "not flyable", "not judged in full", "not judged"]
+# Style of the page's answer, by the answer.
+_ANSWER_STYLES: dict[WindsAnswer, str] = {
+    "judged": "",
+    "not flyable": "missed",
+    "not judged in full": "undecided",
+    "not judged": "undecided",
+}
 
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
@@ -379,7 +390,7 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
 
 def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: str) -> None:
     """Write the files of a search for winds: ``winds.json``, ``winds.png`` and ``winds.html``."""
-    goal, directions = winds.goal, chart_directions(winds)
+    goal, directions, reasons = winds.goal, chart_directions(winds), unsettled_reasons(winds)
     wind = base.scenario.wind
     scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
     figure = draw_go_no_go(directions, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
@@ -390,14 +401,17 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
             _interval_text(direction.low, direction.high, goal.most),
             str(sum(count for _, count, _ in direction.flights)),
             RULE_WORDS[rule].title if rule else "",
+            f"no: {reason}" if reason else "yes",
         )
-        for direction, rule in zip(directions, _deciding_rules(winds), strict=True)
+        for direction, rule, reason in zip(directions, _deciding_rules(winds), reasons, strict=True)
     ]
     data = {
         "schema": WINDS_SCHEMA,
         "name": base.name,
         "seed": base.seed,
         "target": goal.target,
+        "answer": winds_answer(winds),
+        "reason": next(iter(_unsettled_lines(winds)), ""),
         "confidence": goal.confidence,
         "most": goal.most,
         "flights": len(winds.flights),
@@ -408,6 +422,8 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
                 "boundary_mps": round(direction.boundary, 3),
                 "interval_mps": [round(direction.low, 3), round(direction.high, 3)],
                 "beyond": direction.is_beyond_search,
+                "judged": not reasons[k],
+                "reason": reasons[k],
                 "flown": [
                     {"speed_mps": round(speed, 3), "flights": count, "flyable": flyable}
                     for speed, count, flyable in direction.flights
@@ -454,43 +470,53 @@ def _is_only_calm(winds: WindsResult) -> bool:
     return winds.calm is not None and winds.calm.flights == len(winds.flights)
 
 
-def _unsettled_directions(winds: WindsResult) -> list[int]:
-    """Return the indices of directions that have too few flights or too wide an interval.
+def unsettled_reasons(winds: WindsResult) -> list[str]:
+    """Return for each direction the reason why its boundary is not judged, or "" if it is.
 
-    The list is empty if every flight in calm air failed, because then no wind was searched.
+    All are "" if every flight in calm air failed, because then no wind was searched.
     """
     if _is_only_calm(winds):
-        return []
-    counts = Counter(direction for direction, _, _ in winds.flights)
-    return [
-        k
-        for k, boundary in enumerate(winds.boundaries)
-        if needs_more_flights(boundary, counts[k], BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION)
-    ]
+        return [""] * len(winds.boundaries)
+    counts, max_width = Counter(direction for direction, _, _ in winds.flights), 2.0 * BOUNDARY_ACCURACY_MPS
+    reasons = []
+    for k, boundary in enumerate(winds.boundaries):
+        if not needs_more_flights(boundary, counts[k], BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
+            reasons.append("")
+        elif counts[k] < MIN_FLIGHTS_PER_DIRECTION:
+            reasons.append(f"{count_text(counts[k], 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
+        else:
+            reasons.append(f"an interval of {boundary.width:.2f} m/s; at most {max_width:g} m/s is required")
+    return reasons
 
 
-def answer_state(winds: WindsResult) -> str:
-    """Return the state of the answer, which the page shows.
+def winds_answer(winds: WindsResult) -> WindsAnswer:
+    """Return the answer of a search for winds.
 
-    It is "missed" if the flights show that the mission is not flyable even in calm air with the target probability,
-    "undecided" if this is not certain or a direction has too few flights, and otherwise "".
+    It is "not flyable" if the mission does not reach the target probability even in calm air, because the flights there
+    show it or all boundaries are judged; "not judged" if no direction has a judged boundary; "not judged in full" if
+    only some directions have one; and otherwise "judged".
     """
-    calm = winds.calm
-    if calm is not None and wilson(calm.flights - calm.failed_count, calm.flights)[1] < winds.goal.target:
-        return "missed"
-    return "undecided" if calm is not None or _unsettled_directions(winds) else ""
+    calm, reasons = winds.calm, unsettled_reasons(winds)
+    if calm is not None:
+        max_share = wilson(calm.flights - calm.failed_count, calm.flights).high
+        if max_share < winds.goal.target or not any(reasons):
+            return "not flyable"
+    if all(reasons):
+        return "not judged"
+    return "not judged in full" if any(reasons) else "judged"
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return a line about the directions with too few flights; [] if there are none."""
-    unsettled = _unsettled_directions(winds)
-    if not unsettled:
+    """Return a line that the search or some of its directions are not judged, and why; [] if all are judged."""
+    unsettled_count = sum(map(bool, unsettled_reasons(winds)))
+    if not unsettled_count:
         return []
+    total = len(winds.boundaries)
+    word = "not judged" if unsettled_count == total else "not judged in full"
     return [
-        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions have too few "
-        f"flights: each requires at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most "
-        f"{2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer flights, the interval depends mostly on "
-        "assumptions"
+        f"{word}: {unsettled_count} of {count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'} too"
+        f" few flights: each requires at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most"
+        f" {2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer flights, the interval depends mostly on assumptions"
     ]
 
 
@@ -542,8 +568,9 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
         return []
     min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
-        f"no flight failed in {len(counts)} of {len(winds.boundaries)} directions: {min_count} flights in"
-        f" {max_speed:g} m/s from each of them show P >= {probability_text} by themselves"
+        f"no flight failed in {len(counts)} of {count_text(len(winds.boundaries), 'direction')}:"
+        f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"
+        " by themselves"
     ]
 
 
@@ -553,11 +580,14 @@ def _calm_lines(winds: WindsResult) -> list[str]:
     if calm is None:
         return []
     wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
-    return [f"in {wind}, {calm.failed_count} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
+    return [
+        f"in {wind}, {calm.failed_count} of {count_text(calm.flights, 'flight')} fail",
+        *failure_lines(calm.by_rule),
+    ]
 
 
-def _winds_answer(winds: WindsResult) -> str:
-    """Return one line with the answer of a search for winds: the lowest and the highest boundary."""
+def _boundary_line(winds: WindsResult) -> str:
+    """Return one line with the lowest and the highest boundary of a search for winds."""
     directions, target = chart_directions(winds), winds.goal.target
     lowest_direction, highest_direction = (
         select(directions, key=lambda direction: direction.boundary) for select in (min, max)
@@ -585,17 +615,33 @@ def wind_lines(winds: WindsResult) -> list[str]:
     """Return the result of a search for winds as a few lines of text."""
     percent = f"{100 * winds.goal.confidence:g} %"
     return [
-        _winds_answer(winds),
+        *_unsettled_lines(winds),
+        _boundary_line(winds),
         *_calm_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *_deciding_lines(winds),
         *_lines_without_failures(winds),
-        *_unsettled_lines(winds),
         *_lost_lines(winds),
-        f"{len(winds.flights)} flights; no wind was tried, because every flight in calm air fails"
+        f"{count_text(len(winds.flights), 'flight')}; no wind was tried, because every flight in calm air fails"
         if _is_only_calm(winds)
-        else f"{len(winds.flights)} flights; intervals at {percent}, from the flights in each direction",
+        else f"{count_text(len(winds.flights), 'flight')}; intervals at {percent}, from the flights in each direction",
     ]
+
+
+def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
+    """Return the JUnit suite of a search for winds: a test case for its answer, and one for each direction.
+
+    name: mission of the search.
+
+    The answer fails unless it is "judged"; a direction that is not judged is skipped.
+    """
+    lines, reasons = wind_lines(winds), unsettled_reasons(winds)
+    cases = [answer_case("" if winds_answer(winds) == "judged" else lines[0])]
+    for direction, reason in zip(chart_directions(winds), reasons, strict=True):
+        boundary = _speed_text(direction.boundary, winds.goal.most)
+        case = JunitCase("planfly.winds", f"from {direction.from_deg:g}°", text=f"wind up to {boundary}")
+        cases.append(case._replace(result="skipped", message=f"not judged: {reason}") if reason else case)
+    return JunitSuite(name, cases, "\n".join(lines))
 
 
 # ----------------------------------------------------------------------

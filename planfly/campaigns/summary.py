@@ -4,14 +4,15 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from logs.verdict.conditions import Conditions, flown_lines
+from logs.verdict.junit import JunitCase, JunitSuite
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.wording import place_text
+from logs.verdict.wording import margin_text, place_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
@@ -20,10 +21,12 @@ from planfly.campaigns.statistics.decision import (
     MIN_FLIGHTS_FOR_INDEX,
     Estimate,
     Goal,
+    Tally,
     first_order_index,
     rank_slope,
 )
 from planfly.campaigns.tables import Store
+from world.wording import count_text
 
 # Schema of ``summary.json``.
 SUMMARY_SCHEMA = "planfly.campaign-summary/1"
@@ -48,6 +51,28 @@ class Sensitivity:
     slope: float
 
 
+@dataclass(frozen=True)
+class RankedRule:
+    """Rule in the ranking of a campaign by how close its flights came to failing it.
+
+    failed: number of flights that failed the rule.
+    lowest: smallest margin of all flights, in `unit`; None if no flight has one.
+    low_margin: 5 % quantile of the margin, in `unit`; None likewise.
+    """
+
+    rule: str
+    failed: int
+    lowest: float | None
+    low_margin: float | None
+    unit: str
+
+    @property
+    def is_narrow_pass(self) -> bool:
+        """True if every flight passed the rule, but one of them by less than the rule's scale."""
+        scale = RULE_WORDS[self.rule].scale
+        return not self.failed and self.lowest is not None and scale is not None and self.lowest < scale
+
+
 @dataclass(frozen=True, repr=False)
 class CampaignSummary:
     """Contents of the summary and the report.
@@ -57,6 +82,7 @@ class CampaignSummary:
     Journal 66, 1969); "" if there is no such rule.
     conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
     low_margin: 5 % quantile of the margin of the deciding rule, in `unit`; None if unknown.
+    ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
     """
 
     name: str
@@ -69,6 +95,7 @@ class CampaignSummary:
     low_margin: float | None
     unit: str
     sensitivities: tuple[Sensitivity, ...]
+    ranking: tuple[RankedRule, ...]
     worst: tuple[FlightRow, ...]
     dispersions: dict[str, dict[str, Any]]
     made_of: str
@@ -76,7 +103,7 @@ class CampaignSummary:
 
     def __repr__(self) -> str:
         tally = self.estimate.tally
-        return f"<CampaignSummary {self.name}: {tally.flyable} of {tally.flown} flights are flyable>"
+        return f"<CampaignSummary {self.name}: {_flyable_text(tally)}>"
 
 
 def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
@@ -95,6 +122,7 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         low_margin=low_margin,
         unit=next((margin.unit for row in worst_rows for rule, margin in row.margins if rule == deciding), ""),
         sensitivities=_rule_sensitivities(base, store, deciding),
+        ranking=_rank_rules(store, by_rule),
         worst=worst_rows,
         dispersions=base.dispersions.to_json(),
         made_of=store.made_of,
@@ -132,6 +160,34 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
         return "", None
     rule = min(reliability_indices, key=lambda name: reliability_indices[name])
     return rule, low_margins[rule]
+
+
+def _rank_rules(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[RankedRule, ...]:
+    """Return the ranking of the rules; a failed rule is in it also if it has no margin."""
+    failed_counts = {failures.rule: failures.flights for failures in by_rule}
+    ranked = []
+    for rule, words in RULE_WORDS.items():
+        margins = store.column(words.margin_column)
+        margins = margins[np.isfinite(margins)]
+        lowest, low_margin = (float(margins.min()), float(np.quantile(margins, 0.05))) if margins.size else (None, None)
+        if margins.size or rule in failed_counts:
+            ranked.append(RankedRule(rule, failed_counts.get(rule, 0), lowest, low_margin, _margin_unit(store, rule)))
+    return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled(entry))))
+
+
+def _margin_unit(store: Store, rule: str) -> str:
+    """Return the unit of a rule's margins in a table; of several units that of the first flight."""
+    words = RULE_WORDS[rule]
+    place_json = store.first_text(words.place_column)
+    if place_json is not None:
+        return str(json.loads(place_json)["unit"])
+    return "" if words.margin is None else words.margin.unit
+
+
+def _scaled(entry: RankedRule) -> float:
+    """Return a rule's smallest margin as a multiple of the rule's scale; inf if it has none."""
+    scale = RULE_WORDS[entry.rule].scale
+    return math.inf if entry.lowest is None or scale is None else entry.lowest / scale
 
 
 def _rule_sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
@@ -181,6 +237,16 @@ def summary_json(summary: CampaignSummary) -> str:
         "deciding_rule": summary.deciding,
         "margin_of_one_in_twenty": _to_plain_number(summary.low_margin),
         "margin_unit": summary.unit,
+        "closest_rules": [
+            {
+                "rule": entry.rule,
+                "failed": entry.failed,
+                "smallest_margin": _to_plain_number(entry.lowest),
+                "margin_of_one_in_twenty": _to_plain_number(entry.low_margin),
+                "unit": entry.unit,
+            }
+            for entry in summary.ranking
+        ],
         "sensitivities": [
             {
                 "quantity": sensitivity.quantity,
@@ -217,14 +283,22 @@ def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
 
 
 def closest_text(row: FlightRow) -> str:
-    """Return the minimum margin of a flight with its rule and place as text; "" if no margin is known."""
+    """Return the minimum margin of a flight with its rule and place as text; "" if no margin is known.
+
+    A failed rule comes first, also if it has no margin.
+    """
     scaled_margins = [
         (fraction, rule, margin) for rule, margin in row.margins if (fraction := scale_margin(rule, margin)) is not None
     ]
+    failed_rules = {rule for rule, _ in row.failed}
+    for rule, place in row.failed:
+        if rule not in {known_rule for _, known_rule, _ in scaled_margins}:
+            return f"{RULE_WORDS[rule].title} failed at {place_text(place)}, not by a margin"
     if not scaled_margins:
         return ""
-    _, rule, margin = min(scaled_margins, key=lambda entry: entry[0])
-    return f"{RULE_WORDS[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
+    _, rule, margin = min(scaled_margins, key=lambda entry: (entry[1] not in failed_rules, entry[0]))
+    value_text = margin_text(margin.value or 0.0, margin.unit, passed=rule not in failed_rules)
+    return f"{RULE_WORDS[rule].title} at {place_text(margin.place)}: {value_text}"
 
 
 def worst_flight_logs(worst: Sequence[FlightRow]) -> list[str]:
@@ -241,12 +315,18 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     estimate, goal = summary.estimate, summary.goal
     tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
     lines = [
-        f"{_answer_text(summary)}: {tally.flyable} of {tally.flown} flights are flyable, P = {tally.share:.4f}",
+        f"{_answer_text(summary)}: {_flyable_text(tally)}, P = {tally.share:.4f}",
         f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
         f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
         *(f"  {line}" for line in flown_lines(summary.conditions)),
     ]
     lines += failure_lines(summary.by_rule)
+    lines += [
+        f"  narrow  {RULE_WORDS[entry.rule].title}: the smallest margin is"
+        f" {margin_text(entry.lowest or 0.0, entry.unit, passed=True)}"
+        for entry in summary.ranking
+        if entry.is_narrow_pass
+    ]
     if summary.lost:
         lost_text = ", ".join(map(str, summary.lost[:10]))
         lines.append(f"  lost    {len(summary.lost)} could not be flown because their workers died: {lost_text}")
@@ -256,6 +336,31 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
             f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
         )
     return lines
+
+
+def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
+    """Return the JUnit suite of a campaign: a test case for its target, and one for each rule that a flight failed.
+
+    name: mission of the campaign.
+
+    All cases fail if the target is missed or undecided, and all are skipped without a target.  If the target is
+    reached, all pass, and those of rules have their failures as text.
+    """
+    answer, lines = summary.estimate.answer, campaign_lines(summary)
+    result: Literal["passed", "failure", "skipped"] = (
+        "passed" if answer == "reached" else "skipped" if answer == "no target" else "failure"
+    )
+    cases = [JunitCase("planfly", "verdict", result, lines[0])]
+    for failures in summary.by_rule:
+        text = f"{failures.flights} of {count_text(summary.estimate.tally.flown, 'flight')} failed"
+        (line,) = failure_lines([failures])
+        cases.append(JunitCase(f"planfly.{failures.rule}", "flights", result, text, line.strip()))
+    return JunitSuite(name, cases, "\n".join(lines))
+
+
+def _flyable_text(tally: Tally) -> str:
+    """Return the number of flyable flights as text, such as "1 of 4 flights is flyable"."""
+    return f"{tally.flyable} of {count_text(tally.flown, 'flight')} {'is' if tally.flyable == 1 else 'are'} flyable"
 
 
 def _answer_text(summary: CampaignSummary) -> str:

@@ -1,6 +1,7 @@
 """``planfly campaign`` and ``planfly winds``: find the probability that a mission flies, and its strongest wind."""
 
 import argparse
+import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -18,13 +19,20 @@ from planfly.terminal.options import (
     add_world_options,
     call_api,
 )
-from planfly.terminal.output import write_json_if_requested
+from planfly.terminal.output import write_error_if_requested, write_json_if_requested, write_suite_if_requested
 from planfly.workflow.output_paths import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
 # Exit code by the answer of a campaign.
 _EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": INCOMPLETE, "no target": FLYABLE}
+# Exit code by the answer of a search for winds.
+_WINDS_EXIT_CODES = {
+    "judged": FLYABLE,
+    "not flyable": NOT_FLYABLE,
+    "not judged in full": INCOMPLETE,
+    "not judged": INCOMPLETE,
+}
 
 
 def add_campaign_parser(command_line: LineParser) -> None:
@@ -54,7 +62,8 @@ def add_campaign_parser(command_line: LineParser) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="number of flights (default: 300); with --prove, the maximum (default: 5000)",
+        help="number of flights (default: 300); with --prove, the maximum (default: 5000); with --resume, the default "
+        "is the number of the resumed campaign",
     )
     parser.add_argument(
         "--confidence",
@@ -116,7 +125,9 @@ def _add_shared_options(parser: CommandParser) -> None:
     """Add the arguments and options that campaigns and searches for winds have in common."""
     add_flights_options(parser)
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
-    add_result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")
+    add_result_options(
+        parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)", junit=True
+    )
 
 
 def add_flights_options(parser: CommandParser) -> None:
@@ -157,31 +168,41 @@ def campaign(args: argparse.Namespace) -> int:
     folder = _result_folder(args, "campaign")
     if args.refly is not None:
         return _repeat_flight(args, folder)
-    with _report_stored_flights(folder, "campaign.sqlite") as interrupted:
+    with _report_stored_flights(args, folder, "campaign.sqlite") as interrupted:
         result = call_api(planfly.campaign, args, out=folder)
     if interrupted():
         return interrupted()
-    from planfly.campaigns.summary import campaign_lines
+    from planfly.campaigns.summary import campaign_lines, campaign_suite
 
     print("\n".join(campaign_lines(result.summary)))
     print(f"results   {folder}/ (report.html, summary.json, campaign.sqlite, worst/)")
-    write_json_if_requested(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
-    return _EXIT_CODES[result.answer]
+    code = _EXIT_CODES[result.answer]
+    write_json_if_requested(args, lambda: _with_exit_code(folder / "summary.json", code))
+    write_suite_if_requested(args, lambda: campaign_suite(args.target, result.summary))
+    return code
 
 
 def winds(args: argparse.Namespace) -> int:
     """Find the strongest wind from each direction, or resume the search, and draw the chart."""
     folder = _result_folder(args, "winds")
-    with _report_stored_flights(folder, "winds.sqlite") as interrupted:
+    with _report_stored_flights(args, folder, "winds.sqlite") as interrupted:
         result = call_api(planfly.winds, args, out=folder)
     if interrupted():
         return interrupted()
-    from planfly.campaigns.report import wind_lines
+    from planfly.campaigns.report import wind_lines, winds_answer, winds_suite
 
     print("\n".join(wind_lines(result)))
     print(f"results   {folder}/ (winds.html, winds.png, winds.json, winds.sqlite)")
-    write_json_if_requested(args, lambda: (folder / "winds.json").read_text(encoding="utf-8"))
-    return FLYABLE if result.calm is None else NOT_FLYABLE
+    code = _WINDS_EXIT_CODES[winds_answer(result)]
+    write_json_if_requested(args, lambda: _with_exit_code(folder / "winds.json", code))
+    write_suite_if_requested(args, lambda: winds_suite(args.target, result))
+    return code
+
+
+def _with_exit_code(file: Path, code: int) -> str:
+    """Return the JSON text of a file of results with the exit code after its schema."""
+    document = json.loads(file.read_text(encoding="utf-8"))
+    return json.dumps({"schema": document["schema"], "exit_code": code, **document}, indent=1) + "\n"
 
 
 def _result_folder(args: argparse.Namespace, kind: str) -> Path:
@@ -193,8 +214,9 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
     """Repeat one flight of the campaign in a folder, with a log; return 4 if the flight was not flyable."""
     from logs.verdict.wording import place_text
 
-    if args.json:
-        raise PlanflyError("--json: only with a campaign, not with --refly", field="--json", value=args.json)
+    for option, target in (("--json", args.json), ("--junit", args.junit)):
+        if target:
+            raise PlanflyError(f"{option}: only with a campaign, not with --refly", field=option, value=target)
     flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
     print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
     for rule, place in flight.row.failed:
@@ -204,7 +226,7 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
 
 
 @contextmanager
-def _report_stored_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
+def _report_stored_flights(args: argparse.Namespace, folder: Path, table: str) -> Iterator[Callable[[], int]]:
     """Report the number of stored flights after an interruption.
 
     Yields a function that returns the exit code.
@@ -216,9 +238,12 @@ def _report_stored_flights(folder: Path, table: str) -> Iterator[Callable[[], in
         yield lambda: code
     except KeyboardInterrupt as interruption:
         from planfly.campaigns.tables import count_flights
+        from world.wording import count_text
 
         if not (folder / table).is_file():
             raise
         flights = count_flights(folder / table)
-        print(f"planfly: interrupted; {flights} flights are kept in {folder}: continue with --resume", file=sys.stderr)
+        message = f"interrupted; {count_text(flights, 'flight')} kept in {folder}: continue with --resume"
         code = 128 + (interruption.number if isinstance(interruption, Interrupted) else signal.SIGINT)
+        print(f"planfly: {message}", file=sys.stderr)
+        write_error_if_requested(args, code, message)

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import planfly
@@ -28,7 +29,7 @@ from planfly.terminal.results import print_returns_line, print_verdict, print_wa
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from planfly import Judged, Verdict
+    from planfly import Verdict
     from planfly.terminal.verdict_answers import VerdictsDocument
 
 # Suffixes of logs of other programs, as the help shows them.
@@ -90,15 +91,14 @@ def check(args: argparse.Namespace) -> int:
         return _check_for_each_autopilot(args)
     result = call_api(planfly.judge, args)
     if not result.is_log:
-        print_warnings([*result.setup.mission.warnings, *result.setup.scenario.notes])
-    write_json_if_requested(args, lambda: _verdict_answer(result))
+        print_warnings(result.setup.scenario.notes)
+    code = INCOMPLETE if result.lossy else verdict_code(result.verdict)
+    write_json_if_requested(args, lambda: _verdict_answer(result.verdict, code))
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
     print_verdict(result.verdict, result.setup.notes)
     print_returns_line(result.returns_line)
-    if result.lossy:
-        return INCOMPLETE
-    return verdict_code(result.verdict)
+    return code
 
 
 # Options that are not allowed with --for, because they belong to one autopilot or to a log.
@@ -129,8 +129,10 @@ def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, 
     return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
-def _verdict_answer(result: "Judged") -> str:
+def _verdict_answer(verdict: "Verdict", code: int) -> object:
     """Return the answer of the command for --json."""
-    from logs.verdict.verdict import verdict_json
+    from planfly.terminal.verdict_answers import CheckAnswer
 
-    return verdict_json(result.verdict)
+    document = verdict.document()
+    values = {field.name: getattr(document, field.name) for field in fields(document)}
+    return CheckAnswer(exit_code=code, **values)

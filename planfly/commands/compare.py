@@ -1,4 +1,4 @@
-"""``planfly compare``: compare two flights in a table and in pictures."""
+"""``planfly compare``: compare two flights in a table and in pictures, or two campaigns."""
 
 import argparse
 import math
@@ -12,29 +12,33 @@ from planfly.terminal.options import add_log_argument, add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
 from planfly.workflow.output_paths import COMPARE_FILES
+from world.errors import PlanflyError
 
 if TYPE_CHECKING:
-    from planfly import Comparison
+    from planfly import CampaignComparison, Comparison
 
 
 def add_compare_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly compare``."""
     parser = command_line.add_command(
         "compare",
-        "compare two flights: a table of differences, and pictures",
+        "compare two flights: a table of differences, and pictures; or two campaigns: how likely their flights succeed",
         "planfly compare calm.mcap windy.mcap --out both",
+        "planfly compare runs/calm-campaign runs/windy-campaign",
     )
-    add_log_argument(parser, "first", "A.mcap")
-    add_log_argument(parser, "second", "B.mcap", "another")
+    add_log_argument(parser, "first", "A", "a flight log (.mcap), or the folder of a campaign")
+    add_log_argument(parser, "second", "B", "another")
     parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
     add_result_options(parser, "folder for pictures and compare.html (default: only the table)")
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Print the differences, and draw them if a folder is named.
+    """Print the differences, and draw those of two logs if a folder is named.
 
     The exit code is 3 if one of the logs is incomplete.
     """
+    if any(_is_campaign(Path(name)) for name in (args.first, args.second)):
+        return _compare_campaigns(args)
     from logs.views.report.compare import difference_lines
 
     logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]
@@ -50,6 +54,55 @@ def compare(args: argparse.Namespace) -> int:
     code = INCOMPLETE if incomplete_logs else FLYABLE
     write_json_if_requested(args, lambda: _json_answer(comparison, files, code))
     return code
+
+
+def _is_campaign(path: Path) -> bool:
+    """Return True if a path is the folder or the table of a campaign."""
+    from planfly.campaigns.compare_campaigns import campaign_table
+
+    return (path.is_dir() or path.suffix == ".sqlite") and campaign_table(path) is not None
+
+
+def _compare_campaigns(args: argparse.Namespace) -> int:
+    """Print the comparison of two campaigns."""
+    for option, value in (("--out", args.out), ("--svg", args.svg)):
+        if value:
+            raise PlanflyError(f"{option}: only with two flight logs, not with campaigns", field=option, value=value)
+    comparison = planfly.compare_campaigns(args.first, args.second)
+    from planfly.campaigns.compare_campaigns import comparison_lines
+
+    print("\n".join(comparison_lines(comparison)))
+    write_json_if_requested(args, lambda: _campaigns_answer(comparison))
+    return FLYABLE
+
+
+def _campaigns_answer(comparison: "CampaignComparison") -> object:
+    """Return the answer of the command on two campaigns for --json."""
+    from planfly.terminal.answers import ChangedRule, CompareCampaignsAnswer, ComparedCampaignEntry
+
+    return CompareCampaignsAnswer(
+        exit_code=FLYABLE,
+        answer=comparison.answer,
+        campaigns=[
+            ComparedCampaignEntry(
+                name=campaign.name,
+                flights=campaign.tally.flown,
+                flyable=campaign.tally.flyable,
+                probability=campaign.tally.share,
+                interval=list(campaign.interval),
+            )
+            for campaign in (comparison.first, comparison.second)
+        ],
+        difference=comparison.difference.value,
+        interval=list(comparison.difference.interval),
+        p_value=comparison.difference.p_value,
+        pairs=comparison.pairs,
+        only_first=comparison.only_first,
+        only_second=comparison.only_second,
+        rules=[ChangedRule(rule=rule, first=first, second=second) for rule, first, second in comparison.rules],
+        inputs=list(comparison.inputs),
+        notes=list(comparison.notes),
+    )
 
 
 def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> object:

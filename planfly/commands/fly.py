@@ -54,7 +54,7 @@ def fly(args: argparse.Namespace) -> int:
     is_log_named = args.log is not None
     log = args.log if is_log_named else FLY_LOG
     flight = call_api(planfly.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
-    print_warnings([*flight.mission.warnings, *flight.setup.scenario.notes])
+    print_warnings(flight.setup.scenario.notes)
     print_verdict(flight.verdict, flight.setup.notes)
     print_returns_line(flight.returns_line)
     if flight.log is None:

@@ -20,6 +20,7 @@ from planfly.terminal.options import (
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_verdict, warn_about_incomplete_log
 from world.errors import PlanflyError
+from world.wording import count_text
 
 if TYPE_CHECKING:
     from planfly import ImportedFlight, Reflown
@@ -68,7 +69,7 @@ def import_log(args: argparse.Namespace) -> int:
         raise PlanflyError("import needs FLIGHT.mcap, the flight log to write", field="FLIGHT.mcap")
     flight = call_api(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
-    print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
+    print(f"log       {Path(args.target)} ({count_text(len(flight.track), 'row')})")
     code = INCOMPLETE if flight.lossy else verdict_code(flight.verdict)
     write_json_if_requested(args, lambda: _import_answer(Path(args.target), flight, code))
     write_junit_if_requested(args, {args.log: flight.verdict})
@@ -81,7 +82,7 @@ def _guess_columns(args: argparse.Namespace) -> int:
         if value is not None:
             raise PlanflyError(f"--columns-from writes a table and no flight log: without {name}", field=name)
     guesses = planfly.guess_columns(args.files, args.log, overwrite=args.overwrite)
-    print(f"table     {args.log}: {guesses.guesses} guesses to check")
+    print(f"table     {args.log}: {guesses.guesses} {'guess' if guesses.guesses == 1 else 'guesses'} to check")
     for line in guesses.missing:
         print(f"  {line}")
     print(

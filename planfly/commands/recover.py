@@ -9,6 +9,7 @@ from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
 from planfly.terminal.options import add_log_argument, add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
+from world.wording import count_text
 
 
 def add_recover_parser(command_line: LineParser) -> None:
@@ -31,7 +32,7 @@ def recover(args: argparse.Namespace) -> int:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
         write_json_if_requested(args, lambda: _json_answer(None, None, None))
         return FLYABLE
-    print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
+    print(f"log       {target} ({count_text(len(log.track), 'row')}, to {log.end_time:.1f} s)")
     warn_about_incomplete_log(log)
     write_json_if_requested(args, lambda: _json_answer(target, len(log.track), log.end_time))
     return INCOMPLETE

@@ -69,7 +69,7 @@ COMMANDS = (
     Command("link", _JUDGE_AND_SHOW, "link_answers.LinkAnswer"),
     Command("survey", _JUDGE_AND_SHOW, "survey_answers.SurveyAnswer"),
     Command("report", _JUDGE_AND_SHOW, "ReportAnswer"),
-    Command("compare", _JUDGE_AND_SHOW, "CompareAnswer"),
+    Command("compare", _JUDGE_AND_SHOW, "CompareDocument"),
     Command("replay", _JUDGE_AND_SHOW, "ReplayAnswer"),
     Command("recover", _JUDGE_AND_SHOW, "RecoverAnswer"),
     Command("import", _AUTOPILOT_LOGS, "ImportAnswer", "imported_logs", "import_log"),

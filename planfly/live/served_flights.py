@@ -58,6 +58,7 @@ from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
 from world.scenario import Scenario, without_ground_phases
+from world.wording import count_text
 
 # Duration of a loiter in LOITER and GUIDED in one log, s: each lap of a loiter is laid out, and judged, separately.
 LOITER_DURATION_S = 900.0
@@ -329,7 +330,9 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
     """Return the texts on a mission for stations: its size, its geometric verdict, and notes on its route."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.positions[:, :2], axis=0), axis=1).sum()) / 1000.0
-    size_text = StatusText(f"mission: {len(route.points)} waypoints, {length:.1f} km; {route.started}", INFO)
+    size_text = StatusText(
+        f"mission: {count_text(len(route.points), 'waypoint')}, {length:.1f} km; {route.started}", INFO
+    )
     notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS_PER_VERDICT])
     return (size_text, *verdict_texts("geometry", verdict), *notes)
 
@@ -348,8 +351,8 @@ def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[Sta
         for finding in verdict.findings
         if finding.ok is False and finding.rule not in _RULES_OF_UNFINISHED_PATHS
     ]
-    count_text = "1 finding" if len(failed_findings) == 1 else f"{len(failed_findings) or 'no'} findings"
-    first_text = StatusText(f"verdict ({basis}): {end_reason}; {count_text} failed until then", INFO)
+    findings_text = count_text(len(failed_findings), "finding") if failed_findings else "no findings"
+    first_text = StatusText(f"verdict ({basis}): {end_reason}; {findings_text} failed until then", INFO)
     return (first_text, *_finding_texts(failed_findings))
 
 
@@ -377,7 +380,7 @@ def _finding_texts(findings: list[Finding]) -> list[StatusText]:
         for finding in findings[:_MAX_TEXTS_PER_VERDICT]
     ]
     if len(findings) > _MAX_TEXTS_PER_VERDICT:
-        texts.append(StatusText(f"and {len(findings) - _MAX_TEXTS_PER_VERDICT} more findings", WARNING))
+        texts.append(StatusText(f"and {count_text(len(findings) - _MAX_TEXTS_PER_VERDICT, 'more finding')}", WARNING))
     return texts
 
 

@@ -9,6 +9,7 @@ from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.rules.survey_rule import overlap_text, unusable_parts_text
 from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
+from world.wording import count_text
 
 
 def is_line_usable(measure: LineMeasure | None) -> bool:
@@ -47,14 +48,16 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
         return f"line {number:<3} not flown"
     text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.usable:5.1f} % can be used"
     loss_text = unusable_parts_text(measure)
-    photos_text = f"; {measure.missed_photos} of {measure.photos} photos missed" if measure.missed_photos else ""
+    photos_text = (
+        f"; {measure.missed_photos} of {count_text(measure.photos, 'photo')} missed" if measure.missed_photos else ""
+    )
     return f"{text}{': ' if loss_text else ''}{loss_text}{photos_text}"
 
 
 def survey_text(survey: Survey) -> str:
     """Describe the lines, spacing and course of a survey."""
     course = round(math.degrees(survey.course)) % 360
-    return f"{len(survey.lines)} lines, {survey.spacing:.0f} m apart, the first on course {course}°"
+    return f"{count_text(len(survey.lines), 'line')}, {survey.spacing:.0f} m apart, the first on course {course}°"
 
 
 def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
@@ -96,7 +99,7 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (
-            f"no part of the {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, "
+            f"no part of the {count_text(len(lines), 'line')}, {survey.spacing:.0f} m apart, can be used, "
             "because there is no room to turn"
         )
     start, end = (

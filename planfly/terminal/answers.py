@@ -135,7 +135,7 @@ def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
 
 
 # ----------------------------------------------------------------------
-# Answers of ``planfly campaign`` and ``planfly winds``, which are also the content of summary.json and winds.json.
+# Answers of ``planfly campaign`` and ``planfly winds``: the exit code, and the content of summary.json or winds.json.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -171,10 +171,24 @@ class SensitivityEntry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ClosestRule:
+    """Rule by how close the flights came to failing it."""
+
+    rule: str
+    failed: int
+    """Number of flights that failed the rule."""
+    smallest_margin: float | None
+    """Negative beyond the limit; a rule that no flight failed then passed within its tolerance."""
+    margin_of_one_in_twenty: float | None
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class CampaignDocument:
     """planfly campaign: the probability that a mission is flyable."""
 
     schema: Literal["planfly.campaign-summary/1"]
+    exit_code: int
     name: str
     seed: int
     target: float | None
@@ -196,6 +210,8 @@ class CampaignDocument:
     deciding_rule: str
     margin_of_one_in_twenty: float | None
     margin_unit: str
+    closest_rules: list[ClosestRule]
+    """Rules that flights failed, the most flights first, then the others, the closest to their limits first."""
     sensitivities: list[SensitivityEntry]
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
@@ -223,6 +239,10 @@ class WindDirection:
     interval_mps: list[float]
     beyond: bool
     """True if the mission is flyable in every wind that was flown."""
+    judged: bool
+    """False if the boundary depends mostly on assumptions, because there are too few flights."""
+    reason: str
+    """Reason why the boundary is not judged; "" if it is judged."""
     flown: list[WindFlights]
     failed_by_rule: list[FailedRule]
     """Failures of the flights in winds up to the upper bound of the interval; the rule with most flights decides."""
@@ -242,10 +262,15 @@ class CalmFlights:
 class WindsDocument:
     """planfly winds: the largest wind from each direction."""
 
-    schema: Literal["planfly.winds/1"]
+    schema: Literal["planfly.winds/2"]
+    exit_code: int
     name: str
     seed: int
     target: float
+    answer: str
+    """judged, not judged in full, not judged, or "not flyable" if not flyable even in calm air with the target."""
+    reason: str
+    """Reason why the search or some of its directions are not judged; "" if all are judged."""
     confidence: float
     most: float
     """Strongest wind that was flown, m/s."""
@@ -388,6 +413,58 @@ class CompareAnswer:
     quantities: list[QuantityPair]
     notes: list[str]
     files: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ComparedCampaignEntry:
+    """One of two campaigns."""
+
+    name: str
+    flights: int
+    flyable: int
+    probability: float
+    interval: list[float]
+    """Two-sided interval of the probability, at 95 % confidence."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ChangedRule:
+    """Number of flights of each campaign that failed a rule."""
+
+    rule: str
+    first: int
+    second: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class CompareCampaignsAnswer:
+    """planfly compare: the probabilities of two campaigns."""
+
+    schema: Literal["planfly.compare-campaigns/1"] = "planfly.compare-campaigns/1"
+    exit_code: int
+    answer: str
+    """Flights of the second campaign are "more likely" or "less likely" to be flyable, or "no difference shown"."""
+    campaigns: list[ComparedCampaignEntry]
+    difference: float
+    """Probability of the second campaign minus that of the first."""
+    interval: list[float]
+    """Two-sided interval of the difference, at 95 % confidence."""
+    p_value: float
+    """Of McNemar's exact test if the flights are pairs, otherwise of Fisher's exact test."""
+    pairs: int
+    """Number of flights with the same draws in both campaigns; 0 if the draws differ."""
+    only_first: int
+    """Number of pairs that are flyable only in the first campaign."""
+    only_second: int
+    rules: list[ChangedRule]
+    """The largest change first."""
+    inputs: list[str]
+    """Options that differ."""
+    notes: list[str]
+
+
+# Answer of ``planfly compare``, of two logs or of two campaigns.
+CompareDocument = CompareAnswer | CompareCampaignsAnswer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

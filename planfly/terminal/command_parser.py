@@ -82,6 +82,14 @@ class OptionGroup(Protocol):
         """Add an option, as `argparse.ArgumentParser.add_argument` does."""
 
 
+class UsageExit(SystemExit):
+    """Raised to end the process after bad usage.  line: the printed line."""
+
+    def __init__(self, line: str) -> None:
+        super().__init__(BAD_INPUT)
+        self.line = line
+
+
 class CommandParser(argparse.ArgumentParser):
     """Parser for one command, or for the whole command line."""
 
@@ -94,7 +102,8 @@ class CommandParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print the message in one line, like for all other bad input, and exit."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
-        self.exit(BAD_INPUT, colour_text(line, "bad", sys.stderr) + "\n")
+        print(colour_text(line, "bad", sys.stderr), file=sys.stderr)
+        raise UsageExit(line)
 
     def format_help(self) -> str:
         """Return the help text with the paragraph of `extra_help`."""

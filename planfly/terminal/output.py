@@ -10,20 +10,22 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, send_progress_to
-from planfly.terminal.command_parser import wants_colour
+from planfly.terminal.command_parser import CommandParser, wants_colour
 from planfly.terminal.control_characters import escape_controls, escape_json_controls
+from planfly.terminal.exit_codes import BAD_INPUT
 from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_atomically
 
 if TYPE_CHECKING:
+    from logs.verdict.junit import JunitSuite
     from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
@@ -506,13 +508,14 @@ def redirect_output(args: argparse.Namespace) -> Iterator[None]:
 
     With ``--json -`` the lines are printed on standard error.
 
-    Progress is not shown with --quiet.  Raises PlanflyError if the file for the JSON answer or the JUnit report is an
-    input of the command, or if it exists and is not to be overwritten.
+    Progress is not shown with --quiet.  Raises PlanflyError if another argument, too, names the file of the JSON answer
+    or of the JUnit report, or if it exists and is not to be overwritten.
     """
     answer_target, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
-    for target in (answer_target, getattr(args, "junit", None)):
+    for name in ("json", "junit"):
+        target = getattr(args, name, None)
         if target not in (None, STANDARD_OUTPUT):
-            _check_not_input(Path(target), args)
+            _check_named_once(name, Path(target), args)
             check_output_file(Path(target), getattr(args, "overwrite", False))
     token = _output.set(sys.stdout)
     try:
@@ -555,24 +558,98 @@ def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "V
         write_atomically(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
 
 
-def write_junit_error_if_requested(args: argparse.Namespace, message: str) -> None:
-    """Write an error as JUnit XML if requested.  message: line that the command prints at its end."""
-    target = getattr(args, "junit", None)
-    if target is not None:
+def write_suite_if_requested(args: argparse.Namespace, make_suite: Callable[[], "JunitSuite"]) -> None:
+    """Write a suite as JUnit XML if requested.  make_suite: returns the suite; called only if requested."""
+    if args.junit is not None:
+        from logs.verdict.junit import suites_text
+
+        write_atomically(Path(args.junit), suites_text([make_suite()]))
+
+
+# Schema of the answer of a command that ended with an error.
+ERROR_SCHEMA = "planfly.error/1"
+
+
+def write_error_if_requested(args: argparse.Namespace, code: int, message: str) -> None:
+    """Write an error to the files of --json and --junit, in place of those of an earlier run.
+
+    message: line that the command prints at its end.
+    """
+    # An option of another command may have the name of an argument, such as --scenario.
+    names = ("what", "mission", "log", "scenario", "target")
+    source = next((value for name in names if (value := getattr(args, name, None)) is not None), args.command)
+    _write_error(getattr(args, "json", None), getattr(args, "junit", None), str(source), code, message)
+
+
+def write_usage_error_if_requested(
+    arguments: Sequence[str], message: str, commands: Mapping[str, CommandParser]
+) -> None:
+    """Write an error in the command line to the files of its --json and --junit, as `write_error_if_requested` does.
+
+    arguments: the command line, which could not be parsed.
+    commands: parsers of the commands by name.
+
+    A file is not written if it exists without --overwrite, or if another argument may be this file.
+    """
+    command = next((argument for argument in arguments if argument in commands), None)
+    if command is None:
+        return
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    parser.add_argument("--overwrite", action="store_true")
+    for option in {"--json", "--junit"} & set(commands[command].long_options()):
+        parser.add_argument(option)
+    try:
+        args, others = parser.parse_known_args(arguments)
+    except (argparse.ArgumentError, SystemExit):
+        return
+    args.command = command
+    args.what = next((argument for argument in others if argument != command and not argument.startswith("-")), None)
+    for number, argument in enumerate(others):
+        setattr(args, f"argument_{number}", argument.partition("=")[2] if argument.startswith("--") else argument)
+    with contextlib.suppress(PlanflyError), redirect_output(args):
+        write_error_if_requested(args, BAD_INPUT, message)
+
+
+def _write_error(json_target: str | None, junit_target: str | None, source: str, code: int, message: str) -> None:
+    """Write an error as JSON and as JUnit XML.  source: name of the mission or log."""
+    if json_target is not None:
+        text = json.dumps({"schema": ERROR_SCHEMA, "exit_code": code, "error": message}, indent=1) + "\n"
+        if json_target == STANDARD_OUTPUT:
+            print(escape_json_controls(text), end="", file=_output.get() or sys.stdout)
+        else:
+            _replace_or_remove(Path(json_target), text)
+    if junit_target is not None:
         from logs.verdict.junit import junit_error_text
 
-        # An option of another command may have the name of an argument, such as --scenario.
-        names = ("what", "mission", "log", "scenario")
-        source = next(value for name in names if (value := getattr(args, name, None)) is not None)
-        write_atomically(Path(target), junit_error_text(source, message))
+        _replace_or_remove(Path(junit_target), junit_error_text(source, message))
 
 
-def _check_not_input(target: Path, args: argparse.Namespace) -> None:
-    """Raise PlanflyError if another argument of the command line names the target file."""
-    file_names = [
-        value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "junit", "command")
-    ]
-    for name in file_names:
+def _replace_or_remove(file: Path, text: str) -> None:
+    """Write a file, or remove the old one if it cannot be written."""
+    try:
+        write_atomically(file, text)
+    except (OSError, PlanflyError):
         with contextlib.suppress(OSError):
-            if target.exists() and target.samefile(name):
-                raise PlanflyError(f"{target}: is the input file; name another output file", file=target)
+            if file.is_file():
+                file.unlink()
+
+
+def _check_named_once(name: str, target: Path, args: argparse.Namespace) -> None:
+    """Raise PlanflyError if another argument of the command line names the target file.
+
+    name: name of the target's own argument.
+    """
+    for key, value in vars(args).items():
+        if key in (name, "command"):
+            continue
+        for other in value if isinstance(value, list) else [value]:
+            if isinstance(other, str) and other != STANDARD_OUTPUT and _is_same_path(target, Path(other)):
+                reason = f"is named by another argument, too; name another file for --{name}"
+                raise PlanflyError(f"{target}: {reason}", file=target, field=f"--{name}")
+
+
+def _is_same_path(first: Path, second: Path) -> bool:
+    """Return True if two paths name the same file, which need not exist."""
+    with contextlib.suppress(OSError, ValueError, RuntimeError):
+        return first.resolve() == second.resolve() or (first.exists() and first.samefile(second))
+    return False

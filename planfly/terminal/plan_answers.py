@@ -8,6 +8,7 @@ from pydantic.dataclasses import dataclass
 
 from logs.verdict.conditions import Conditions
 from planfly.terminal.verdict_answers import STRICT
+from world.wording import count_text
 
 if TYPE_CHECKING:
     from planner.search.plan_front import Front
@@ -115,7 +116,13 @@ def fewer_plans_line(front: "Front") -> str:
 
     min_fraction, min_exposure = f"{NOTICEABLE_GAIN_FRACTION:.1%}", f"{NOTICEABLE_EXPOSURE_FRACTION:.0%}"
     min_height = f"{NOTICEABLE_CLEARANCE_M:g} m"
-    refused_text = f"{front.refused} plans that were found are not safe when completed, and " if front.refused else ""
+    refused_verbs = ("was", "is") if front.refused == 1 else ("were", "are")
+    refused_text = (
+        f"{count_text(front.refused, 'plan')} that {refused_verbs[0]} found {refused_verbs[1]} not safe when completed,"
+        " and "
+        if front.refused
+        else ""
+    )
     return (
         f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other plan that was "
         f"found gains more than {min_fraction} in length or {front.fourth}, {min_exposure} in "

@@ -1,5 +1,6 @@
-"""Answer of `planfly check` with ``--json``, one `VerdictDocument`, or one for each of several autopilots."""
+"""Answer of `planfly check` with ``--json``: one verdict, or one for each of several autopilots."""
 
+import dataclasses
 from typing import Literal
 
 from pydantic import ConfigDict
@@ -9,6 +10,13 @@ from logs.verdict.document import VerdictDocument
 
 # Configuration of answers for pydantic.
 STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
+
+
+@dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
+class CheckAnswer(VerdictDocument):
+    """planfly check: the verdict, as in verdict.json, and the exit code."""
+
+    exit_code: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -23,4 +31,4 @@ class VerdictsDocument:
 
 
 # Answer of ``planfly check``, without or with --for.
-CheckDocument = VerdictDocument | VerdictsDocument
+CheckDocument = CheckAnswer | VerdictsDocument

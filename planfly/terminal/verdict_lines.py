@@ -82,4 +82,5 @@ def _rule_summary(rule: RuleFindings) -> str:
     relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
     place_text = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
     source_text = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
-    return f"{rule.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text})"
+    note = f"; {closest.tolerance_note}" if closest.tolerance_note else ""
+    return f"{rule.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text}{note})"

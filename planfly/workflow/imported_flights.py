@@ -45,6 +45,7 @@ from world.errors import LogError, MissionError, StartError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
+from world.wording import count_text
 
 # Size of the blocks in which a file is hashed, bytes.
 _BLOCK_BYTES = 2**20
@@ -177,7 +178,11 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
         problems.append("`plan` names the mission that was planned")
         raise LogError(f"{path}: {'; '.join(problems)}", file=path)
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
-    return logged.mission, f"{logged.origin} of the log{time_text}, {len(logged.mission.items)} items", None
+    return (
+        logged.mission,
+        f"{logged.origin} of the log{time_text}, {count_text(len(logged.mission.items), 'item')}",
+        None,
+    )
 
 
 def _choose_scenario_and_place_mission(
@@ -320,10 +325,11 @@ def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: Lo
     if len(logged_items) == len(mission.items) and not changed:
         return ()
     if len(logged_items) != len(mission.items):
-        return (f"the mission of the log has {len(logged_items)} items, the plan {len(mission.items)}",)
+        return (f"the mission of the log has {count_text(len(logged_items), 'item')}, the plan {len(mission.items)}",)
+    verb, noun = ("has", "another position") if len(changed) == 1 else ("have", "other positions")
     return (
-        f"{len(changed)} items of the mission in the log have other positions than in the plan; the first is item"
-        f" {changed[0]}",
+        f"{count_text(len(changed), 'item')} of the mission in the log {verb} {noun} than in the plan; the first is"
+        f" item {changed[0]}",
     )
 
 

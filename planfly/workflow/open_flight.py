@@ -21,7 +21,7 @@ from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.file_autopilots import with_file_autopilot
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.errors import MissionError
-from world.files import did_you_mean
+from world.files import did_you_mean, missing_text
 from world.scenario import Scenario
 
 # Name of a plan without a file, in messages about its mission.
@@ -104,8 +104,9 @@ def check_mission_exists(path: Path) -> Path:
     Raises MissionError if it does not exist, with the most similar name as a suggestion.
     """
     if not path.is_file():
-        hint = did_you_mean(path.name, _mission_file_names(path.parent))
-        raise MissionError(f"{path}: no such file; expected a plan.json, .waypoints or .plan file{hint}", file=path)
+        hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent))
+        expected = "expected a plan.json, .waypoints or .plan file"
+        raise MissionError(f"{path}: {missing_text(path)}; {expected}{hint}", file=path)
     return path
 
 

@@ -108,10 +108,10 @@ def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error", [MissionError, ScenarioError])
 def test_what_cannot_be_read_is_one_line_of_the_callers_error(tmp_path: Path, error: type[PlanflyError]) -> None:
-    for path in (tmp_path, tmp_path / "none"):
+    for path, reason in ((tmp_path, "is a folder; expected a scenario file"), (tmp_path / "none", "cannot be read: ")):
         with pytest.raises(error) as caught:
             read_small_file(path, 10**6, "scenario", error)
-        assert str(caught.value).startswith(f"{path}: cannot be read: ")
+        assert str(caught.value).startswith(f"{path}: {reason}")
         assert "\n" not in str(caught.value)
 
 

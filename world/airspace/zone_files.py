@@ -17,6 +17,7 @@ from world.airspace.zone_entries import NO_BAND, PUBLISHED, UPSIDE_DOWN, zone_en
 from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
 from world.airspace.zones import are_holes_inside, repair_rings
 from world.errors import ScenarioError
+from world.files import missing_text
 from world.scenario_file import checked_table
 from world.scenario_tables import MAX_ZONES, ZoneTable
 
@@ -454,7 +455,7 @@ def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
 
 def _check_size(path: Path, source: str) -> None:
     if not path.is_file():
-        raise ScenarioError(f"{source}: no such file", file=source)
+        raise ScenarioError(f"{source}: {missing_text(path)}", file=source)
     if path.stat().st_size > MAX_BYTES:
         raise ScenarioError(
             f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,}", file=source

@@ -16,7 +16,7 @@ from typing import Self
 
 from flight.autopilots.guard import Guard
 from world.errors import FlightError
-from world.files import temporary_folder
+from world.files import missing_text, temporary_folder
 from world.interruption import delay_signals
 
 _OUTPUT_FILE = "output.txt"
@@ -39,10 +39,8 @@ def check_binary(binary: Path, kind: str) -> str:
     ...     print(error)
     missing/arduplane: no such file; expected the SITL program of ArduPlane
     """
-    if not binary.exists():
-        raise FlightError(f"{binary}: no such file; expected the SITL program of {kind}", file=binary)
     if not binary.is_file():
-        raise FlightError(f"{binary}: not a file; expected the SITL program of {kind}", file=binary)
+        raise FlightError(f"{binary}: {missing_text(binary)}; expected the SITL program of {kind}", file=binary)
     if not os.access(binary, os.X_OK):
         raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
     try:

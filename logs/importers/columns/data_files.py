@@ -10,6 +10,8 @@ import numpy as np
 
 from logs.importers.columns.file_names import DATA_SUFFIXES
 from world.errors import LogError
+from world.files import missing_text
+from world.wording import count_text
 
 Column = np.ndarray[Any, Any]
 # First bytes of a MAT file of version 7.3, which is an HDF5 file.
@@ -50,7 +52,7 @@ def read_data_file(path: Path) -> DataFile:
         raise LogError.at(path, "suffix", suffix or "none", f"expected {', '.join(DATA_SUFFIXES)}")
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file; expected {', '.join(DATA_SUFFIXES)}", file=path)
+            raise LogError(f"{path}: {missing_text(path)}; expected {', '.join(DATA_SUFFIXES)}", file=path)
         if not path.stat().st_size:
             raise LogError(f"{path}: empty; expected columns of numbers", file=path)
         data = readers[suffix](path)
@@ -125,7 +127,12 @@ def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width
         # A separator at the end of each row adds an empty cell; quoted cells may contain separators.
         if cells != width and '"' not in line and not (cells == width + 1 and line.rstrip().endswith(separator)):
             allowed = f"expected {width}, as in the header"
-            raise LogError(f"{path}: line {number}: {cells} cells: {allowed}", file=path, value=cells, allowed=allowed)
+            raise LogError(
+                f"{path}: line {number}: {count_text(cells, 'cell')}: {allowed}",
+                file=path,
+                value=cells,
+                allowed=allowed,
+            )
 
 
 def _numbers_as_float64(values: Column) -> Column:

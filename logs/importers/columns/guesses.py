@@ -14,6 +14,7 @@ from logs.importers.columns.data_files import Column, DataFile, read_data_file
 from logs.importers.columns.quantities import ANGLES, QUANTITIES, QUATERNION, UNIT_ZEROS, UNITS
 from world.arrays import Floats
 from world.errors import LogError
+from world.wording import count_text
 
 # Names of columns by quantity, as only lower-case letters and digits; the first name that is found is used.
 NAMES: dict[str, tuple[str, ...]] = {
@@ -375,7 +376,7 @@ def _table_text(guesses: Sequence[_Guess], alternatives: Sequence[_Guess], files
     lines = [*_HEAD, f'file = "{file}"', 'program = ""']
     main = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
     for clock, name in names.items():
-        lines += ["", f"[clocks.{name}]  # guess: {clock.length} rows"]
+        lines += ["", f"[clocks.{name}]  # guess: {count_text(clock.length, 'row')}"]
         lines += [f'file = "{clock.file}"'] if clock.file != file else []
         lines += [f'column = "{clock.column}"', f'unit = "{clock.unit}"']
         partner = next((guess for guess in alternatives if guess.clock == clock), None)

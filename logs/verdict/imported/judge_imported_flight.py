@@ -32,6 +32,7 @@ from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, undecided_text
 from logs.verdict.tolerances import MAX_UNSEEN_TIME_S
 from logs.verdict.verdict import Verdict
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # The lines of a verdict on an imported flight: the answer, what was judged and what was not, and facts about the log.
@@ -206,7 +207,8 @@ def damage_text(damage: Damage) -> str:
             f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size_text} cannot be read"
         )
     if damage.unreadable:
-        texts.append(f"{damage.unreadable} messages contain nothing that can be used")
+        verb = "contains" if damage.unreadable == 1 else "contain"
+        texts.append(f"{count_text(damage.unreadable, 'message')} {verb} nothing that can be used")
     if damage.cut:
         texts.append("it ends within a message")
     return "; ".join(texts) or "nothing"
@@ -309,7 +311,7 @@ def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
     if not pauses:
         return ""
     start, end = max(pauses, key=lambda pause: pause[1] - pause[0])
-    others_text = f", and in {len(pauses) - 1} more pauses" if len(pauses) > 1 else ""
+    others_text = f", and in {count_text(len(pauses) - 1, 'more pause')}" if len(pauses) > 1 else ""
     return f"not judged from {start:.1f} s to {end:.1f} s{others_text}: the log has no rows"
 
 
@@ -389,7 +391,7 @@ def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
         return ""
     time = legs.aligned.track.time[is_missing]
     return (
-        f"the log contains no {_QUANTITY_LABELS[quantity]} at {int(is_missing.sum())} rows from "
+        f"the log contains no {_QUANTITY_LABELS[quantity]} at {count_text(int(is_missing.sum()), 'row')} from "
         f"{time[0]:.1f} s to {time[-1]:.1f} s"
     )
 

@@ -18,6 +18,7 @@ from logs.verdict.returns.judge_returns import (
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
+from world.wording import count_text
 
 # Texts for the outcome of one return, and of several returns.
 _SINGULAR_TEXTS: dict[Kind, str] = {
@@ -152,7 +153,9 @@ def _judged_text(returns: Returns) -> str:
     total, failure_counts = len(returns.each), counts_text(returns)
     if failure_counts:
         safe_count = returns.count("safe")
-        return f"of {total} returns {failure_counts}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
+        return (
+            f"of {count_text(total, 'return')} {failure_counts}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
+        )
     # Leave out returns that begin below the limit, as after a take-off: their lowest point is the start.
     high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
     lowest_return = min(high_returns, key=lambda ret: ret.clearance)
@@ -161,10 +164,8 @@ def _judged_text(returns: Returns) -> str:
     )
     energy_text = "" if math.isnan(min_energy_left) else f", and at least {min_energy_left:.0f} Wh are left"
     landing_suffix = " up to their landing" if returns.lands else ""
-    return (
-        f"all {total} returns are safe{landing_suffix}: never lower than {lowest_return.clearance:.0f} m above"
-        f" ground{energy_text}"
-    )
+    subject = f"all {total} returns are" if total > 1 else "the only return is"
+    return f"{subject} safe{landing_suffix}: never lower than {lowest_return.clearance:.0f} m above ground{energy_text}"
 
 
 def point_of_no_return_text(returns: Returns) -> str:
@@ -190,8 +191,10 @@ def point_of_no_return_text(returns: Returns) -> str:
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
             text = f"{name}: none, because every return leaves {reserve} (at least {point.remaining_energy:.0f} Wh)"
-    verb = "does" if point.skipped_count == 1 else "do"
-    return text + (f"; {point.skipped_count} returns that {verb} not arrive are ignored" if point.skipped_count else "")
+    skipped_texts = {0: "", 1: "; 1 return that does not arrive is ignored"}
+    return text + skipped_texts.get(
+        point.skipped_count, f"; {point.skipped_count} returns that do not arrive are ignored"
+    )
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:

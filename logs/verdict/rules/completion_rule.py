@@ -14,6 +14,7 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS, MAX_VELOCITY_DISAGREEMENT_MPS
 from logs.verdict.wording import place_text_within
+from world.wording import count_text
 
 
 def completion_findings(
@@ -36,10 +37,12 @@ def completion_findings(
         # A leg counts as flown only once its loiter is complete.
         flown_count = leg_count - len(set(leg_numbers[~aligned.passed[1:]].tolist()))
         if flown_count < leg_count:
-            faults.append(message(f"{flown_count} of {leg_count} legs flown"))
+            faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown"))
         faults += _record_faults(aligned)
     notes = "; ".join(requirements.setup.route.notes)
-    reason = finding_reason(faults) if faults else f"all {leg_count} legs flown"
+    reason = (
+        finding_reason(faults) if faults else f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
+    )
     return [
         make_finding(
             "completion",
@@ -116,11 +119,11 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
             faults.append(message(reason))
     elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
-            f"{finished_count} of the {leg_count} legs in the log flown, the last of them to "
+            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, the last of them to "
             f"its end: {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
-        last_leg_text = f"{finished_count} of {leg_count} legs flown, the last of them to its end"
+        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, the last of them to its end"
         unflown_legs, doubt_texts = _unflown_legs(setup, stretches, flown_legs)
         if unflown_legs:
             unflown_text = f"{_legs_text(setup, unflown_legs)} not flown along the mission"
@@ -129,14 +132,14 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         notes += [] if unflown_legs or doubt_texts else [last_leg_text]
     else:
         last_stretch = stretches[-1]
-        count_text = f"{finished_count} of {leg_count} legs flown"
+        legs_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown"
         ending = f"{stretch_end_text(last_stretch.stretch)}, on the way to {_next_waypoint_text(setup, last_stretch)}"
         if _ends_in_return(setup, last_stretch):
-            notes.append(f"{count_text}, and the return at the mission's end began at {last_stretch.stretch.end:.1f} s")
+            notes.append(f"{legs_text}, and the return at the mission's end began at {last_stretch.stretch.end:.1f} s")
         elif last_stretch.stretch.ended == "log":
-            unknown_texts.append(f"{ending}: {count_text}")
+            unknown_texts.append(f"{ending}: {legs_text}")
         else:
-            faults.append(message(ending, f": {count_text}"))
+            faults.append(message(ending, f": {legs_text}"))
     unknown_texts += [
         f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined_stops
     ]

@@ -66,7 +66,7 @@ def energy_findings(
             reason = f"the battery's capacity is a guess: {remedy}; {reason}"
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
-        elif max_energy > energy:
+        if max_energy > energy and not is_guessed:
             source = setup.envelope.source
             reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
         reason += failsafes.unjudged_text

@@ -13,6 +13,7 @@ from logs.verdict.rule import Rule
 from logs.verdict.tolerances import MAX_CONTROLLED_BANK_RAD, MIN_CONTROLLED_AIRSPEED_MPS, MIN_CONTROLLED_STALL_RATIO
 from logs.verdict.wording import place_text
 from world.arrays import Floats
+from world.wording import count_text
 
 
 def departure_findings(
@@ -33,7 +34,8 @@ def departure_findings(
     if aligned.bad_rows:
         faults.append(
             message(
-                f"{aligned.bad_rows} rows of the log have no usable numbers, the first {_time_text(aligned.first_bad)}"
+                f"no usable numbers in {count_text(aligned.bad_rows, 'row')} of the log, the first"
+                f" {_time_text(aligned.first_bad)}"
             )
         )
     if (bank > MAX_CONTROLLED_BANK_RAD).any():

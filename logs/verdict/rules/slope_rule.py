@@ -79,9 +79,10 @@ def _leg_finding(
             method = f"{method_text} over {fit.length:.0f} m"
     ok: bool | None = not faults
     check = ""
-    if not faults and (uncertainty := _uncertainty_text(requirements, leg)):
+    uncertainty = _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
+    if not faults and uncertainty:
         ok, check = None, UNKNOWN_AIRCRAFT
-        facts.insert(0, uncertainty)
+    facts = [uncertainty, *facts] if uncertainty else facts
     if measure is not None and not measure.is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
@@ -143,6 +144,32 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°"
 
 
+def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
+    """Explain by the aircraft's uncertainty why a slope is undecided, or on which slope the suggestions are based.
+
+    Return "" for a certain aircraft, and for a planned slope that is too steep, whose message states the limit (rad).
+    """
+    if not has_failed:
+        return _uncertainty_text(requirements, leg)
+    is_planned_steep = abs(float(requirements.slopes[leg])) > limit
+    return "" if is_planned_steep else _certain_limit_text(requirements, leg, limit, source)
+
+
+def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
+    """State the slope that an uncertain aircraft can certainly fly, on which suggestions are based.
+
+    Return "" if the limit (rad) is certain or is not the aircraft's.
+    """
+    envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
+    certain_limit = float((requirements.certain_climb if is_climb else requirements.certain_dive)[leg])
+    if source != "aircraft" or not certain_limit < limit:
+        return ""
+    deviation = math.degrees(envelope.climb_sd if is_climb else envelope.descent_sd)
+    return (
+        f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) {math.degrees(certain_limit):.1f}° is certain"
+    )
+
+
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
     """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, otherwise []."""
     arc = steep_arc(requirements, leg)
@@ -184,7 +211,8 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
-    return message(f"leg {leg} {verb} {slope_text}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
+    limit_texts = [_limit_text(requirements, leg, limit, source), _certain_limit_text(requirements, leg, limit, source)]
+    return message(f"leg {leg} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:

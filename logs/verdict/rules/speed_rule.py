@@ -104,16 +104,14 @@ def _speed_finding(
                 margin, tolerance = allowed_error - abs(mean_speed - commanded), held_speed.tolerance
                 faults.append(message(f"{mean_speed:.1f} m/s held instead of the commanded {commanded:.1f} m/s"))
         facts.append(Fact("speed error", mean_speed - commanded, "m/s"))
-    ok: bool | None = not faults
-    check = ""
-    if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, max_speed)):
-        ok, check = None, UNKNOWN_AIRCRAFT
-        notes.insert(0, uncertainty)
+    uncertainty = _uncertainty_text(requirements, leg, commanded, max_speed)
+    check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
+    ok = None if check else not faults
     return make_finding(
         "speed",
         requirements.leg(leg),
         ok=None if ok and is_unflown else ok,
-        reason=finding_reason(faults, notes),
+        reason=finding_reason(faults, [*filter(None, [uncertainty]), *notes]),
         faults=faults,
         planned=commanded,
         flown=mean_speed,
@@ -184,7 +182,7 @@ def _find_held_speed(
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
-    """Explain why an uncertain maximum airspeed leaves a commanded speed undecided; return "" if decided."""
+    """State an uncertain maximum airspeed, if it leaves a commanded speed undecided or impossible; otherwise ""."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""

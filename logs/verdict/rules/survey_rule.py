@@ -24,6 +24,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
+from world.wording import count_text
 
 
 def survey_findings(
@@ -210,7 +211,7 @@ def _flown_finding(
     faults = [] if ok else [_coverage_fault(measure, name)]
     facts = [] if not ok else [f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used"]
     if measure.missed_photos:
-        facts.append(f"{measure.missed_photos} of {measure.photos} photos missed")
+        facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
 
 

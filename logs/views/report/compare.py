@@ -1,7 +1,7 @@
 """Measure two flights alike from their logs alone, and compare them."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,8 +98,20 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
     keys = list(dict.fromkeys([*measures[0], *measures[1]]))
     differences = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
     return Comparison(
-        (first, second), names, verdicts, tuple(differences), tuple(_difference_notes(first, second, names))
+        (first, second),
+        names,
+        verdicts,
+        tuple(differences),
+        (*_difference_notes(first, second, names), *_tolerance_notes(names, verdicts)),
     )
+
+
+def _tolerance_notes(names: tuple[str, str], verdicts: tuple[Verdict, Verdict]) -> Iterator[str]:
+    """Yield a note for each smallest margin that is negative and passes by its tolerance."""
+    for name, verdict in zip(names, verdicts, strict=True):
+        for rule, finding in verdict.closest.items():
+            if finding.tolerance_note:
+                yield f"smallest margin: {RULE_WORDS[rule].word} of {name}: passes, {finding.tolerance_note}"
 
 
 def _judge_log(log: FlightLog) -> Verdict:

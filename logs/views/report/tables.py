@@ -19,6 +19,7 @@ from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import lat_lon_of_points
+from world.wording import count_text
 
 if TYPE_CHECKING:
     from logs.recording.reader import LogEvent
@@ -224,7 +225,10 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
     facts: Facts = [
         ("Aircraft", f"{setup.aircraft}, at {quantity(setup.airspeed, 'm/s')}, bank up to {quantity(bank, 'rad')}"),
         ("Descent", f"the propeller {braking_text}"),
-        ("Mission", f"{setup.mission.source}: {len(setup.mission.items)} items, {route.legs} legs"),
+        (
+            "Mission",
+            f"{setup.mission.source}: {count_text(len(setup.mission.items), 'item')}, {count_text(route.legs, 'leg')}",
+        ),
         ("Route", f"{quantity(float(path_length(route.positions)) / 1000.0, 'km')} long"),
     ]
     if setup.plan is not None:

@@ -24,7 +24,7 @@ def test_what_is_no_text_is_refused(case: str, suffix: str, tmp_path: Path) -> N
 def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
     refused(tmp_path / "missing.waypoints", "cannot be read")
     (tmp_path / "folder.plan").mkdir()
-    refused(tmp_path / "folder.plan", "cannot be read")
+    refused(tmp_path / "folder.plan", "is a folder; expected a mission file")
     (tmp_path / "a.kml").write_text("<kml/>")
     refused(tmp_path / "a.kml", "suffix '.kml': expected one of .waypoints, .plan, .txt")
 

@@ -88,7 +88,7 @@ def test_what_neither_its_bytes_nor_its_name_tell_is_refused(tmp_path: Path) -> 
 
 
 def test_a_folder_is_no_log(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="no such file"):
+    with pytest.raises(LogError, match="is a folder; expected a log"):
         open_log(tmp_path)
 
 

@@ -277,7 +277,7 @@ def test_a_line_without_times_is_refused_by_name(tmp_path: Path) -> None:
     path.write_text(
         "<kml><Placemark><LineString><coordinates>8,46,5 8,47,5</coordinates></LineString></Placemark></kml>"
     )
-    with pytest.raises(LogError, match="its 1 lines have no times"):
+    with pytest.raises(LogError, match="1 line without times"):
         read_kml(path)
 
 

@@ -56,7 +56,7 @@ THREAT = {
 def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track) -> None:
     program = AutopilotProgram("ArduPlane V4.6.0", "ab" * 32, {"WP_RADIUS": 60.0}, {"WP_RADIUS": 60.0}, ("FOO",))
     verdict = judge(replace(setup, autopilot=ArduPlaneSitl(ArduPilotParameters.defaults(), program)), track)
-    assert "\nFlown by: ArduPlane V4.6.0 (sha256 abababab...), 1 parameters set for" in verdict.summary
+    assert "\nFlown by: ArduPlane V4.6.0 (sha256 abababab...), 1 parameter set for" in verdict.summary
     assert json.loads(verdict_json(verdict))["flown_by"] == {
         "version": "ArduPlane V4.6.0",
         "sha256": "ab" * 32,

@@ -134,7 +134,7 @@ def test_a_verdict_prints_in_a_line_whatever_it_holds() -> None:
     many = Verdict((PASSES,) * 500, flyable=True, complete=True, lines=("flyable",), level="geometric")
     assert repr(many) == "<Verdict geometric: flyable; 500 findings, 0 failed>"
     cut = Verdict((PASSES,), flyable=False, complete=False, lines=(), level="flown")
-    assert repr(cut) == "<Verdict flown: incomplete; 1 findings, 0 failed>"
+    assert repr(cut) == "<Verdict flown: not flyable; 1 finding, 0 failed>"
 
 
 def test_a_notebook_shows_each_rule_and_what_fails_of_it() -> None:

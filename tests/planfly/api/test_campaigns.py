@@ -20,7 +20,7 @@ from planfly.campaigns.statistics.wind_boundary import Direction
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, RequestedFlight, Store, WindsStore
 from planfly.campaigns.worker_pool import Workers
 from planfly.runtime.stages import Advance
-from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
+from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
@@ -118,6 +118,24 @@ def test_a_campaign_that_goes_on_keeps_its_confidence_unless_one_is_named(
     goals = [campaigns.continued_goal(tmp_path, flights, prove, at_least, one) for one in named]
     assert [one.confidence for one in goals] == list(named)
     assert campaigns.continued_goal(tmp_path, flights, prove, at_least, None) == Goal(0.9, False, 9, 0.8)
+
+
+def test_a_campaign_that_goes_on_without_a_number_says_its_number(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base = short_base(tmp_path)
+    out = tmp_path / "out"
+    out.mkdir()
+    with open_store(base, Goal(None, False, 2), out, resume=False) as store:
+        for index in range(2):
+            store.add(made_flight(base, index))
+    monkeypatch.setattr(campaigns, "finish_campaign", lambda base, goal, estimate, *_: estimate)
+    options = {"scenario": tmp_path / "short.toml", "seed": 1, "out": out, "resume": True}
+    planfly.campaign(tmp_path / "short.waypoints", at_least=0.9, **options)
+    assert caplog.messages == ["flies 2 flights, the number of the resumed campaign"]
+    caplog.clear()
+    planfly.campaign(tmp_path / "short.waypoints", flights=2, at_least=0.9, **options)
+    assert caplog.messages == []
 
 
 def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:

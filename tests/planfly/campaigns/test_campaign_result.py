@@ -82,7 +82,7 @@ def test_every_option_that_decides_what_is_flown_is_repeated() -> None:
     """What a command takes beside them decides how, where to or how many, or is the goal's."""
     asked = build_parser().parse_args(["campaign", "jacksboro-air"])
     others = {"command", "target", "prove", "at_least", "flights", "confidence", "workers", "scheduler", "resume"}
-    others |= {"refly", "out", "overwrite", "json", "quiet"}
+    others |= {"refly", "out", "overwrite", "json", "junit", "quiet"}
     assert set(vars(asked)) - others == set(repeated_options(asked))
 
 

@@ -133,6 +133,10 @@ def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_
     assert resumed_goal(Goal(0.9, False, 40), tmp_path) == asked
     assert resumed_goal(Goal(0.9, False, 40), tmp_path, 0.95) == Goal(0.9, False, 40, 0.95)
     assert resumed_goal(replace(asked, target=0.95), tmp_path) == replace(asked, target=0.95)
+    asked_anew = Goal(0.95, False, 300, 0.8)
+    assert resumed_goal(asked_anew, tmp_path, keeps_flights=True) == replace(asked, target=0.95, confidence=0.8)
+    # The maximum of a proof is no number of flights fixed beforehand.
+    assert resumed_goal(replace(asked_anew, stops=True), tmp_path, keeps_flights=True).flights == 300
 
 
 def test_a_number_of_flights_that_was_changed_is_said_to_be(base: CampaignBase, tmp_path: Path) -> None:

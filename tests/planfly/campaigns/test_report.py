@@ -17,12 +17,14 @@ from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import (
     OutputDirectory,
-    answer_state,
     chart_directions,
     clear_campaign,
     finish_campaign,
     fly_row_again,
+    unsettled_reasons,
     wind_lines,
+    winds_answer,
+    winds_suite,
     write_files,
     write_winds,
 )
@@ -125,7 +127,7 @@ FOUND = WindsResult(
 def test_flights_are_counted_by_wind() -> None:
     first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
-    assert wind_lines(FOUND)[0] == (
+    assert wind_lines(FOUND)[1] == (
         "flies with P >= 0.9, by the best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
         " over 20 m/s from 270°"
     )
@@ -139,7 +141,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     )
     boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
     found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
-    assert wind_lines(found)[:4] == [
+    assert wind_lines(found)[1:5] == [
         "does not fly with P >= 0.9, by the best estimate, in any wind from 0°, even a light one;"
         " it flies in wind up to 2.0 m/s from 270°",
         "in calm air, 3 of 4 flights fail",
@@ -147,7 +149,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
         "  failed  clearance in 3: leg 4 in 3",
     ]
     nowhere = replace(found, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:]))
-    assert wind_lines(nowhere)[:2] == [
+    assert wind_lines(nowhere)[1:3] == [
         "does not fly with P >= 0.9, by the best estimate, even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]
@@ -157,10 +159,14 @@ def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> No
     """Of 4 flights none that flies shows P < 0.9 (at most 0.49 at 95 %), one of which fails does not."""
     settled = tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION))
     narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
-    assert answer_state(FOUND) == "undecided"
-    assert answer_state(replace(FOUND, flights=settled, boundaries=narrow)) == ""
-    for failed, state in ((4, "missed"), (1, "undecided"), (0, "undecided")):
-        assert answer_state(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == state
+    assert winds_answer(FOUND) == "not judged"
+    judged = replace(FOUND, flights=settled, boundaries=narrow)
+    assert winds_answer(judged) == "judged"
+    assert winds_answer(replace(judged, flights=settled[1:])) == "not judged in full"
+    for failed, answer in ((4, "not flyable"), (1, "not judged"), (0, "not judged")):
+        assert winds_answer(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == answer
+    # A boundary of 0 m/s whose interval is narrow, from 150 flights, is an answer, too.
+    assert winds_answer(replace(judged, calm=CalmFailures(0.0, 4, 1, ()))) == "not flyable"
     page = page_template("winds.html", "planfly.campaigns").render(
         name="x", colours="", picture="", answer="undecided", lines=["not settled"], rows=[], command="x"
     )
@@ -180,7 +186,8 @@ def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, t
     rules = [[(rule["rule"], rule["flights"]) for rule in one["failed_by_rule"]] for one in directions]
     assert rules == [[("clearance", 3), ("slope", 4)], [("slope", 3)], [("clearance", 3), ("slope", 3)], []]
     assert directions[1]["failed_by_rule"][0]["places"][0]["where"] == "leg 4"
-    cells = re.findall(r'<td class="n">([a-z]*)</td></tr>', (tmp_path / "winds.html").read_text())
+    page = (tmp_path / "winds.html").read_text()
+    cells = re.findall(r'<td class="n">([a-z]*)</td><td class="n">no: [^<]* of at least 150</td></tr>', page)
     assert cells == ["slopes", "slopes", "clearance", ""]
 
 
@@ -200,12 +207,31 @@ def test_what_flights_show_by_themselves_where_none_failed() -> None:
 
 
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
-    assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
+    assert wind_lines(FOUND)[0].startswith("not judged: 4 of 4 directions have too few flights: each requires at least")
     boundary = WindBoundary(7.0, 6.8, 7.3, False)
     settled = WindsResult(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(MIN_FLIGHTS_PER_DIRECTION)))
-    assert not any("not settled" in line for line in wind_lines(settled))
+    assert not any("not judged" in line for line in wind_lines(settled))
     fewer = WindsResult(FOUND.goal, (boundary,), settled.flights[1:])
-    assert any("not settled: 1 of 1" in line for line in wind_lines(fewer))
+    assert wind_lines(fewer)[0].startswith("not judged: 1 of 1 direction has too few flights")
+    flights = (*settled.flights, *((1, *flight[1:]) for flight in settled.flights))
+    wide = replace(settled, boundaries=(boundary, WindBoundary(7.0, 6.5, 7.5, False)), flights=flights)
+    assert unsettled_reasons(wide) == ["", "an interval of 1.00 m/s; at most 0.5 m/s is required"]
+    assert wind_lines(wide)[0].startswith("not judged in full: 1 of 2 directions has too few flights")
+
+
+def test_the_cases_of_continuous_integration_are_the_answer_and_each_direction() -> None:
+    """Of a search that judges nothing, the answer fails and the directions are skipped."""
+    suite = winds_suite("m.waypoints", FOUND)
+    answer, *directions = suite.cases
+    assert (suite.name, answer.result, answer.message) == ("m.waypoints", "failure", wind_lines(FOUND)[0])
+    assert [(case.name, case.result) for case in directions] == [
+        (f"from {angle}°", "skipped") for angle in (0, 90, 180, 270)
+    ]
+    assert directions[0].message == "not judged: 2 flights of at least 150"
+    settled = tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION))
+    narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
+    judged = winds_suite("m", replace(FOUND, flights=settled, boundaries=narrow))
+    assert [case.result for case in judged.cases] == ["passed"] * 5
 
 
 def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
@@ -213,6 +239,11 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     data = json.loads((tmp_path / "winds.json").read_text())
     assert [one["boundary_mps"] for one in data["directions"]] == [7.0, 8.0, 9.0, 20.0]
     assert data["directions"][3]["beyond"] is True
+    assert (data["answer"], data["reason"]) == ("not judged", wind_lines(FOUND)[0])
+    assert [(one["judged"], one["reason"]) for one in data["directions"]] == [
+        (False, "2 flights of at least 150"),
+        *[(False, "1 flight of at least 150")] * 3,
+    ]
     assert data["lost"] == [1]
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
     page = (tmp_path / "winds.html").read_text()

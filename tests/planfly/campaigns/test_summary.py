@@ -3,12 +3,23 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
+from logs.verdict.junit import suites_text
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import count_failures
+from planfly.campaigns.flight_row import FlightRow, MinimumMargin, Outcome
+from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import campaign_page
-from planfly.campaigns.summary import campaign_lines, summary_json
+from planfly.campaigns.statistics.decision import Answer, Estimator, Goal
+from planfly.campaigns.summary import (
+    campaign_lines,
+    campaign_suite,
+    closest_text,
+    summarise_campaign,
+    summary_json,
+)
 from tests.planfly.campaigns.made_campaigns import made_flight
 from tests.planfly.campaigns.made_report import made_report
 
@@ -37,6 +48,24 @@ def test_it_counts_what_failed_and_names_what_was_lost(base: CampaignBase, tmp_p
         assert "lost    1" in text
 
 
+def test_the_target_and_each_failed_rule_are_cases_of_continuous_integration(
+    base: CampaignBase, tmp_path: Path
+) -> None:
+    with made_report(base, tmp_path) as (_, summary):
+        failed = summary.by_rule[0].flights
+        results = {"reached": "passed", "missed": "failure", "undecided": "failure", "no target": "skipped"}
+        for answer, result in results.items():
+            estimate = replace(summary.estimate, answer=cast(Answer, answer))
+            suite = campaign_suite("m.waypoints", replace(summary, estimate=estimate))
+            assert [(case.classname, case.name, case.result) for case in suite.cases] == [
+                ("planfly", "verdict", result),
+                ("planfly.clearance", "flights", result),
+            ]
+            assert suite.cases[1].message == f"{failed} of 60 flights failed"
+            assert suite.cases[1].text == f"failed  clearance in {failed}: leg 1 in {failed}"
+            assert suites_text([suite]).count("<failure") == (2 if result == "failure" else 0)
+
+
 def test_a_campaign_without_a_target_says_so_in_its_answer(base: CampaignBase, tmp_path: Path) -> None:
     with made_report(base, tmp_path) as (_, summary):
         untargeted = replace(
@@ -60,6 +89,50 @@ def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp
         assert (data["wind_mps"], data["wind_from_deg"], data["turbulence"]) == (5.0, 250.0, "light")
         page = campaign_page(base, summary, store, "planfly campaign").decode()
         assert page.count("Aircraft: aerosonde, 11 kg, 25 m/s") == 1
+
+
+def with_margins(base: CampaignBase, index: int, *rules: tuple[str, float], failed: tuple[str, ...] = ()) -> FlightRow:
+    """A flight with these margins, m, at leg 1, that failed these rules at leg 2."""
+    margins = tuple((rule, MinimumMargin(margin, "m", Place("leg", 1))) for rule, margin in rules)
+    outcome: Outcome = "not flyable" if failed else "flyable"
+    places = tuple((rule, Place("leg", 2)) for rule in failed)
+    return replace(made_flight(base, index), outcome=outcome, margins=margins, failed=places)
+
+
+def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: CampaignBase, tmp_path: Path) -> None:
+    """Slope fails twice for a reason without a number; waypoints pass by 4 m, and clearance by its tolerance only."""
+    goal = Goal(None, False, 4)
+    with open_store(base, goal, tmp_path, resume=False) as store:
+        store.add(with_margins(base, 0, ("clearance", 30.0), ("waypoint", 4.0), failed=("slope",)))
+        store.add(with_margins(base, 1, ("clearance", -0.3), ("waypoint", 14.0), failed=("slope",)))
+        store.add(with_margins(base, 2, ("clearance", 3.0), ("corridor", -2.0), failed=("corridor",)))
+        store.add(with_margins(base, 3, ("clearance", -0.5), ("height", 40.0)))
+        summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+        ranked = [
+            (entry["rule"], entry["failed"], entry["smallest_margin"])
+            for entry in json.loads(summary_json(summary))["closest_rules"]
+        ]
+    assert ranked == [
+        ("slope", 2, None),
+        ("corridor", 1, -2.0),
+        ("clearance", 0, -0.5),
+        ("waypoint", 0, 4.0),
+        ("height", 0, 40.0),
+    ]
+    lines = campaign_lines(summary)
+    assert [line for line in lines if line.startswith(("  failed", "  narrow"))] == [
+        "  failed  slopes in 2: leg 2 in 2",
+        "  failed  corridor in 1: leg 2 in 1",
+        "  narrow  clearance: the smallest margin is -0.5 m, within the tolerance",
+        "  narrow  waypoints: the smallest margin is +4.0 m",
+    ]
+    closest = {row.draw.index: closest_text(row) for row in summary.worst}
+    assert closest == {
+        0: "slopes failed at leg 2, not by a margin",
+        1: "slopes failed at leg 2, not by a margin",
+        2: "corridor at leg 1: -2.0 m",
+        3: "clearance at leg 1: -0.5 m, within the tolerance",
+    }
 
 
 def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Path) -> None:

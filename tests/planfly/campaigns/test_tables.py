@@ -23,6 +23,7 @@ from planfly.campaigns.tables import (
     Store,
     StoreError,
     WindsStore,
+    count_flights,
     read_path_arrays,
     read_table,
 )
@@ -54,6 +55,17 @@ def test_rows_come_back_as_they_were_in_order_of_index(base: CampaignBase, tmp_p
         assert list(store.outcomes()) == [0]
         with pytest.raises(StoreError, match="UNIQUE"):
             store.add(made)
+
+
+def test_a_copy_of_the_file_alone_lacks_a_few_flights_at_most(base: CampaignBase, tmp_path: Path) -> None:
+    """A campaign that is killed leaves the last flights in the write-ahead log next to its file."""
+    with Store(tmp_path / "c.sqlite", "a", {}, resume=False) as store:
+        for flights in (0, 3, 20, 47):
+            for index in range(store.tally().flown, flights):
+                store.add(replace(fly_one(base, 0), draw=made_flight(base, index).draw))
+            copy = tmp_path / f"copy-{flights}.sqlite"
+            copy.write_bytes((tmp_path / "c.sqlite").read_bytes())
+            assert flights - 8 <= count_flights(copy) <= flights
 
 
 # ----------------------------------------------------------------------

@@ -5,6 +5,7 @@ import shutil
 import threading
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -16,7 +17,7 @@ from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.tables import is_same_flight
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
-from tests.planfly.terminal.answers.checked_answers import validate
+from tests.planfly.terminal.answers.checked_answers import answered, validate
 from tests.soak import some
 
 pytestmark = pytest.mark.filterwarnings("default")
@@ -37,7 +38,7 @@ def test_it_leaves_its_files_and_says_undecided(flown: tuple[list[str], Path]) -
     assert {path.name for path in out.iterdir()} == {"campaign.sqlite", "summary.json", "report.html", "worst"}
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["flights"], summary["answer"]) == (4, "undecided")
-    validate("campaign", summary)
+    validate("campaign", summary | {"exit_code": 3})
     assert len(list((out / "worst").iterdir())) == 3
 
 
@@ -53,6 +54,7 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
     [
         (["--refly", "9"], "no such flight"),
         (["--refly", "2", "--json", "-"], "--json: only with a campaign"),
+        (["--refly", "2", "--junit", "r.xml"], "--junit: only with a campaign"),
         ([], "--resume continues it"),
         (["--resume", "--seed", "2"], "belongs to another campaign: seed 2 instead of 1"),
         (["--refly", "1", "--wind", "8,250"], "belongs to another campaign: wind.speed_mps 8.0 instead of 5.0"),
@@ -85,6 +87,26 @@ def test_one_line_and_nothing_lost(
     assert len(told) == 1
     assert words in told[0]
     assert (out / "summary.json").read_bytes() == before
+
+
+def test_the_answer_and_the_cases_of_continuous_integration_have_the_exit_code(
+    flown: tuple[list[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Five flyable flights show 0.05 ** (1 / 5) = 0.549 at 95 %: 0.5 is reached, 0.9 is undecided."""
+    line, first = flown
+    out = tmp_path / "out"
+    shutil.copytree(first, out)
+    for target, code, answer, result in (("0.5", 0, "reached", None), ("0.9", 3, "undecided", "failure")):
+        xml = tmp_path / f"{target}.xml"
+        goal = ["--resume", "--flights", "5", "--at-least", target, "--junit", str(xml)]
+        document = answered(capsys, code, *line[:-1], str(out), *goal)
+        assert (document["exit_code"], document["answer"]) == (code, answer)
+        assert "exit_code" not in json.loads((out / "summary.json").read_text())
+        ((case, output),) = ElementTree.parse(xml).getroot()
+        assert (case.get("classname"), case.get("name")) == ("planfly", "verdict")
+        assert [child.tag for child in case if child.tag != "system-out"] == ([result] if result else [])
+        assert output.text is not None
+        assert output.text.startswith(f"P >= {target}")
 
 
 def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

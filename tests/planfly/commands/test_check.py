@@ -261,6 +261,32 @@ def test_an_autopilot_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]
     )
 
 
+@pytest.mark.parametrize("more", [[], ["--geometry"]])
+def test_a_gap_in_seq_is_a_note_of_the_verdict(
+    more: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A person who deletes a line by hand leaves a gap: jumps then lead elsewhere, which a log of CI must say."""
+    monkeypatch.chdir(tmp_path)
+    rows = ((0, 46.0, 0), (1, 46.0, 100), (3, 46.01, 100), (3, 46.015, 100))
+    lines = [f"{seq} 0 {3 if alt else 0} 16 0 0 0 0 {lat} 8 {alt} 1" for seq, lat, alt in rows]
+    Path("gap.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n")
+    notes = [
+        "Note: gap.waypoints:4: a gap in seq before 3 (1 in all): ",
+        "Note: gap.waypoints:5: seq 3 does not rise (1 in all): ",
+    ]
+    main(["check", "gap.waypoints", *more, "--json", "a.json", "--junit", "a.xml"])
+    printed = capsys.readouterr().out
+    output = ElementTree.parse("a.xml").find(".//system-out")
+    assert output is not None
+    for text in (printed, json.loads(Path("a.json").read_text())["summary"], output.text or ""):
+        assert all(f"\n{note}" in text for note in notes)
+    if not more:
+        main(["fly", "gap.waypoints", "--log", "a.mcap"])
+        capsys.readouterr()
+        main(["check", "a.mcap"])
+        assert all(f"\n{note}" in capsys.readouterr().out for note in notes[:1])
+
+
 @pytest.mark.parametrize(
     ("argv", "name"),
     [

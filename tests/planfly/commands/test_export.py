@@ -65,6 +65,35 @@ def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.Ca
     assert main(["export", str(plan_file), str(targets[2])]) == 2
 
 
+def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
+    log_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The Aerosonde cruises at 25 m/s, the scenario's X8 at its own; a DO_CHANGE_SPEED of 19 m/s is the mission's."""
+    monkeypatch.chdir(tmp_path)
+    mission = log_file.with_name("m.waypoints").read_text()
+    Path("m.waypoints").write_text(mission)
+    lines = mission.splitlines()
+    Path("slow.waypoints").write_text(
+        "\n".join([*lines[:3], "2\t0\t3\t178\t0\t19\t-1\t0\t0\t0\t0\t1", *lines[3:]]) + "\n"
+    )
+    area = "[area]\neast_m = [-900, 9000]\nnorth_m = [-900, 9000]\nceiling_amsl_m = 900\n"
+    ends = "".join(
+        f"[{name}]\neast_m = {k}\nnorth_m = 0\namsl_m = 100\n" for name, k in (("start", 0), ("destination", 900))
+    )
+    terrain = '[terrain]\nkind = "flat"\namsl_m = 0\n[origin]\nlat_deg = 46.0\nlon_deg = 8.0\n'
+    Path("x8.toml").write_text(f'name = "x"\n{terrain}{area}{ends}[flight]\naircraft = "x8"\n')
+    x8 = planfly.aircraft("x8").airspeed
+    for source, more, speed, words in (
+        ("m.waypoints", [], 25.0, "that of the default aircraft aerosonde; --scenario names yours"),
+        ("slow.waypoints", [], 19.0, "the mission's"),
+        ("m.waypoints", ["--scenario", "x8.toml"], x8, "that of x8"),
+        (str(log_file), [], 25.0, "that of aerosonde"),
+    ):
+        assert main(["export", source, "a.plan", *more, "--overwrite"]) == 0
+        assert f"cruiseSpeed {speed:.0f} m/s: {words})" in capsys.readouterr().out
+        assert json.loads(Path("a.plan").read_text())["mission"]["cruiseSpeed"] == round(speed)
+
+
 def places(file: Path) -> list[list[tuple[float, float, float]]]:
     """Points of each LineString of a KML file: longitude, latitude, height."""
     lines = ElementTree.parse(file).getroot().iter(f"{KML}LineString")

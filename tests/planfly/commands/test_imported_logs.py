@@ -131,7 +131,7 @@ def test_a_plan_other_than_the_logs_own_mission_is_told(tmp_path: Path, capsys: 
     plan.write_text(plan.read_text().replace("\t500.000\t", "\t510.000\t", 1))
     assert main(["check", str(log), "--plan", str(plan)]) == 0
     assert (
-        "1 items of the mission in the log have other positions than in the plan; the first is item 1"
+        "1 item of the mission in the log has another position than in the plan; the first is item 1"
         in capsys.readouterr().out
     )
 

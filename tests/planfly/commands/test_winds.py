@@ -54,10 +54,11 @@ def test_a_short_mission_has_its_chart_stopped_or_not(
     line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    answer = answered(capsys, 0, *line, "--flights", "8", "--out", str(out))
+    answer = answered(capsys, 3, *line, "--flights", "8", "--out", str(out))
     assert {path.name for path in out.iterdir()} == {"winds.html", "winds.json", "winds.png", WINDS_DATABASE}
     data = json.loads((out / "winds.json").read_text())
-    assert data == answer
+    assert data | {"exit_code": 3} == answer
+    assert answer["answer"] == "not judged"
     assert (data["flights"], len(data["directions"])) == (8, 4)
     assert "wind_speed" not in data["spread"]
     assert main([*line, "--out", str(out)]) == 2
@@ -68,7 +69,7 @@ def test_a_short_mission_has_its_chart_stopped_or_not(
     shutil.copy(out / WINDS_DATABASE, again)
     with closing(sqlite3.connect(again / WINDS_DATABASE)) as connection, connection:
         connection.execute("DELETE FROM flights WHERE flight IN (1, 4) OR flight > 5")
-    assert answered(capsys, 0, *line, "--flights", "8", "--out", str(again), "--resume") == answer
+    assert answered(capsys, 3, *line, "--flights", "8", "--out", str(again), "--resume") == answer
     assert table(again / WINDS_DATABASE) == table(out / WINDS_DATABASE)
 
 
@@ -84,7 +85,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
     monkeypatch.setattr(campaigns, "find_winds", interrupted)
     assert main([*line, "--out", str(tmp_path / "out")]) == 128 + number
     told = capsys.readouterr().err.splitlines()
-    assert told[-1] == f"planfly: interrupted; 3 flights are kept in {tmp_path / 'out'}: continue with --resume"
+    assert told[-1] == f"planfly: interrupted; 3 flights kept in {tmp_path / 'out'}: continue with --resume"
     assert [path.name for path in (tmp_path / "out").iterdir()] == [WINDS_DATABASE]
     assert len(table(tmp_path / "out" / WINDS_DATABASE)) == 3
 
@@ -143,7 +144,7 @@ def test_winds_fly_the_draws_of_an_aircraft(
     rows = [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{46.0 + 0.002 * k:.6f}\t8.0\t500.0\t1" for k in range(3)]
     Path("hop.waypoints").write_text("QGC WPL 110\n" + "\n".join(rows) + "\n")
     line = ["winds", "hop.waypoints", "--aircraft", "./foam", "--workers", "1", "--directions", "4", "--flights", "4"]
-    data = answered(capsys, 0, *line, "--most", "6", "--out", "drawn")
+    data = answered(capsys, 3, *line, "--most", "6", "--out", "drawn")
     assert data["flights"] == 4
     assert "mass" in data["spread"]
     assert not {"drag", "control_power"} & set(data["spread"])

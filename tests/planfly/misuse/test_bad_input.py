@@ -268,6 +268,50 @@ def test_a_missing_file(argv: list[str], tmp_path: Path, capsys: pytest.CaptureF
     assert "missing" in refused(argv, tmp_path, capsys)
 
 
+@pytest.mark.parametrize(
+    "argv",
+    [
+        *(["fly", "run"], ["check", "run"], ["report", "run"], ["replay", "run"], ["recover", "run"], ["run", "run"]),
+        *(["plan", "run"], ["campaign", "run"], ["winds", "run"], ["returns", "run"], ["survey", "run"]),
+        *(["export", "run", "out.plan"], ["import", "run", "new.mcap"], ["refly", "run"], ["compare", "run", "run"]),
+        ["studio", "run", "--no-browser"],
+        ["predict", "run", "--aircraft", "aerosonde"],
+        *(["check", "well.waypoints", option, "run"] for option in ("--scenario", "--params", "--fence")),
+        ["campaign", "well.waypoints", "--spread", "run"],
+    ],
+)
+def test_a_folder_is_called_one_and_what_it_holds_is_named(
+    argv: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "well.waypoints").write_text(WAY, encoding="utf-8")
+    (tmp_path / "run").mkdir()
+    for name in ("plan.json", "flight.mcap", "notes.txt"):
+        (tmp_path / "run" / name).write_text("", encoding="utf-8")
+    line = refused(argv, tmp_path, capsys)
+    assert "run: is a folder that holds flight.mcap, plan.json; expected" in line or (
+        "--fence" in argv and "run: is a folder that holds flight.mcap, plan.json" in line
+    )
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        (
+            "campaign.sqlite",
+            "is a folder that holds a campaign: planfly compare reads it, planfly campaign --resume --out",
+        ),
+        ("winds.sqlite", "is a folder that holds a search for winds: planfly winds --resume --out continues it"),
+    ],
+)
+def test_the_folder_of_a_campaign_names_its_commands(
+    file: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / file).touch()
+    for command in ("check", "fly", "report"):
+        assert words in refused([command, "out"], tmp_path, capsys)
+
+
 def test_binary_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "bad.toml").write_bytes(b"\xff\xfe\x00\x01" * 40)
     assert "UTF-8" in refused(["run", "bad.toml"], tmp_path, capsys)

@@ -95,7 +95,7 @@ def test_fences_join_the_missions_own_and_each_other(mission: Path, capsys: pyte
     Path("b.geojson").write_text(feature(705.0), encoding="ascii")
     command = ["check", str(mission), "--fence", "a.fence", "--fence", "b.geojson", "--json", "v.json"]
     assert main(command) == 4
-    assert "the mission's own fence of 1 items applies in addition to the named fence" in capsys.readouterr().err
+    assert "the mission's own fence of 1 item applies in addition to the named fence" in capsys.readouterr().out
     found = json.loads(Path("v.json").read_text(encoding="utf-8"))["findings"]
     failed = [item["where"] for item in found if item["rule"] == "fence" and item["ok"] is False]
     assert failed == ["mill (exclusion)", "fence item 1 (exclusion)"]

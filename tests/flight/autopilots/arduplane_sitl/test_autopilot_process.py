@@ -212,6 +212,6 @@ def test_the_digest_is_the_files(tmp_path: Path) -> None:
 def test_what_is_no_program_is_told_apart(tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.write_text("no program")
-    for path, said in ((tmp_path / "none", "no such file"), (tmp_path, "not a file"), (plain, "not executable")):
+    for path, said in ((tmp_path / "none", "no such file"), (tmp_path, "is a folder"), (plain, "not executable")):
         with pytest.raises(FlightError, match=said):
             check_binary(path, "ArduPlane")

@@ -87,7 +87,7 @@ def test_a_truncated_file_is_refused_in_one_line(tmp_path: Path, write, suffix: 
         ("\n\n", "holds no rows"),
         ("t,roll\n", "holds no rows"),
         ("t,roll\n1,2\n1,2,3\n", "line 3: 3 cells: expected 2, as in the header"),
-        ("t,roll\n1,2\n1\n", "line 3: 1 cells: expected 2, as in the header"),
+        ("t,roll\n1,2\n1\n", "line 3: 1 cell: expected 2, as in the header"),
         ("1,2\n3,4\n", "line 1: '1,2': expected the names of the columns"),
         ("t,t\n1,2\n", "columns: 't': two columns have this name"),
     ],

@@ -154,7 +154,7 @@ def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path:
     completion = next(item for item in verdict.findings if item.rule == "completion")
     assert (completion.ok, completion.margin) == (False, -1)
     assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last of them to its end"
-    assert verdict.answer == "incomplete"
+    assert verdict.answer == "not flown as planned"
 
 
 def test_what_the_aircraft_is_not_known_well_enough_for_is_left_open(tmp_path: Path) -> None:

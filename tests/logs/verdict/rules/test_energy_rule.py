@@ -141,8 +141,8 @@ def test_energy_within_what_is_not_known_is_undecided(share: float, ok: bool | N
     verdict = judge_geometry(replace(setup, battery=used / share))
     item = of(verdict, "energy")
     assert (item.ok, verdict.undecided) == (ok, ok is None)
-    # The pessimistic end is stated wherever it is not the limit itself that is exceeded.
-    assert (f"at most {1.50871 * used:.1f} Wh with 95 % probability" in item.reason) is (ok is not False)
+    # The pessimistic end is always stated: a suggested battery holds it, also where the limit itself is exceeded.
+    assert f"at most {1.50871 * used:.1f} Wh with 95 % probability, because the power is from a data" in item.reason
     if ok is None:
         assert verdict.headline.startswith(
             "not judged in full: energy is too close to the limit to judge with what is known of the aircraft"

@@ -264,6 +264,16 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
         assert verdict.levels[0].undecided
 
 
+def test_a_suggested_slope_follows_from_what_the_reason_says_of_the_data_sheet() -> None:
+    """13.7 less 1.645 x 3 is 8.8 degrees; a suggestion stays 0.1 degrees below."""
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(16.0)], table=unsure())
+    item = of(judge_geometry(setup), "slope", leg(1))
+    assert item.ok is False
+    assert "at most 13.7° in calm air; with the uncertainty of a data sheet (± 3.0°) 8.8° is certain" in item.reason
+    certain = make_setup([[e, n, u + 400] for e, n, u in hill(16.0)])
+    assert "certain" not in of(judge_geometry(certain), "slope", leg(1)).reason
+
+
 def test_an_uncertain_slope_that_was_not_flown_is_undecided() -> None:
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure())
     # The flight ends halfway along leg 0.

@@ -82,7 +82,7 @@ def test_a_plan_alone_is_not_said_to_have_been_flown() -> None:
     assert all("flown" in picture.alternative for picture in flown)
     assert not any("flown" in picture.alternative for picture in planned)
     # Three legs and one unit over terrain; the other has neither.
-    assert "shaded terrain, 1 threats, the planned path of 3 legs" in flown[0].alternative
+    assert "shaded terrain, 1 threat, the planned path of 3 legs" in flown[0].alternative
     assert "no terrain, 0 threats, the planned path of 3 legs." in planned[0].alternative
 
 

@@ -1,0 +1,195 @@
+"""Compare two campaigns: their probabilities, the difference, the rules that fail more often, and their inputs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from logs.verdict.rule_words import RULE_WORDS
+from planfly.campaigns.campaign_inputs import difference_texts
+from planfly.campaigns.dispersions import NAMES
+from planfly.campaigns.flight_row import parse_failed_findings
+from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Estimator, Goal, Interval, Tally
+from planfly.campaigns.statistics.proportions import ProportionDifference, independent_difference, paired_difference
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, read_stored_settings, read_table
+from world.html_table import html_table
+from world.wording import count_text
+
+
+@dataclass(frozen=True, repr=False)
+class ComparedCampaign:
+    """One of two campaigns that are compared.
+
+    name: its folder.
+    interval: two-sided interval of the probability of a flyable flight, at 95 % confidence.
+    failed_by_rule: number of flights that failed each rule.
+    """
+
+    name: str
+    tally: Tally
+    interval: Interval
+    failed_by_rule: dict[str, int]
+
+
+@dataclass(frozen=True, repr=False)
+class CampaignComparison:
+    """Result of `planfly.compare_campaigns`.
+
+    difference: probability of the second campaign minus that of the first, with an interval at 95 % confidence.
+    pairs: number of flights with the same draws in both campaigns, by which the difference is estimated; 0 if the
+        flights of the campaigns have other draws, so that they are independent samples.
+    only_first, only_second: number of pairs that are flyable in one campaign only.
+    inputs: options that differ, in sentences.
+    notes: further remarks.
+    """
+
+    first: ComparedCampaign
+    second: ComparedCampaign
+    difference: ProportionDifference
+    pairs: int
+    only_first: int
+    only_second: int
+    inputs: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def answer(self) -> Literal["more likely", "less likely", "no difference shown"]:
+        """Answer by the interval: flights of the second campaign are more or less likely to be flyable, or neither."""
+        if self.difference.interval.low > 0.0:
+            return "more likely"
+        return "less likely" if self.difference.interval.high < 0.0 else "no difference shown"
+
+    @property
+    def rules(self) -> list[tuple[str, int, int]]:
+        """Rules that flights failed, with the number of failed flights of each campaign, the largest change first."""
+        first, second = self.first, self.second
+        names = [name for name in RULE_WORDS if name in first.failed_by_rule or name in second.failed_by_rule]
+        counts = [(name, first.failed_by_rule.get(name, 0), second.failed_by_rule.get(name, 0)) for name in names]
+        return sorted(counts, key=lambda entry: -abs(entry[2] / second.tally.flown - entry[1] / first.tally.flown))
+
+    def __repr__(self) -> str:
+        value, (low, high), _ = self.difference
+        return f"<CampaignComparison {value:+.4f} ({low:+.4f} to {high:+.4f}); {self.answer}>"
+
+    def _repr_html_(self) -> str:
+        """Return the HTML for a notebook."""
+        return html_table(comparison_lines(self)[0], self.rules, ("rule", self.first.name, self.second.name))
+
+
+def campaign_table(path: Path) -> Path | None:
+    """Return the file of a campaign's table for the campaign's folder or for the file itself; None for another path."""
+    if path.is_dir():
+        path /= CAMPAIGN_DATABASE
+    return path if path.name == CAMPAIGN_DATABASE and path.is_file() else None
+
+
+def compare_tables(first: Path, second: Path) -> CampaignComparison:
+    """Compare the campaigns in two tables.
+
+    Raises StoreError for a file that is no table of a campaign, for an empty table, and for a table that another
+    process has locked.
+    """
+    tables = [read_table(path) for path in (first, second)]
+    settings = [read_stored_settings(path) for path in (first, second)]
+    for path, table in zip((first, second), tables, strict=True):
+        if not len(table["flight"]):
+            raise StoreError(f"{path}: no flight of this campaign was flown", file=path)
+    campaigns = [_compared(*values) for values in zip((first, second), tables, settings, strict=True)]
+    flyable = _paired_outcomes(*tables)
+    only_first = int(np.count_nonzero(flyable[:, 0] & ~flyable[:, 1]))
+    only_second = int(np.count_nonzero(flyable[:, 1] & ~flyable[:, 0]))
+    counts = [(campaign.tally.flyable, campaign.tally.flown) for campaign in campaigns]
+    difference = (
+        paired_difference(only_first, only_second, len(flyable), DEFAULT_CONFIDENCE)
+        if len(flyable)
+        else independent_difference(counts[0], counts[1], DEFAULT_CONFIDENCE)
+    )
+    inputs = (setting.get("inputs", {}) for setting in settings)
+    return CampaignComparison(
+        campaigns[0],
+        campaigns[1],
+        difference,
+        len(flyable),
+        only_first,
+        only_second,
+        tuple(difference_texts(*inputs)),
+        tuple(_notes(tables, settings, len(flyable))),
+    )
+
+
+def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> ComparedCampaign:
+    """Return the counts of a campaign."""
+    outcomes = table["outcome"].tolist()
+    tally = Tally(*(outcomes.count(outcome) for outcome in ("flyable", "not flyable", "lost")))
+    goal = Goal(
+        **{field.name: settings[field.name] for field in fields(Goal) if field.name in settings}
+        | {"confidence": DEFAULT_CONFIDENCE}
+    )
+    failed_rules = [{rule for rule, _ in parse_failed_findings(text)} for text in table["failed"].tolist()]
+    failed_by_rule = {name: count for name in RULE_WORDS if (count := sum(name in rules for rules in failed_rules))}
+    return ComparedCampaign(str(path.parent), tally, Estimator(goal).estimate(tally).interval, failed_by_rule)
+
+
+def _paired_outcomes(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Return True for each flyable flight of the flights that both campaigns have, (n, 2).
+
+    n is 0 if the draws of any of these flights differ, because then the flights are no pairs.
+    """
+    _, first_rows, second_rows = np.intersect1d(first["flight"], second["flight"], return_indices=True)
+    for name in ("seed", *NAMES):
+        if not np.array_equal(first[name][first_rows], second[name][second_rows]):
+            return np.empty((0, 2), dtype=bool)
+    return np.column_stack([first["outcome"][first_rows] == "flyable", second["outcome"][second_rows] == "flyable"])
+
+
+def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]], pairs: int) -> list[str]:
+    """Return remarks on the flights that are compared, and on assumptions of the interval that do not hold."""
+    notes = []
+    counts = [len(table["flight"]) for table in tables]
+    if pairs and pairs < max(counts):
+        notes.append(f"the difference is that of the {count_text(pairs, 'flight')} that both campaigns have")
+    if any(setting.get("stops") or setting.get("changed") for setting in settings):
+        notes.append("a number of flights was not fixed beforehand: the interval of the difference is only approximate")
+    return notes
+
+
+def comparison_lines(comparison: CampaignComparison) -> list[str]:
+    """Return a comparison as lines for a terminal."""
+    value, (low, high), p_value = comparison.difference
+    percent = f"{100.0 * DEFAULT_CONFIDENCE:g} %"
+    answers = {
+        "more likely": "flights of the second campaign are more likely to be flyable",
+        "less likely": "flights of the second campaign are less likely to be flyable",
+        "no difference shown": "the flights show no difference",
+    }
+    lines = [f"{answers[comparison.answer]}: {value:+.4f} ({low:+.4f} to {high:+.4f} at {percent})"]
+    for title, campaign in (("first ", comparison.first), ("second", comparison.second)):
+        lines.append(
+            f"  {title}  {campaign.name}: {campaign.tally.flyable} of {count_text(campaign.tally.flown, 'flight')}"
+            f" flyable, P = {campaign.tally.share:.4f} ({campaign.interval.low:.4f} to {campaign.interval.high:.4f}"
+            f" at {percent})"
+        )
+    lines.append(
+        f"  paired  {count_text(comparison.pairs, 'flight')} with the same draws: {comparison.only_first} flyable only"
+        f" in the first, {comparison.only_second} only in the second (McNemar's exact test: p = {p_value:.2g})"
+        if comparison.pairs
+        else f"  paired  no: the flights have other draws (Fisher's exact test: p = {p_value:.2g})"
+    )
+    lines += [
+        f"  fails   {RULE_WORDS[rule].title}: {_change_text(first, second, comparison)}"
+        for rule, first, second in comparison.rules
+    ]
+    lines += [f"  differs {text}" for text in comparison.inputs] or [
+        "  differs nothing but planfly's code, if anything"
+    ]
+    return [*lines, *(f"  note    {note}" for note in comparison.notes)]
+
+
+def _change_text(first: int, second: int, comparison: CampaignComparison) -> str:
+    """Return the number of flights that failed a rule in each campaign, and the change of their share."""
+    change = 100.0 * (second / comparison.second.tally.flown - first / comparison.first.tally.flown)
+    word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
+    return f"{word}, in {first} and {count_text(second, 'flight')} ({change:+.1f} %)"

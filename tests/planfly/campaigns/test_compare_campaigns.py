@@ -1,0 +1,90 @@
+"""Two campaigns compared: in pairs where the draws are the same, else as two samples."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import planfly
+from logs.verdict.places import Place
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.compare_campaigns import comparison_lines
+from planfly.campaigns.dispersions import default_dispersions
+from planfly.campaigns.fly_campaign import open_store
+from planfly.campaigns.statistics.decision import Goal
+from planfly.cli import main
+from planfly.flight_options import MissionOptions
+from tests.planfly.campaigns.made_campaigns import all_fly, write_short
+from tests.planfly.terminal.answers.checked_answers import answered
+
+
+def fly(base: CampaignBase, folder: Path, flights: int, failed: dict[int, str], goal: Goal | None = None) -> Path:
+    """A campaign of so many flights, of which those named fail their rule."""
+    folder.mkdir()
+    with open_store(base, goal or Goal(None, False, flights), folder, resume=False) as store:
+        for index in range(flights):
+            row = all_fly(base, index)
+            if index in failed:
+                row = replace(row, outcome="not flyable", failed=((failed[index], Place("leg", 1)),))
+            store.add(row)
+    return folder
+
+
+def test_flights_with_the_same_draws_are_pairs(
+    base: CampaignBase, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Flights 0 and 1 fail in both; 12 more fail in the second campaign, and 2 that fly there in the first."""
+    first = fly(base, tmp_path / "a", 50, {0: "slope", 1: "slope", 2: "slope", 3: "energy"})
+    failed = dict.fromkeys([0, 1, *range(10, 22)], "clearance")
+    mission, scenario = write_short(tmp_path)
+    options: MissionOptions = {"scenario": scenario, "seed": 1, "wind": (9.0, 250.0)}
+    windier = open_campaign(str(mission), default_dispersions(), options)
+    second = fly(windier, tmp_path / "b", 50, failed)
+    found = planfly.compare_campaigns(first, second / "campaign.sqlite")
+    assert (found.pairs, found.only_first, found.only_second) == (50, 12, 2)
+    assert found.difference.value == pytest.approx(-0.2)
+    assert found.answer == "less likely"
+    assert found.rules == [("clearance", 0, 14), ("slope", 3, 0), ("energy", 1, 0)]
+    assert found.inputs == ("wind.speed_mps 9.0 instead of 5.0",)
+    lines = comparison_lines(found)
+    assert lines[0].startswith("flights of the second campaign are less likely to be flyable: -0.2000 (-0.3447 to")
+    assert "  fails   clearance: more often, in 0 and 14 flights (+28.0 %)" in lines
+    assert "  fails   slopes: less often, in 3 and 0 flights (-6.0 %)" in lines
+    answer = answered(capsys, 0, "compare", str(first), str(second))
+    assert (answer["answer"], answer["pairs"], answer["campaigns"][1]["flyable"]) == ("less likely", 50, 36)
+
+
+def test_other_draws_are_other_samples(base: CampaignBase, tmp_path: Path) -> None:
+    first = fly(base, tmp_path / "a", 80, dict.fromkeys(range(32), "slope"))
+    second = fly(replace(base, seed=2), tmp_path / "b", 70, dict.fromkeys(range(14), "slope"))
+    found = planfly.compare_campaigns(first, second)
+    assert found.pairs == 0
+    assert [round(bound, 4) for bound in found.difference.interval] == [0.0524, 0.3339]
+    assert found.answer == "more likely"
+    assert found.inputs == ("seed 2 instead of 1",)
+
+
+def test_the_flights_that_both_have_are_compared_and_a_stopped_campaign_is_noted(
+    base: CampaignBase, tmp_path: Path
+) -> None:
+    first = fly(base, tmp_path / "a", 20, {})
+    second = fly(base, tmp_path / "b", 30, {}, Goal(0.9, True, 5000))
+    found = planfly.compare_campaigns(first, second)
+    assert (found.pairs, found.answer, found.inputs) == (20, "no difference shown", ())
+    assert found.notes[0] == "the difference is that of the 20 flights that both campaigns have"
+    assert "only approximate" in found.notes[1]
+    assert "  differs nothing but planfly's code, if anything" in comparison_lines(found)
+
+
+def test_a_campaign_is_compared_with_a_campaign_only(
+    base: CampaignBase, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first = fly(base, tmp_path / "a", 2, {})
+    empty = fly(base, tmp_path / "b", 0, {})
+    for argv, words in (
+        ([str(first), "flight.mcap"], "flight.mcap: no campaign; expected a folder with a campaign.sqlite"),
+        ([str(first), str(empty)], "no flight of this campaign was flown"),
+        ([str(first), str(first), "--svg"], "--svg: only with two flight logs"),
+    ):
+        assert main(["compare", *argv]) == 2
+        assert words in capsys.readouterr().err
