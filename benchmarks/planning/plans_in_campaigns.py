@@ -19,6 +19,7 @@ import numpy as np
 
 import planfly
 from logs.verdict.wording import place_text
+from planfly.api.planning import failures_to_expect
 from planfly.campaigns.statistics.decision import wilson
 from planner.plan import Plan
 from tests.autopilot_plans import plan_scenario
@@ -49,8 +50,7 @@ class Held:
 
     low, high: Wilson's interval of the probability at 95 %.
     failed: failed flights by rule, with the places.
-    expected: probability that the plan itself states; None if it states none.
-    notes: what the plan says about its probability.
+    stated: what the plan itself says about failures to expect.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Held:
     low: float
     high: float
     failed: dict[str, dict[str, Any]]
-    problems: tuple[str, ...]
+    stated: tuple[str, ...]
     seconds: float
 
     @property
@@ -120,17 +120,18 @@ def hold(name: str, plan: Plan, flights: int, workers: int) -> Held:
         for one in result.summary.by_rule
     }
     interval = wilson(tally.flyable, tally.flown)
-    problems = plan.certificate.problems
-    return Held(name, tally.flown, tally.flyable, *interval, failed, problems, time.perf_counter() - began)
+    return Held(
+        name, tally.flown, tally.flyable, *interval, failed, failures_to_expect(plan), time.perf_counter() - began
+    )
 
 
 def line(held: Held) -> str:
-    """Return the line of one campaign."""
+    """Return the line of one campaign: "!" marks too few flyable flights, "s" the same where the plan says so."""
     causes = "; ".join(
         f"{rule} {one['flights']} ({', '.join(f'{place} {count}' for place, count in one['places'].items())})"
         for rule, one in held.failed.items()
     )
-    mark = " " if held.percent >= REQUIRED_PERCENT else "!"
+    mark = " " if held.percent >= REQUIRED_PERCENT else "s" if held.stated else "!"
     return f"{mark} {held.name:44s} {held.flyable:3d} of {held.flights}  {held.low:.3f} to {held.high:.3f}  {causes}"
 
 
@@ -150,7 +151,12 @@ def main() -> None:
             print(line(rows[-1]), flush=True)
     worst = min((held.percent for held in rows), default=math.nan)
     count = sum(held.percent >= REQUIRED_PERCENT for held in rows)
-    print(f"{count} of {len(rows)} plans hold in at least {REQUIRED_PERCENT:g} % of their flights; worst {worst:.0f} %")
+    silent = [held for held in rows if held.percent < REQUIRED_PERCENT and not held.stated]
+    print(
+        f"{count} of {len(rows)} plans hold in at least {REQUIRED_PERCENT:g} % of their flights; worst {worst:.0f} %;"
+        f" {len(silent)} fail more often without saying so, worst"
+        f" {min((held.percent for held in silent), default=math.nan):.0f} %"
+    )
     args.json.parent.mkdir(parents=True, exist_ok=True)
     args.json.write_text(json.dumps([asdict(held) for held in rows], indent=1) + "\n", encoding="utf-8")
 
