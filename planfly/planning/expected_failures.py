@@ -18,8 +18,8 @@ from world.wind import W20
 
 # Probability with which a plan is to hold in dispersed flights.
 HOLDING_PROBABILITY = 0.95
-# Standard deviation of a touchdown along the strip in light turbulence, with GNSS errors and a surveyed height, m: root mean
-# square of ten plans of four aircraft, 24 flights each (16 to 66 m).  It is assumed to grow with the gusts.
+# Standard deviation of a touchdown along the strip in light turbulence, with GNSS errors and a surveyed height, m: root
+# mean square of ten plans of four aircraft, 24 flights each (16 to 66 m).  It is assumed to grow with the gusts.
 _TOUCHDOWN_SD_IN_LIGHT_TURBULENCE_M = 40.0
 # The same without turbulence: 5 touchdowns of ArduPlane in steady wind were within 15 m of the simulated ones.
 _TOUCHDOWN_SD_IN_CALM_AIR_M = 8.0
@@ -80,9 +80,9 @@ def _short_strip_text(plan: Plan) -> str:
         remedies.append("less turbulence")
     source = "the elevation file" if strip.height_sd is None else "its survey"
     return (
-        f"at most {probability:.2f} of the landings are expected to touch down on the {strip.length:.0f} m of the strip:"
-        f" its height is known within {height_sd:.1f} m by {source}, and the touchdown within {touchdown_sd:.0f} m"
-        f" (standard deviations); {', '.join(remedies[:-1])}{' or ' if len(remedies) > 1 else ''}{remedies[-1]} would help"
+        f"at most {probability:.2f} of the landings are expected to touch down on the {strip.length:.0f} m of the"
+        f" strip: its height is known within {height_sd:.1f} m by {source}, and the touchdown within"
+        f" {touchdown_sd:.0f} m (standard deviations); what would help: {', or '.join(remedies)}"
     )
 
 

@@ -264,9 +264,9 @@ def add_flights_option(group: OptionGroup) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="then fly the plan N times with the default dispersions of 'planfly campaign', and say in how many flights "
-        "it holds, what decides, and what would raise it; the exit code is 4 if it holds in less than 95 % "
-        "(at 95 % confidence); 40 flights take some 10 s",
+        help="then fly the plan N times with the default dispersions of 'planfly campaign', and say in how many "
+        "flights it holds, what decides, and what would help; the exit code is 4 if the probability is below 0.95 "
+        "(at 95 % confidence); 40 flights take some 20 s",
     )
 
 

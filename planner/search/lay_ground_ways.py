@@ -57,18 +57,19 @@ _FIRST_LEG_FACTOR_AND_M = (1.05, 30.0)
 _FIRST_LEG_FACTORS = (1.0, 1.7)
 # Fraction of the climb at which a take-off is complete; the rest of the leg must hold the turn at its end.
 _TAKEOFF_DONE_FRACTION = 0.8
-# Slope relative to the air of a slow take-off: 52 of 60 take-offs of four aircraft were at least as steep, with the minimum
-# pitch of 12 degrees and the default dispersions.
+# Slope relative to the air of a slow take-off, with the minimum pitch of 12 degrees and the default dispersions: 52 of
+# 60 take-offs of four aircraft were at least as steep.
 _SLOW_TAKEOFF_SLOPE = 0.16
 # Drift of a take-off, which holds its heading: a fraction of the crosswind times the time of the climb.  The same
 # take-offs drifted by 0.4 to 0.9 of it where the crosswind was above 3 m/s.
 _DRIFT_FRACTION = 0.8
 # Standard deviation of the forecast's wind speed, m/s: 2.5 m/s in 80 % of cases (ICAO Annex 3, Attachment B).
 _WIND_FORECAST_ERROR_MPS = 1.95
-# Standard deviation of the heights of an elevation file, m: 9.0 m at 90 % in North America (Rodriguez et al., JPL D-31639,
-# 2005), divided by 1.645.
+# Standard deviation of the heights of an elevation file, m: 9.0 m at 90 % in North America (Rodriguez et al.,
+# JPL D-31639, 2005), divided by 1.645.
 MAP_HEIGHT_SD_M = 5.5
-# Error of these heights that an approach allows for, in standard deviations: the ground is higher in one of twenty cases.
+# Error of these heights that an approach allows for, in standard deviations: the ground is higher in one case of
+# twenty.
 _MAP_HEIGHT_SIGMAS = 1.645
 # Distance from home within which terrain is ignored, m (LAUNCH_RUN of the verdict).
 _LAUNCH_RUN_M = 50.0
