@@ -1,6 +1,7 @@
 """``planfly run``: plan, fly, judge and report into one folder, once or in rounds."""
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import planfly
@@ -21,7 +22,7 @@ from planfly.terminal.output import write_json_if_requested, write_junit_if_requ
 from planfly.terminal.results import print_engine, print_returns_line, print_verdict
 
 if TYPE_CHECKING:
-    from planfly import Round, RunResult
+    from planfly import Plan, Round, RunResult
     from planfly.terminal.answers import DispersedFlights
 
 
@@ -68,11 +69,19 @@ def run(args: argparse.Namespace) -> int:
     result = call_api(planfly.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)
-    dispersed = fly_dispersed(args, result.folder / "plan.json") if result.rounds[-1].flown else None
+    dispersed = fly_dispersed(args, _last_plan(result)) if args.flights and result.rounds[-1].flown else None
     code = verdict_code(result.verdict) if dispersed is None or dispersed.holds else NOT_FLYABLE
     write_json_if_requested(args, lambda: _json_answer(result, bool(args.refine), code, dispersed))
     write_junit_if_requested(args, {result.scenario: result.verdict})
     return code
+
+
+def _last_plan(result: "RunResult") -> "Plan":
+    """Read the plan of the last round, in the scenario without the limits that were tightened for it."""
+    from planner.plan import read_plan
+
+    first, last = (read_plan(one.folder / "plan.json") for one in (result.rounds[0], result.rounds[-1]))
+    return replace(last, scenario=first.scenario)
 
 
 def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "DispersedFlights | None") -> object:

@@ -1,7 +1,6 @@
 """Fly a finished plan with the default dispersions, and say in how many flights it holds (``--flights N``)."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
@@ -25,16 +24,14 @@ def check_flights_option(args: argparse.Namespace, excluded: str) -> None:
     require_extra("campaigns", "--flights needs")
 
 
-def fly_dispersed(args: argparse.Namespace, plan: "Plan | Path") -> "DispersedFlights | None":
+def fly_dispersed(args: argparse.Namespace, plan: "Plan") -> "DispersedFlights | None":
     """Fly a plan N times for ``--flights N``, print and return the result; None without the option."""
     if args.flights is None:
         return None
     from planfly.campaigns.remedies import remedies
-    from planner.plan import read_plan
 
     result = planfly.campaign(plan, flights=args.flights)
-    scenario = read_plan(plan).scenario if isinstance(plan, Path) else plan.scenario
-    answer = _dispersed_answer(result, remedies(result.summary, scenario))
+    answer = _dispersed_answer(result, remedies(result.summary, plan.scenario))
     print("\n".join(_dispersed_lines(result, answer)))
     return answer
 
