@@ -265,8 +265,8 @@ def add_flights_option(group: OptionGroup) -> None:
         metavar="N",
         type=number_parser("flights"),
         help="then fly the plan N times with the default dispersions of 'planfly campaign', and say in how many "
-        "flights it holds, what decides, and what would help; the exit code is 4 if the probability is below 0.95 "
-        "(at 95 % confidence); 40 flights take some 20 s",
+        "flights it holds, what decides, and what would help; the exit code is 4 if the whole interval is below 0.95; "
+        "40 flights take some 20 s",
     )
 
 
