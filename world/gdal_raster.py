@@ -115,8 +115,8 @@ def _check_layout(file: Path, source: Any) -> None:
     """
     number_kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or number_kind not in "iuf":
-        allowed = "an elevation file has 1 band of numbers"
-        raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of kind {number_kind!r}")
+        allowed = "an elevation file has 1 band of integers or real numbers"
+        raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of {source.dtypes[0]}")
     block_pixels = math.prod(source.block_shapes[0])
     if block_pixels > MAX_BLOCK_PIXELS:
         allowed = f"at most {MAX_BLOCK_PIXELS:,} are read at once; save the file with tiles"

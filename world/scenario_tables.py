@@ -42,9 +42,11 @@ def in_range(
             value < max_value if exclude_max else value <= max_value
         ):
             return value
-        low_prefix, high_prefix = ("above " if exclude_min else ""), ("below " if exclude_max else "")
         low_text, high_text = (bound if isinstance(bound, int) else f"{bound:.12g}" for bound in (min_value, max_value))
-        raise ValueError(f"allowed {low_prefix}{low_text}..{high_prefix}{high_text}{also}")
+        if exclude_min or exclude_max:
+            low_prefix, high_prefix = ("above" if exclude_min else "from"), ("below" if exclude_max else "up to")
+            raise ValueError(f"allowed {low_prefix} {low_text}, {high_prefix} {high_text}{also}")
+        raise ValueError(f"allowed {low_text}..{high_text}{also}")
 
     return AfterValidator(check)
 

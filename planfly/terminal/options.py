@@ -59,7 +59,7 @@ def add_result_options(
     group = parser.add_group("results")
     if out:
         group.add_argument("--out", metavar=placeholder, help=out)
-    group.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
+    group.add_argument("--overwrite", action="store_true", help="replace output files that exist")
     if json:
         add_json_and_quiet_options(group, parser.prog.split()[-1])
     if junit:

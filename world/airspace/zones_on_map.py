@@ -73,7 +73,7 @@ def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
     """
     count += 0 if isinstance(shape, Cylinder) else sum(map(len, shape.rings))
     if count > MAX_MAP_CORNERS:
-        raise ValueError(f"too many corners on the map: all zones together may have at most {MAX_MAP_CORNERS:,}")
+        raise ValueError(f"all zones together then have {count:,} corners; at most {MAX_MAP_CORNERS:,} are allowed")
     return count
 
 

@@ -140,8 +140,12 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     # Without the aircraft's limits there is no uncertain limit.
     if abs(planned_slope) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
-    slope, limit_deg, deviation_deg = (math.degrees(angle) for angle in (abs(planned_slope), limit, deviation))
-    return f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°"
+    angles = abs(planned_slope), limit, deviation, certain_limit
+    slope, limit_deg, deviation_deg, certain_deg = (math.degrees(angle) for angle in angles)
+    return (
+        f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°, so"
+        f" only {certain_deg:.1f}° is certain"
+    )
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
@@ -186,8 +190,10 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
         f"and {corner} have {legs}: the fly-by arc is shorter than the "
         f"{2.0 * float(requirements.length_before[corner]):.0f} m of leg that it replaces"
     )
+    side = "below" if arc.tangent > 0.0 else "above"
     limit = (
-        f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, {missing_height:.0f} m less"
+        f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, and leaves the arc"
+        f" {missing_height:.0f} m {side} its end"
     )
     # A headline names the waypoint, not its item.
     return [

@@ -180,13 +180,13 @@ def _sphere_finding(
     judged_visit = planned_visit if flown_visit is None else flown_visit
     is_missing = math.isnan(judged_visit.closest)
     facts = (
-        f"planned {planned_visit.time_inside:.1f} s inside the radius of {radius:.0f} m, exposure"
-        f" {planned_visit.exposure:.3g} s"
+        f"the planned path is inside the radius of {radius:.0f} m for {planned_visit.time_inside:.1f} s (exposure"
+        f" {planned_visit.exposure:.3g} s)"
     )
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; flown {flown_visit.time_inside:.1f} s inside, exposure {flown_visit.exposure:.3g} s, nearest to the"
-            f" center {flown_visit.closest:.0f} m"
+            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s), at"
+            f" least {flown_visit.closest:.0f} m from the center"
         )
         facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
     flown_time = None if flown_visit is None else flown_visit.time_inside

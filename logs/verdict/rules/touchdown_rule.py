@@ -250,13 +250,11 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         if stop[0] > half_length:
             brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
         faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m of the strip must be left"))
-    lateral_offset = max(abs(touchdown[1]), abs(stop[1]))
-    if lateral_offset > half_width:
-        faults.append(
-            message(
-                f"{lateral_offset:.0f} m off the strip's center line", f"; the strip is {2.0 * half_width:.0f} m wide"
-            )
-        )
+    width_text = f"; the strip is {2.0 * half_width:.0f} m wide"
+    for verb, offset in (("touches down", abs(touchdown[1])), ("comes to rest", abs(stop[1]))):
+        if offset > half_width:
+            faults.append(message(f"{verb} {offset:.0f} m beside the strip's center line", width_text))
+            break
     return faults
 
 

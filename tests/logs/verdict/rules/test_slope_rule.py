@@ -150,7 +150,7 @@ def test_the_arc_and_both_legs_are_named() -> None:
     assert item.brief == "the arc at waypoint 1"
     assert "have 7.0° and 6.0°" in item.reason
     missing = (math.tan(steep) - math.tan(math.radians(7.8))) * length
-    assert f"the aircraft can fly at most 7.8° there, {missing:.0f} m less" in item.reason
+    assert f"the aircraft can fly at most 7.8° there, and leaves the arc {missing:.0f} m above its end" in item.reason
 
 
 def test_its_suggestion_passes() -> None:
