@@ -202,17 +202,21 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
     )
     altitude_candidates = [float(altitude) for altitude in altitude_grid]
 
-    def min_passing_altitude(min_altitude: float, criterion: Criterion) -> float | None:
+    def min_passing_altitude(min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
         """Return the lowest RTL_ALTITUDE, at least ``min_altitude``, with which all returns pass, or None."""
         return first_that_passes(
             (altitude for altitude in altitude_candidates if altitude >= min_altitude),
             lambda altitude: trial.passes(world.with_parameters(RTL_ALTITUDE=altitude), criterion),
         )
 
-    ground_altitude = min_passing_altitude(0.0, _clears_ground)
+    ground_altitude = min_passing_altitude(0.0, _clears_ground, trial)
     if ground_altitude is not None and ground_altitude > current_altitude:
         remedies.append(Remedy({"RTL_ALTITUDE": ground_altitude}))
-    safe_altitude = min_passing_altitude(ground_altitude or 0.0, _meets_all_limits)
+    safe_altitude = min_passing_altitude(ground_altitude or 0.0, _meets_all_limits, trial)
+    if safe_altitude is None:
+        # No altitude keeps the margin on all returns: take the lowest that makes them safe.
+        trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, 0.0))
+        safe_altitude = min_passing_altitude(0.0, _meets_all_limits, trial_without_margin)
     if safe_altitude is not None and safe_altitude not in (ground_altitude, current_altitude):
         remedies.append(Remedy({"RTL_ALTITUDE": safe_altitude}))
     if safe_altitude is None:

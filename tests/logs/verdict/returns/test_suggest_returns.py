@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from flight.mission.return_path import ReturnPoint, ReturnTarget
+from logs.verdict.returns import suggest_returns
 from logs.verdict.returns.judge_returns import (
     Kind,
     Returns,
@@ -50,6 +51,24 @@ def test_the_least_altitude_clears_the_hill_with_its_margin(tmp_path: Path) -> N
     assert min(one.clearance for one in good.each) >= world.limit + MARGIN
     lower = world.with_parameters(RTL_ALTITUDE=found.parameters["RTL_ALTITUDE"] - 50.0)
     assert min(one.clearance for one in judge_returns(lower, starts, 8.0).each) < world.limit + MARGIN
+
+
+def test_an_altitude_that_is_safe_without_the_margin_is_suggested_if_none_keeps_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world, starts = asked(tmp_path)
+    limits = suggest_returns._return_limits
+
+    def out_of_reach(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
+        found = limits(world, starts, margin)
+        return found if margin == 0.0 else replace(found, clearance=found.clearance + 1e4)
+
+    monkeypatch.setattr(suggest_returns, "_return_limits", out_of_reach)
+    (found,) = suggest_parameters(world, starts)
+    altitude = found.parameters["RTL_ALTITUDE"]
+    assert all(one.safe for one in judge_returns(found.apply_to(world), starts, 8.0).each)
+    lower = world.with_parameters(RTL_ALTITUDE=altitude - 25.0)
+    assert not all(one.safe for one in judge_returns(lower, starts, 8.0).each)
 
 
 def test_nothing_is_suggested_where_all_is_safe(tmp_path: Path) -> None:
