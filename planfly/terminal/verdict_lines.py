@@ -1,6 +1,6 @@
 """Format a verdict as lines for a terminal."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
@@ -25,6 +25,11 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     lines = [colour_text(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
     for rule in presentation.failed_rules:
         lines += _failed_lines(rule)
+    if _needs_geometric_suggestions(verdict, presentation.failed_rules):
+        lines.append(
+            colour_text("          would pass: ", "hint")
+            + "no change was found by flying; planfly check --geometry suggests changes for the planned route"
+        )
     lines += [
         f"  open    {rule_word(finding.rule)} at {finding.where}: {finding.reason}"
         for finding in presentation.undecided[: 2 * _MAX_LISTED]
@@ -38,6 +43,15 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
         )
         lines.append(f"  {rule.words.title:<{_TITLE_WIDTH}}{zone_count_text}{_rule_summary(rule)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
+
+
+def _needs_geometric_suggestions(verdict: Verdict, failed_rules: Sequence[RuleFindings]) -> bool:
+    """Return True if no failed finding has a suggestion, but the planned route fails too, for which there are some."""
+    has_suggestion = any(finding.suggestions for rule in failed_rules for finding in rule.failed)
+    fails_by_geometry = any(
+        level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels
+    )
+    return bool(failed_rules) and not has_suggestion and fails_by_geometry
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
