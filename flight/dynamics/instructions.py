@@ -85,11 +85,14 @@ def run_instructions(numbers: Floats, code: Code, start: int, end: int) -> None:
             divisor = numbers[code[first_operand + 1]]
             value = value / divisor if divisor != 0.0 else math.inf
         elif operation == Operation.MAX:
-            for k in range(first_operand + 1, next_position):
+            # From minus infinity on, like JSBSim, which so ignores operands that are not numbers.
+            value = -math.inf
+            for k in range(first_operand, next_position):
                 operand = numbers[code[k]]
                 value = operand if operand > value else value
         elif operation == Operation.MIN:
-            for k in range(first_operand + 1, next_position):
+            value = math.inf
+            for k in range(first_operand, next_position):
                 operand = numbers[code[k]]
                 value = operand if operand < value else value
         elif operation == Operation.TABLE:

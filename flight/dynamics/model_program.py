@@ -41,6 +41,19 @@ FRAME_PROPERTIES = {
     "metrics/bw-ft": ("wing_span", 0),
     "metrics/cbarw-ft": ("wing_chord", 0),
 }
+# Roots of the properties that JSBSim itself computes or reads, by version 1.3.3.
+_JSBSIM_ROOTS = {
+    *("accelerations", "atmosphere", "attitude", "buoyant_forces", "contact", "external_reactions", "flight-path"),
+    *("forces", "gear", "ground", "ic", "inertia", "inertial", "metrics", "moments", "orbital", "position"),
+    *("propulsion", "simulation", "systems", "velocities"),
+}
+# The same below the root of aerodynamics, which models use for their own properties too.
+_JSBSIM_AERO_PROPERTIES = {
+    *("alpha-rad", "beta-rad", "mag-beta-rad", "alpha-deg", "beta-deg", "mag-beta-deg", "Re", "qbar-psf"),
+    *("qbarUW-psf", "qbarUV-psf", "alphadot-rad_sec", "betadot-rad_sec", "alphadot-deg_sec", "betadot-deg_sec"),
+    *("h_b-cg-ft", "h_b-mac-ft", "cl-squared", "qbar-area", "alpha-max-rad", "alpha-min-rad", "bi2vel", "ci2vel"),
+    *("alpha-wing-rad", "stall-hyst-norm"),
+}
 # Operations of functions with several operands, by XML element.
 _SEVERAL_OPERANDS = {
     "product": Operation.PRODUCT,
@@ -216,9 +229,9 @@ class _Translator:
                 if element.tag == "property" and "value" in element.attrib:
                     self._property(_element_text(element))
                 elif element.tag in _COMPONENTS:
-                    self._property(_component_property(element))
+                    self._property(_own_property(_component_property(element)))
                 elif element.tag == "function" and "name" in element.attrib:
-                    self._property(element.attrib["name"])
+                    self._property(_own_property(element.attrib["name"]))
 
     def _property(self, name: str) -> int:
         """Return the register of a property; for a new property, assign a new register."""
@@ -486,3 +499,15 @@ def _component_property(element: Element) -> str:
     """Return the name of the property that holds the output of a component."""
     name = element.get("name", "")
     return name if "/" in name else "fcs/" + name.lower().replace(" ", "-")
+
+
+def _own_property(name: str) -> str:
+    """Return the name of a property that a model computes.
+
+    Raises UnsupportedModel for a property that JSBSim itself computes or reads, such as a mass, a switch of a failure
+    or the direction of a force: JSBSim would use the model's value, and the program would not.
+    """
+    root, _, rest = name.partition("/")
+    if root in _JSBSIM_ROOTS or (root == "aero" and rest in _JSBSIM_AERO_PROPERTIES) or "/malfunction/" in name:
+        raise UnsupportedModel(f"a model that computes {name}, a property of JSBSim's own")
+    return name

@@ -1,11 +1,24 @@
 """A model becomes registers and instructions, and one that is not covered is refused with the reason."""
 
+import math
+from pathlib import Path
+
+import jsbsim
+import numpy as np
 import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
 from flight.dynamics.compiled_frame import FRAME_NUMBERS
-from flight.dynamics.instructions import Operation
-from flight.dynamics.model_program import ModelProgram, UnsupportedModel, frame_register, translate
+from flight.dynamics.fdm import load_model
+from flight.dynamics.instructions import Operation, run_instructions
+from flight.dynamics.model_program import (
+    _JSBSIM_AERO_PROPERTIES,
+    _JSBSIM_ROOTS,
+    ModelProgram,
+    UnsupportedModel,
+    frame_register,
+    translate,
+)
 
 ALPHA = frame_register("alpha")
 VARIABLE = "<independentVar lookup='row'> aero/alpha-rad </independentVar>"
@@ -18,6 +31,11 @@ def model(function: str = "<v> 1 </v>", *, fcs: str = "", aero: str = "", extern
 <aerodynamics><function name="f">{function}</function>{aero}
 <axis name="X" frame="STABILITY"><function name="x"><p>f</p></function></axis></aerodynamics>
 <external_reactions>{external}</external_reactions></fdm_config>""".encode()
+
+
+def _computed(name: str) -> str:
+    """Return a component that computes a property."""
+    return f"<fcs_function name='{name}'><function><v>1</v></function></fcs_function>"
 
 
 def instructions(code: tuple[int, ...]) -> list[tuple[int, int, tuple[int, ...]]]:
@@ -99,6 +117,46 @@ def test_all_aircraft_but_one_are_covered() -> None:
     assert refused == ["c172x"]
 
 
+def test_the_properties_of_jsbsims_own_are_those_of_its_catalog(tmp_path: Path) -> None:
+    """They are all properties of an instance with a model that the model does not name."""
+    aircraft = load_aircraft("aerosonde")
+    jsbsim.FGJSBBase().debug_lvl = 0
+    instance = jsbsim.FGFDMExec(str(tmp_path))
+    load_model(instance, tmp_path, aircraft, 1 / 120, str, flat_earth=False, is_tested=True)
+    catalog = {line.partition(" ")[0] for line in instance.query_property_catalog("").splitlines()}
+    assert "atmosphere/delta-T" in catalog
+    text = aircraft.model_file.read_text()
+    of_actuators = ("/malfunction/", "/saturated")
+    own = {name for name in catalog if name and name not in text and not any(part in name for part in of_actuators)}
+    assert {name.partition("/")[0] for name in own} <= {*_JSBSIM_ROOTS, "aero", "fcs"}
+    assert {name.partition("/")[2] for name in own if name.startswith("aero/")} <= _JSBSIM_AERO_PROPERTIES
+
+
+@pytest.mark.parametrize(
+    ("operation", "operands", "value"),
+    [
+        ("max", (math.nan, 1.0), 1.0),
+        ("max", (1.0, math.nan), 1.0),
+        ("min", (math.nan, 1.0), 1.0),
+        ("min", (2.0, math.nan, 1.0), 1.0),
+        ("max", (math.nan, math.nan), -math.inf),
+        ("min", (-3.0, 4.0), -3.0),
+    ],
+)
+def test_extremes_ignore_what_is_not_a_number_as_jsbsim_does(
+    operation: str, operands: tuple[float, ...], value: float
+) -> None:
+    """JSBSim compares each operand with the extreme so far, from -infinity or +infinity on (FGFunction, 1.3.3)."""
+    places = [11.0 + k for k in range(len(operands))]
+    program, _ = of_function(f"<{operation}>{''.join(f'<v> {place} </v>' for place in places)}</{operation}>")
+    numbers = np.array(program.numbers)
+    for place, operand in zip(places, operands, strict=True):
+        numbers[program.numbers.index(place)] = operand
+    code = np.array(program.aero, dtype=np.uint32)
+    run_instructions(numbers, code, 0, 3 + len(operands))
+    assert numbers[program.properties["f"]] == value
+
+
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
@@ -128,6 +186,12 @@ def test_all_aircraft_but_one_are_covered() -> None:
             "hysteresis",
         ),
         (model(fcs="<actuator name='a/b'><input>command/a</input><lag>command/a</lag></actuator>"), "'command/a'"),
+        (model(fcs=_computed("forces/hold-down")), "computes forces/hold-down, a property of JSBSim's own"),
+        (model(fcs=_computed("inertia/pointmass-weight-lbs")), "computes inertia/pointmass-weight-lbs"),
+        (model(fcs=_computed("external_reactions/t/x")), "computes external_reactions/t/x"),
+        (model(fcs=_computed("a/b/malfunction/fail_zero")), "computes a/b/malfunction/fail_zero"),
+        (model(fcs=_computed("aero/alpha-max-rad")), "computes aero/alpha-max-rad"),
+        (model(aero="<function name='atmosphere/delta-T'><v>1</v></function>"), "computes atmosphere/delta-T"),
         (model(external="<force name='t' frame='LOCAL'><function><v>1</v></function></force>"), "BODY"),
     ],
 )
