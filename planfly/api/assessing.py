@@ -60,13 +60,8 @@ def ground_risk(
     ...
     world.errors.ArgumentError: max_speed 0.0: expected a speed from 1 to 300 m/s
     """
-    check_arguments(
-        population_unit=population_unit,
-        max_speed=max_speed,
-        probability=probability,
-        every=every,
-        sample_flights=options["flights"],
-    )
+    check_arguments(population_unit=population_unit, max_speed=max_speed, probability=probability, every=every)
+    check_arguments(sample_flights=options["flights"])
     workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
     if out is not None:
         check_output_folder(Path(out), overwrite)

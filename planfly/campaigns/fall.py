@@ -38,16 +38,17 @@ def impact_points(position: Floats, velocity: Floats, drag: float, wind: Wind, t
     place, speed = position.astype(np.float64), velocity.astype(np.float64)
     start_ground = terrain.height(place[:, 0], place[:, 1])
     lowest_ground = float(np.nanmin(start_ground)) if np.isfinite(start_ground).any() else float(place[:, 2].min())
+    half_pull = np.array([0.0, 0.0, 0.5 * GRAVITY * _TIME_STEP_S])
     is_falling = np.ones(len(place), dtype=np.bool_)
     for _ in range(int(_MAX_FALL_S / _TIME_STEP_S)):
         rows = np.flatnonzero(is_falling)
         if not rows.size:
             break
         wind_velocity = np.column_stack([wind.velocities_at(place[rows, 2]), np.zeros(rows.size)])
-        airspeed = speed[rows] - wind_velocity
-        # The exact loss of speed by drag alone, and then that by gravity.
+        # Half of the step's gravity, the exact loss of speed by drag alone, and the other half.
+        airspeed = speed[rows] - wind_velocity - half_pull
         slowed = airspeed / (1.0 + drag * np.linalg.norm(airspeed, axis=1)[:, None] * _TIME_STEP_S)
-        new_speed = wind_velocity + slowed - [0.0, 0.0, GRAVITY * _TIME_STEP_S]
+        new_speed = wind_velocity + slowed - half_pull
         place[rows] += 0.5 * (speed[rows] + new_speed) * _TIME_STEP_S
         speed[rows] = new_speed
         ground = terrain.height(place[rows, 0], place[rows, 1])

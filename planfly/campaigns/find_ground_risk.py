@@ -320,16 +320,25 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     if scenario.terrain is None:
         message = f"{base.name}: heights above ground need an elevation file: name a terrain"
         raise ScenarioError(message, file=base.name, field="terrain")
-    path = _nominal_path(base)
+    path = nominal_path(base)
     if goal.population is not None:
         # A bad raster is refused before the flights.
         least_area = shapely.LineString(path).buffer(min_geography_half_width(aircraft.wing_span))
         read_population(goal.population, goal.unit, scenario.origin, least_area)
     rows = _fly_excursions(base, goal, path, workers, advance)
     glide_ratio = _best_glide_ratio(base) if goal.glide else None
-    result = _make_volumes(base, goal, path, rows, glide_ratio)
+    return with_ground_class(make_volumes(base, goal, path, rows, glide_ratio))
+
+
+def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
+    """Return a result with the population of its footprint and its ground risk class.
+
+    Raises PlanflyError for a population raster that cannot be used.
+    """
+    goal, aircraft = result.goal, result.aircraft
     if goal.population is not None:
-        population = read_population(goal.population, goal.unit, scenario.origin, result.footprint)
+        origin = result.base.scenario.origin
+        population = read_population(goal.population, goal.unit, origin, result.footprint)
         result = replace(result, population=population)
     if not result.is_judged:
         return result
@@ -340,7 +349,7 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     return replace(result, ground_class=found_class)
 
 
-def _nominal_path(base: CampaignBase) -> Floats:
+def nominal_path(base: CampaignBase) -> Floats:
     """Return the path of the flight without variations, m, (n, 2)."""
     track = fly_to_end(Flight(base.nominal_setup(), base.airframe.aircraft)).track
     if len(track) < 2:
@@ -381,24 +390,29 @@ def _best_glide_ratio(base: CampaignBase) -> float:
     aircraft, setup = base.airframe.aircraft, base.nominal_setup()
     model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())
     if not model.glides:
-        raise FlightError(f"{aircraft.name}: its model has no trim with the throttle closed, so its glide is unknown")
+        message = f"{aircraft.name}: its model has no trim with the throttle closed, so its glide is unknown"
+        raise FlightError(message, file=aircraft.name)
     altitude = float(setup.route.positions[0, 2])
     airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 20)
     return max(1.0 / float(glide_slopes(model, float(one), altitude, altitude + 1.0).table.min()) for one in airspeeds)
 
 
-def _make_volumes(
+def make_volumes(
     base: CampaignBase, goal: GroundRiskGoal, path: Floats, rows: tuple[ExcursionRow, ...], glide_ratio: float | None
 ) -> GroundRiskResult:
-    """Make the volumes from the rows of the flights."""
+    """Make the volumes from the rows of the flights.
+
+    path: path of the flight without variations, m, (n, 2).
+    glide_ratio: best glide ratio; None if glides are not asked for.
+    """
     aircraft = base.airframe.aircraft
+    if not all(math.isfinite(row.height) for row in rows):
+        message = f"{base.name}: no ground is known below some flights; name an elevation file that covers them"
+        raise ScenarioError(message, file=base.name, field="terrain")
     deviation, height = (
         float(np.quantile(values, goal.probability, method="median_unbiased"))
         for values in ([row.deviation for row in rows], [row.height for row in rows])
     )
-    if not math.isfinite(height):
-        message = f"{base.name}: no ground is known below the flights; name an elevation file that covers them"
-        raise ScenarioError(message, file=base.name, field="terrain")
     line = shapely.LineString(path)
     geography = line.buffer(max(deviation, min_geography_half_width(aircraft.wing_span)))
     flown_area = shapely.union_all([geography, *shapely.from_wkb([row.flown for row in rows])])

@@ -111,10 +111,24 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
 
 def table_text(result: GroundRiskResult) -> str:
     """Return the table for an application, as Markdown."""
+    table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in _table_rows(result))
+    conditions = "\n".join(f"- {line}" for line in (*flown_lines(result.base.conditions()), *_flight_lines(result)))
+    return (
+        f"# Ground risk of {result.base.name}\n\n{answer_line(result)}\n\n"
+        f"| quantity | value | source |\n|---|---|---|\n{table}\n\n"
+        "Larger values count: the operational volume holds the flown contingency volume and that by formula, and the"
+        " ground risk buffer holds the falls and the width by formula. Formulas: SORA 2.5, Annex A, with the values of"
+        " the guides of LBA and FOCA. Class: SORA 2.5, main body, table 2.\n\n"
+        f"## Flights\n\n{conditions}\n\n## What this is not\n\n{DISCLAIMER}\n"
+    )
+
+
+def _table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
+    """Return the rows of the table: quantity, value and source."""
     flown, formula, goal = result.flown, result.formula, result.goal
     span = result.aircraft.wing_span
-    flown_by = f"{_share_text(result)}"
-    rows = [
+    flown_by = _share_text(result)
+    return [
         ("**aircraft**", "", ""),
         ("aircraft", result.aircraft.title, ""),
         ("characteristic dimension CD", f"{span:g} m", "wing span"),
@@ -165,16 +179,6 @@ def table_text(result: GroundRiskResult) -> str:
             f"{count_text(len(result.base.scenario.zones), 'zone')} given, whatever their heights",
         ),
     ]
-    table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in rows)
-    conditions = "\n".join(f"- {line}" for line in (*flown_lines(result.base.conditions()), *_flight_lines(result)))
-    return (
-        f"# Ground risk of {result.base.name}\n\n{answer_line(result)}\n\n"
-        f"| quantity | value | source |\n|---|---|---|\n{table}\n\n"
-        "Larger values count: the operational volume holds the flown contingency volume and that by formula, and the"
-        " ground risk buffer holds the falls and the width by formula. Formulas: SORA 2.5, Annex A, with the values of"
-        " the guides of LBA and FOCA. Class: SORA 2.5, main body, table 2.\n\n"
-        f"## Flights\n\n{conditions}\n\n## What this is not\n\n{DISCLAIMER}\n"
-    )
 
 
 def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
