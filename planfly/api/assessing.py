@@ -30,7 +30,7 @@ def ground_risk(
     max_speed: float | None = None,
     probability: float = 0.95,
     glide: bool = False,
-    every: float = 30.0,
+    every: float = 10.0,
     out: str | Path | None = None,
     overwrite: bool = True,
     **options: Unpack[SampleOptions],

@@ -6,6 +6,7 @@ holds a fraction of the flights; contingency volume and ground risk buffer hold 
 volumes by the formulas of SORA's annex A.
 """
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -49,8 +50,10 @@ from world.population import Population, PopulationUnit, read_population
 from world.terrain import Terrain
 from world.wind import Wind
 
-# Time between the positions of a flight or a return from which falls begin, s.
+# Time between the positions of a flight from which falls begin, s.
 _SAMPLE_INTERVAL_S = 1.0
+# Number of seconds between the positions of a return from which falls begin.
+_RETURN_SAMPLE_ROWS = 5
 # Deviation of a simplified outline, m.
 _OUTLINE_TOLERANCE_M = 0.5
 # End reason of a flight that flew its mission to the end.
@@ -73,7 +76,7 @@ class GroundRiskGoal:
 
     probability: float = 0.95
     flights: int = 100
-    interval: float = 30.0
+    interval: float = 10.0
     glide: bool = False
     speed: float | None = None
     controlled: bool = False
@@ -125,14 +128,15 @@ def fly_for_excursions(
     if len(flown.track) < 2 or terrain is None:
         return row
     positions, velocities = _sampled_flight(flown.track)
-    tracks, circles, glides = _return_paths(setup, flown.track, interval, glide=glide)
+    paths = _return_paths(setup, flown.track, interval, glide=glide)
     airframe = varied.airframe.aircraft
-    sampled = [(positions, velocities), *((path_of, _path_velocities(path_of)) for path_of in tracks)]
-    areas = [_fall_area(*each, airframe, setup.scenario.wind, terrain) for each in sampled]
-    lines = [shapely.LineString(each[:, :2]) for each, _ in sampled]
+    sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
     half_span = 0.5 * airframe.wing_span
-    flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *circles])
-    fallen_area = shapely.union_all([*areas, *shapely.buffer([shapely.LineString(one[:, :2]) for one in glides], 1.0)])
+    lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
+    flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *paths.loiters, *_areas_between(paths.returns)])
+    falls = _fall_areas(sampled, airframe, setup.scenario.wind, terrain)
+    glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
+    fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
     distances = shapely.distance(shapely.points(positions[:, :2]), shapely.LineString(path))
     return replace(
@@ -140,7 +144,7 @@ def fly_for_excursions(
         duration=float(flown.track.time[-1]),
         deviation=float(distances.max()),
         height=height,
-        return_height=max([height, *(_largest_height(each, terrain) for each in tracks)]),
+        return_height=max([height, *(_largest_height(each, terrain) for each in paths.returns)]),
         ground_speed=float(np.hypot(velocities[:, 0], velocities[:, 1]).max()),
         flown=shapely.to_wkb(flown_area.simplify(_OUTLINE_TOLERANCE_M)),
         fallen=shapely.to_wkb(fallen_area.buffer(half_span).simplify(_OUTLINE_TOLERANCE_M)),
@@ -158,27 +162,41 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats]:
     return track.position[kept], track.velocity[kept].astype(np.float64)
 
 
-def _path_velocities(path: Floats) -> Floats:
-    """Return the velocities along a return, whose positions are a second apart, m/s, (n, 3)."""
-    return np.gradient(path, axis=0)
+def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
+    """Return positions and ground velocities of a return with a position each second, m and m/s, (n, 3) each."""
+    rows = np.union1d(np.arange(0, len(path), _RETURN_SAMPLE_ROWS), [len(path) - 1])
+    return path[rows], np.gradient(path, axis=0)[rows]
 
 
-def _return_paths(
-    setup: FlightSetup, track: Track, interval: float, *, glide: bool
-) -> tuple[list[Floats], list[BaseGeometry], list[Floats]]:
-    """Return the paths of the returns from a track, their loiters, and the paths of the glides to the ground."""
+class _ReturnPaths(NamedTuple):
+    """Paths of the returns from a flight, in order of their starts.
+
+    returns: positions, m, (n, 3) each.
+    loiters: areas of their loiters, m.
+    glides: paths of glides to the ground, m, (n, 3) each.
+    """
+
+    returns: list[Floats]
+    loiters: list[BaseGeometry]
+    glides: list[Floats]
+
+
+def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: bool) -> _ReturnPaths:
+    """Return the paths of the returns from a track; none without a home.
+
+    interval: time between two returns, s.
+    glide: True to simulate the returns without an engine, too.
+    """
+    none = _ReturnPaths([], [], [])
     if setup.mission.home is None:
-        return [], [], []
+        return none
     world, starts = make_return_world(setup), flown_starts(setup, track, interval)
     if not len(starts):
-        return [], [], []
+        return none
     targets = [world.target(row) for row in starts.rows]
     _, paths = simulate_returns(world, starts, targets, store_paths=True)
     radius = abs(ArduPlane(world.parameters).returns.rules.radius)
-    circles = [
-        shapely.Point(target.position[:2]).buffer(radius)
-        for target in {target.position[:2]: target for target in targets if not target.straight}.values()
-    ]
+    positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
         gliding = fly_without_engine(world, starts, targets, store_paths=True)
@@ -187,16 +205,34 @@ def _return_paths(
             for one, result in zip(gliding.tracks, gliding.results, strict=True)
             if len(one) > 1 and result["outcome"] == RETURN_GROUND_IMPACT
         ]
-    return [path for path in paths if len(path) > 1], circles, glides
+    loiters = [shapely.Point(position).buffer(radius) for position in positions]
+    return _ReturnPaths([path for path in paths if len(path) > 1], loiters, glides)
 
 
-def _fall_area(positions: Floats, velocities: Floats, aircraft: Aircraft, wind: Wind, terrain: Terrain) -> BaseGeometry:
-    """Return the area on which an aircraft can fall from a path: the hull of each piece and its impacts."""
+def _areas_between(paths: list[Floats]) -> list[BaseGeometry]:
+    """Return the areas between neighbouring returns: a return may begin at any time between theirs."""
+    lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
+    rings = [np.concatenate([one, other[::-1]]) for one, other in itertools.pairwise(lines)]
+    return [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
+
+
+def _fall_areas(
+    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind: Wind, terrain: Terrain
+) -> list[BaseGeometry]:
+    """Return the areas on which an aircraft can fall from paths: the hull of each piece of a path and its impacts.
+
+    sampled: positions and velocities of each path, m and m/s, (n, 3) each.
+    """
+    positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
     impacts = [impact_points(positions, velocities, drag, wind, terrain) for drag in (0.0, plate_drag(aircraft))]
     points = np.stack([positions[:, :2], *impacts], axis=1)
-    corners = np.concatenate([points[:-1], points[1:]], axis=1)
-    hulls = shapely.convex_hull(shapely.multipoints(shapely.points(corners)))
-    return shapely.union_all(hulls)
+    ends = np.cumsum([len(each) for each, _ in sampled])[:-1]
+    areas = []
+    for part in np.split(points, ends):
+        corners = np.concatenate([part[:-1], part[1:]], axis=1)
+        hulls = shapely.convex_hull(shapely.multipoints(shapely.points(corners)))
+        areas.append(shapely.union_all(hulls))
+    return areas
 
 
 def _largest_height(positions: Floats, terrain: Terrain) -> float:

@@ -106,6 +106,11 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
             f"flights reach {ground_speed:.1f} m/s over the ground, more than the highest speed of"
             f" {result.speed:g} m/s in the formulas (--max-speed)"
         )
+    spread = result.base.dispersions.name
+    lines.append(
+        f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}; returns to launch by"
+        f" ArduPlane's law every {result.goal.interval:g} s"
+    )
     return lines
 
 

@@ -45,7 +45,7 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     for name, unit, text in (
         ("max_speed", "M/S", "highest speed of the aircraft (default: the highest airspeed of its model)"),
         ("probability", "P", "fraction of the flights that the flight geography holds (default: 0.95)"),
-        ("every", "S", "time between two returns, s (default: 30)"),
+        ("every", "S", "time between two returns, s (default: 10)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(

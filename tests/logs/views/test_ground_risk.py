@@ -69,9 +69,10 @@ def test_geojson_reads_back(setup: FlightSetup) -> None:
     for feature, volume in zip(document["features"], VOLUMES, strict=True):
         shape = shapely.geometry.shape(feature["geometry"])
         assert shape.is_valid
-        # Degrees have 7 decimals, 1 cm along an outline of 3.5 km.  RFC 7946: the outline counter-clockwise, its holes clockwise.
+        # RFC 7946: the outline counter-clockwise, its holes clockwise.
         assert shape.geoms[0].exterior.is_ccw
         assert not any(ring.is_ccw for ring in shape.geoms[0].interiors)
+        # Degrees have 7 decimals, 1 cm along an outline of 3.5 km.
         assert shapely.transform(shape, to_plane).symmetric_difference(volume.area).area < 35.0
 
 

@@ -211,3 +211,12 @@ def test_glides_reach_the_ground_beyond_the_flight(base: CampaignBase, path: np.
     without = shapely.from_wkb(fly_for_excursions(base, 0, path=path, interval=30.0, glide=False).fallen)
     with_glides = shapely.from_wkb(fly_for_excursions(base, 0, path=path, interval=30.0, glide=True).fallen)
     assert with_glides.area > without.area
+
+
+def test_the_area_between_two_returns_is_flown_over(base: CampaignBase, path: np.ndarray) -> None:
+    """Returns every 10 s and every 2.5 s sweep nearly the same area, because one may begin at any time between two."""
+    rare, frequent = (
+        shapely.from_wkb(fly_for_excursions(base, 0, path=path, interval=interval, glide=False).flown)
+        for interval in (10.0, 2.5)
+    )
+    assert rare.area > 0.85 * frequent.area
