@@ -133,7 +133,7 @@ def fly_for_excursions(
     sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
     half_span = 0.5 * airframe.wing_span
     lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
-    flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *paths.loiters, *_areas_between(paths.returns)])
+    flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns)])
     falls = _fall_areas(sampled, airframe, setup.scenario.wind, terrain)
     glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
@@ -209,7 +209,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     return _ReturnPaths([path for path in paths if len(path) > 1], loiters, glides)
 
 
-def _areas_between(paths: list[Floats]) -> list[BaseGeometry]:
+def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
     """Return the areas between neighbouring returns: a return may begin at any time between theirs."""
     lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
     rings = [np.concatenate([one, other[::-1]]) for one, other in itertools.pairwise(lines)]

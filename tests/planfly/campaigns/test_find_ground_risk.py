@@ -14,6 +14,7 @@ from planfly.campaigns.find_ground_risk import (
     ExcursionRow,
     GroundRiskGoal,
     GroundRiskResult,
+    areas_between,
     fly_for_excursions,
     make_volumes,
     nominal_path,
@@ -213,10 +214,15 @@ def test_glides_reach_the_ground_beyond_the_flight(base: CampaignBase, path: np.
     assert with_glides.area > without.area
 
 
-def test_the_area_between_two_returns_is_flown_over(base: CampaignBase, path: np.ndarray) -> None:
-    """Returns every 10 s and every 2.5 s sweep nearly the same area, because one may begin at any time between two."""
-    rare, frequent = (
-        shapely.from_wkb(fly_for_excursions(base, 0, path=path, interval=interval, glide=False).flown)
-        for interval in (10.0, 2.5)
-    )
-    assert rare.area > 0.85 * frequent.area
+def test_the_area_between_two_returns_counts() -> None:
+    """Two returns from places 100 m apart to a home 1,000 m away, and a third that crosses the second."""
+    home = [1000.0, 0.0, 50.0]
+    first, second = np.array([[0.0, 0.0, 90.0], home]), np.array([[0.0, 100.0, 90.0], home])
+    (between,) = areas_between([first, second])
+    assert between.area == pytest.approx(50_000.0)
+    third = np.array([[0.0, 0.0, 90.0], [500.0, 100.0, 90.0], home])
+    crossed = areas_between([first, second, third])[1]
+    # The lines meet at east 333.3 m, north 66.7 m: triangles with bases of 100 m and of the rest on either side.
+    assert crossed.is_valid
+    assert crossed.contains(shapely.Point(10.0, 50.0))
+    assert crossed.contains(shapely.Point(500.0, 75.0))
