@@ -120,6 +120,7 @@ def export(
     autopilot: str | None = None,
     scenario: str | Path | None = None,
     params: str | Path | None = None,
+    aircraft: str | Path | None = None,
     overwrite: bool = False,
 ) -> ExportedFiles:
     """Write a plan, a mission or a flight in the formats that the suffixes of the files name.
@@ -130,6 +131,7 @@ def export(
     fence: files of fences or zones in addition to those of the source.
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
     scenario: scenario of a mission or plan, as for `planfly.fly`.
+    aircraft: a name, or a folder: the aircraft whose cruise speed a .plan states, and to which the parameters apply.
     autopilot, params: the autopilot, or a parameter file of it, that a .plan is for (its firmwareType), and with whose
     values a mission or plan is judged for a .parm; None for the autopilot of the source.
     overwrite: True replaces existing files.
@@ -151,7 +153,9 @@ def export(
             if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
                 _check_suffix(target)
             check_output_file(target, overwrite, path)
-        options = MissionOptions(fence=fence, at=at, scenario=scenario, autopilot=autopilot, params=params)
+        options = MissionOptions(
+            fence=fence, at=at, scenario=scenario, autopilot=autopilot, params=params, aircraft=aircraft
+        )
         source_content = _read_source(path, targets, options)
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, chosen_autopilot, fence)
@@ -254,12 +258,13 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
         if options["fence"]:
             allowed = "a log is exported with the fence that it was flown with"
             raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
-        for name in ("scenario", "autopilot", "params"):
+        for name in ("scenario", "autopilot", "params", "aircraft"):
             if (value := options.get(name)) is not None:
                 allowed = f"a log is exported with the {name} that it was flown with"
                 raise MissionError.of_argument(name, value, allowed, file=path)
         return _read_log(path, needs_returns=_needs_kml(targets))
-    if not any(target.suffix.lower() in PARAMETER_SUFFIXES for target in targets):
+    has_aircraft = options.get("aircraft") is not None
+    if not has_aircraft and not any(target.suffix.lower() in PARAMETER_SUFFIXES for target in targets):
         # Only the parameters of a .parm file need the autopilot itself; a .plan states its name.
         options = options | {"autopilot": None, "params": None}
     for target in targets:
@@ -267,7 +272,9 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
         if suffix.lower() in LOG_SUFFIXES:
             message = f"{target}: {suffix} is written only from a flight log (.mcap), which {path} is not"
             raise MissionError(message, file=target, field="suffix", value=suffix)
-    needs_world = any(target.suffix.lower() in (*MAP_WRITERS, *PARAMETER_SUFFIXES) for target in targets)
+    needs_world = has_aircraft or any(
+        target.suffix.lower() in (*MAP_WRITERS, *PARAMETER_SUFFIXES) for target in targets
+    )
     return _read_mission(path, options, needs_world=needs_world, needs_returns=_needs_kml(targets))
 
 
@@ -390,7 +397,7 @@ def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
     if source.airspeed is not None:
         return source.airspeed, f"that of {source.aircraft}"
     aircraft = load_aircraft(FlightTable().aircraft)
-    return aircraft.airspeed, f"that of the default aircraft {aircraft.name}; --scenario names yours"
+    return aircraft.airspeed, f"that of the default aircraft {aircraft.name}; --aircraft names yours"
 
 
 def judging_parameters_text(

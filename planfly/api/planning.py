@@ -14,6 +14,7 @@ from logs.verdict.conditions import Conditions, plan_conditions
 from planfly.arguments import check_arguments
 from planfly.flight_options import PlanOptions, load_scenario_with_options, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING
+from planfly.planning.expected_failures import expected_failures
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_airframe
@@ -251,6 +252,14 @@ def conditions_of_plan(plan: Plan) -> Conditions:
     aircraft, _ = find_aircraft_and_energy(plan.scenario)
     autopilot = load_autopilot(plan.scenario, aircraft)
     return plan_conditions(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
+
+
+def failures_to_expect(plan: Plan) -> tuple[str, ...]:
+    """Return the known causes for which more than one of twenty dispersed flights of a safe plan is expected to fail.
+
+    Each is one line with what would help; the result is empty for a plan that is not safe.
+    """
+    return expected_failures(plan, load_airframe(plan.scenario)) if plan.safe else ()
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:

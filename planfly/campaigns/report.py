@@ -614,9 +614,12 @@ def _boundary_line(winds: WindsResult) -> str:
 def wind_lines(winds: WindsResult) -> list[str]:
     """Return the result of a search for winds as a few lines of text."""
     percent = f"{100 * winds.goal.confidence:g} %"
+    answer_lines = [*_unsettled_lines(winds), _boundary_line(winds)]
+    if winds_answer(winds) == "not flyable":
+        # Failures in calm air answer the question, whatever the directions show.
+        answer_lines.reverse()
     return [
-        *_unsettled_lines(winds),
-        _boundary_line(winds),
+        *answer_lines,
         *_calm_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *_deciding_lines(winds),

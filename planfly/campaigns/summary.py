@@ -330,12 +330,17 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     if summary.lost:
         lost_text = ", ".join(map(str, summary.lost[:10]))
         lines.append(f"  lost    {len(summary.lost)} could not be flown because their workers died: {lost_text}")
-    if summary.deciding and summary.low_margin is not None:
-        lines.append(
-            f"  decides {RULE_WORDS[summary.deciding].title}: one flight in twenty has a margin below"
-            f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
-        )
-    return lines
+    return lines + deciding_lines(summary)
+
+
+def deciding_lines(summary: CampaignSummary) -> list[str]:
+    """Return the line on the margin of the deciding rule and on what it depends on; [] if no margin is known."""
+    if not summary.deciding or summary.low_margin is None:
+        return []
+    return [
+        f"  decides {RULE_WORDS[summary.deciding].title}: one flight in twenty has a margin below"
+        f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
+    ]
 
 
 def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:

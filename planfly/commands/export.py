@@ -4,7 +4,13 @@ import argparse
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import MISSION_SUFFIXES, complete_scenario, file_completer, with_completer
+from planfly.terminal.arguments import (
+    MISSION_SUFFIXES,
+    complete_aircraft,
+    complete_scenario,
+    file_completer,
+    with_completer,
+)
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
 from planfly.terminal.options import add_fence_option, add_result_options, add_time_option
@@ -49,6 +55,13 @@ def add_export_parser(command_line: LineParser) -> None:
         "--params", metavar="FILE", help="parameter file of the autopilot; a .parm contains its values"
     )
     with_completer(option, file_completer("param", "parm", "params"))
+    aircraft_option = group.add_argument(
+        "--aircraft",
+        metavar="AIRCRAFT",
+        help="aircraft of the mission, whose cruise speed a .plan states and whose parameters a .parm completes"
+        " (default: aerosonde)",
+    )
+    with_completer(aircraft_option, complete_aircraft)
     add_fence_option(parser)
     add_time_option(parser)
     add_result_options(parser)
@@ -56,7 +69,8 @@ def add_export_parser(command_line: LineParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; return 3 for an incomplete log."""
-    options = {name: getattr(args, name) for name in ("fence", "at", "scenario", "autopilot", "params", "overwrite")}
+    names = ("fence", "at", "scenario", "autopilot", "params", "aircraft", "overwrite")
+    options = {name: getattr(args, name) for name in names}
     result = planfly.export(args.source, *args.files, **options)
     print_warnings(result.notes)
     for file, content in zip(result.files, result.contents, strict=True):

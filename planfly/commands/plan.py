@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import file_completer, number_parser, parse_budget, parse_threat, with_completer
 from planfly.terminal.command_parser import LineParser
+from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import (
     add_aircraft_and_wind_options,
     add_autopilot_options,
+    add_flights_option,
     add_result_options,
     add_scenario_argument,
     call_api,
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from planfly import Plan
+    from planfly.terminal.answers import DispersedFlights
 
 
 def add_plan_parser(command_line: LineParser) -> None:
@@ -67,6 +70,7 @@ def add_plan_parser(command_line: LineParser) -> None:
             "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
         ),
     )
+    add_flights_option(planning_group)
     replanning_group = parser.add_group("planning again in flight")
     with_completer(
         replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
@@ -98,8 +102,9 @@ def _algorithms_help() -> str:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan a path, and write the plan file; return 4 if the plan is not safe."""
+    """Plan a path, and write the plan file; return 4 if the plan is not safe, or does not hold in its flights."""
     _check_replanning(args)
+    check_flights_option(args, "front")
     if args.front is not None:
         return _plan_front(args)
     name = "plan.json" if args.old is None else "replan.json"
@@ -115,12 +120,16 @@ def plan(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None,
             stop=should_stop,
         )
+    from planfly.api.planning import failures_to_expect
+
     target = expand_path_pattern(out, new_plan.scenario.name, new_plan.seed)
     print_warnings(new_plan.scenario.notes)
-    _print_plan(new_plan)
+    risks = failures_to_expect(new_plan)
+    _print_plan(new_plan, risks, is_dispersed=args.flights is not None)
     print(f"plan      {target}")
-    code = FLYABLE if new_plan.safe else NOT_FLYABLE
-    write_json_if_requested(args, lambda: _json_answer(new_plan, target, code))
+    dispersed = fly_dispersed(args, new_plan) if new_plan.feasible else None
+    code = FLYABLE if new_plan.safe and (dispersed is None or dispersed.holds) else NOT_FLYABLE
+    write_json_if_requested(args, lambda: _json_answer(new_plan, target, code, risks, dispersed))
     return code
 
 
@@ -156,7 +165,9 @@ def _plan_front(args: argparse.Namespace) -> int:
     return code
 
 
-def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
+def _json_answer(
+    plan: "Plan", target: "Path", code: int, risks: tuple[str, ...], dispersed: "DispersedFlights | None"
+) -> object:
     """Return the answer of the command for --json."""
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
@@ -174,6 +185,8 @@ def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
         evaluations=plan.evaluations,
         ended=plan.ended,
         problems=list(plan.certificate.problems),
+        expected_failures=list(risks),
+        dispersed=dispersed,
         conditions=conditions_of_plan(plan),
     )
 
@@ -208,8 +221,12 @@ def _check_replanning(args: argparse.Namespace) -> None:
         raise ScenarioError.of_argument("old", args.old, allowed, shown="")
 
 
-def _print_plan(plan: "Plan") -> None:
-    """Print the properties of a plan."""
+def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> None:
+    """Print the properties of a plan.
+
+    risks: known causes of failures in dispersed flights.
+    is_dispersed: True if such flights follow.
+    """
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.planning import conditions_of_plan
 
@@ -218,6 +235,8 @@ def _print_plan(plan: "Plan") -> None:
     print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
     conditions = conditions_of_plan(plan)
     print("\n".join([*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]))
+    if plan.feasible and not is_dispersed:
+        print("Judged: in the stated wind and over the heights of the map, not over dispersions (--flights 40)")
     if plan.ended != "completed":
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
         print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")
@@ -228,5 +247,5 @@ def _print_plan(plan: "Plan") -> None:
         )
     for problem in plan.certificate.problems:
         print(f"  failed  {problem}")
-    for obstacle in planfly.what_blocks(plan):
-        print(f"  note    {obstacle}")
+    for note in (*planfly.what_blocks(plan), *risks):
+        print(f"  note    {note}")

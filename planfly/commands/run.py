@@ -1,14 +1,17 @@
 """``planfly run``: plan, fly, judge and report into one folder, once or in rounds."""
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import planfly
 from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import verdict_code
+from planfly.terminal.dispersed_flights import check_flights_option, fly_dispersed
+from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import (
     add_flight_options,
+    add_flights_option,
     add_log_rate_option,
     add_result_options,
     add_scenario_argument,
@@ -19,7 +22,8 @@ from planfly.terminal.output import write_json_if_requested, write_junit_if_requ
 from planfly.terminal.results import print_engine, print_returns_line, print_verdict
 
 if TYPE_CHECKING:
-    from planfly import Round, RunResult
+    from planfly import Plan, Round, RunResult
+    from planfly.terminal.answers import DispersedFlights
 
 
 def add_run_parser(command_line: LineParser) -> None:
@@ -47,6 +51,7 @@ def add_run_parser(command_line: LineParser) -> None:
         default=0,
         help="if the plan is not flyable, tighten the limits and plan again, up to N times (default: 0)",
     )
+    add_flights_option(planning)
     add_terrain_option(planning)
     add_flight_options(parser)
     add_log_rate_option(parser.add_group("the log"))
@@ -56,17 +61,30 @@ def add_run_parser(command_line: LineParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``."""
+    """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``.
+
+    Returns the code of the verdict, or 4 if the plan does not hold in the flights of ``--flights N``.
+    """
+    check_flights_option(args, "sitl")
     result = call_api(planfly.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)
-    code = verdict_code(result.verdict)
-    write_json_if_requested(args, lambda: _json_answer(result, bool(args.refine), code))
+    dispersed = fly_dispersed(args, _last_plan(result)) if args.flights and result.rounds[-1].flown else None
+    code = verdict_code(result.verdict) if dispersed is None or dispersed.holds else NOT_FLYABLE
+    write_json_if_requested(args, lambda: _json_answer(result, bool(args.refine), code, dispersed))
     write_junit_if_requested(args, {result.scenario: result.verdict})
     return code
 
 
-def _json_answer(result: "RunResult", has_rounds: bool, code: int) -> object:
+def _last_plan(result: "RunResult") -> "Plan":
+    """Read the plan of the last round, in the scenario without the limits that were tightened for it."""
+    from planner.plan import read_plan
+
+    first, last = (read_plan(one.folder / "plan.json") for one in (result.rounds[0], result.rounds[-1]))
+    return replace(last, scenario=first.scenario)
+
+
+def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "DispersedFlights | None") -> object:
     """Return the answer of the command for --json."""
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
@@ -84,6 +102,7 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int) -> object:
         files=[file.name for file in result.files],
         rounds=rounds if has_rounds else [],
         verdict=result.verdict.document(),
+        dispersed=dispersed,
     )
 
 

@@ -162,6 +162,25 @@ class FailedRule:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class DispersedFlights:
+    """Flights of a finished plan with the default dispersions (``--flights N``)."""
+
+    flights: int
+    flyable: int
+    probability: float
+    """Fraction of flyable flights."""
+    interval: list[float]
+    """Two-sided interval of the probability at 95 %."""
+    holds: bool
+    """False if the upper end of the interval is below 0.95."""
+    deciding_rule: str
+    """Rule that most flights failed, or with the smallest margin if none failed."""
+    failed_by_rule: list[FailedRule]
+    remedies: list[str]
+    """What would raise the probability."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SensitivityEntry:
     """Fraction of the deciding margin's variance that a quantity explains."""
 
@@ -309,6 +328,8 @@ class RunAnswer:
     rounds: list[RoundAnswer]
     """With --refine: each round; the results of the last round are in the folder itself."""
     verdict: VerdictDocument
+    dispersed: DispersedFlights | None
+    """With --flights: dispersed flights of the plan; null without, or if there is no feasible plan."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic.dataclasses import dataclass
 
 from logs.verdict.conditions import Conditions
+from planfly.terminal.answers import DispersedFlights
 from planfly.terminal.verdict_answers import STRICT
 from world.wording import count_text
 
@@ -34,6 +35,10 @@ class PlanAnswer:
     """Reason for the end of the search: completed, budget or interrupted."""
     problems: list[str]
     """Reasons why the plan is not feasible."""
+    expected_failures: list[str]
+    """Known causes for which more than one of twenty dispersed flights of a safe plan is expected to fail."""
+    dispersed: DispersedFlights | None
+    """With --flights: dispersed flights of the plan; null without, or if the plan is not feasible."""
     conditions: Conditions
     """Conditions for which the plan was made."""
 

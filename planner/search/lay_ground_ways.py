@@ -57,6 +57,20 @@ _FIRST_LEG_FACTOR_AND_M = (1.05, 30.0)
 _FIRST_LEG_FACTORS = (1.0, 1.7)
 # Fraction of the climb at which a take-off is complete; the rest of the leg must hold the turn at its end.
 _TAKEOFF_DONE_FRACTION = 0.8
+# Slope relative to the air of a slow take-off, with the minimum pitch of 12 degrees and the default dispersions: 52 of
+# 60 take-offs of four aircraft were at least as steep.
+_SLOW_TAKEOFF_SLOPE = 0.16
+# Drift of a take-off, which holds its heading: a fraction of the crosswind times the time of the climb.  The same
+# take-offs drifted by 0.4 to 0.9 of it where the crosswind was above 3 m/s.
+_DRIFT_FRACTION = 0.8
+# Standard deviation of the forecast's wind speed, m/s: 2.5 m/s in 80 % of cases (ICAO Annex 3, Attachment B).
+_WIND_FORECAST_ERROR_MPS = 1.95
+# Standard deviation of the heights of an elevation file, m: 9.0 m at 90 % in North America (Rodriguez et al.,
+# JPL D-31639, 2005), divided by 1.645.
+MAP_HEIGHT_SD_M = 5.5
+# Error of these heights that an approach allows for, in standard deviations: the ground is higher in one case of
+# twenty.
+_MAP_HEIGHT_SIGMAS = 1.645
 # Distance from home within which terrain is ignored, m (LAUNCH_RUN of the verdict).
 _LAUNCH_RUN_M = 50.0
 # Required height above ground beyond this distance, as a fraction of the height climbed; at most the clearance.
@@ -138,7 +152,10 @@ def add_departure_and_approach(
         climb, reason = _find_departure(site, scenario.launch)
         problems += [f"climb-out: {reason}"] if reason else []
     if scenario.landing is not None:
-        descent, reason = _find_approach(site, scenario.landing, final_model)
+        careful_site = _make_site(plan, _with_map_error(limits), scenario.home, scenario.terrain)
+        descent, reason = _find_approach(careful_site, scenario.landing, final_model)
+        if descent is None:
+            descent, reason = _find_approach(site, scenario.landing, final_model)
         problems += [f"landing: {reason}"] if reason else []
     certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
     return replace(plan, ways=DepartureAndApproach(climb, descent), certificate=certificate)
@@ -268,6 +285,16 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     return _Site(plan, algorithm_limits, home, terrain, problem, low_problem, turn_radius, turn_lengths)
 
 
+def _with_map_error(limits: Limits) -> Limits:
+    """Return limits with a height reserved for the error of the elevation file.
+
+    It is independent of the autopilot's altitude error, for which the limits have a margin already.
+    """
+    altitude_error = 0.0 if limits.tracking is None else limits.tracking.up
+    added_height = math.hypot(altitude_error, _MAP_HEIGHT_SIGMAS * MAP_HEIGHT_SD_M) - altitude_error
+    return replace(limits, reserve_height=limits.reserve_height + added_height)
+
+
 def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[float]:
     """Interpolate the turn lengths of a tracking error, m, at a ratio of ground speed to airspeed."""
     return [float(np.interp(speed_ratio, SPEED_RATIOS, row)) for row in length_table]
@@ -383,11 +410,22 @@ def _make_departure(
 
 
 class _Launch(NamedTuple):
-    """Launch: course (rad), point where the take-off is complete, and end of the first leg."""
+    """Launch: course (rad), point where the take-off is complete, and end of the first leg.
+
+    drifted_ends: points where a slow take-off is complete in the least and in the most crosswind to be expected.
+    """
 
     course: float
     takeoff_end: MapPoint
     end: MapPoint
+    drifted_ends: tuple[MapPoint, ...]
+
+    def fits(self, points: Sequence[MapPoint], turn_lengths: TurnLengths) -> bool:
+        """Return True if what a drifted take-off leaves of the first leg holds the turn at the end of that leg.
+
+        points: home, end of the first leg, and the points after it.
+        """
+        return all(measure_path([end, *points[1:4]], turn_lengths).fits for end in self.drifted_ends)
 
 
 def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
@@ -432,15 +470,34 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
             if obstacle:
                 best_rejected = max(best_rejected, (-1e6, f"{direction} it is {obstacle}"))
                 break
-            launches.append(
-                _Launch(course, (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north), end)
-            )
+            takeoff_end = (home[0] + takeoff_distance * east, home[1] + takeoff_distance * north)
+            launches.append(_Launch(course, takeoff_end, end, _drifted_ends(site, course, takeoff_height)))
     subject = "the launch course is" if launch.course is not None else f"none of {len(courses)} launch courses is"
     negation = "" if launch.course is None else "not "
     return (
         launches,
         f"{subject} {negation}clear of ground, missiles and zones at {SLOPE_FRACTION:.0%} of the "
         f"steepest climb: {best_rejected[1]}",
+    )
+
+
+def _drifted_ends(site: _Site, course: float, takeoff_height: float) -> tuple[MapPoint, ...]:
+    """Return the points where a slow take-off is complete in the least and in the most crosswind to be expected.
+
+    course: launch course, rad.
+    takeoff_height: height above home at the end of the take-off, m.
+    """
+    tailwind, crosswind = site.scenario.wind.components_on_course(course, float(site.home[2]))
+    climb_time = takeoff_height / (_SLOW_TAKEOFF_SLOPE * site.limits.airspeed)
+    distance = climb_time * max(1.0, site.limits.airspeed + tailwind)
+    east, north = math.sin(course), math.cos(course)
+    drifts = [
+        _DRIFT_FRACTION * climb_time * (crosswind + error)
+        for error in (-_WIND_FORECAST_ERROR_MPS, _WIND_FORECAST_ERROR_MPS)
+    ]
+    return tuple(
+        (site.home[0] + distance * east + drift * north, site.home[1] + distance * north - drift * east)
+        for drift in drifts
     )
 
 
@@ -456,15 +513,17 @@ def _list_departures(
     end, home = (float(first_waypoint[0]), float(first_waypoint[1])), (float(site.home[0]), float(site.home[1]))
     next_point = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
     min_length = site.min_path_length(float(first_waypoint[2] - site.home[2]), False) + math.dist(end, next_point)
-    for course, takeoff_end, first_leg_end in launches:
+    for launch in launches:
+        course, takeoff_end = launch.course, launch.takeoff_end
         tailwind = site.scenario.wind.components_on_course(course, float(site.home[2]))[0]
-        for corners in candidate_chains(first_leg_end, course, end, next_course, site.turn_radius, laps):
-            points = [home, first_leg_end, *corners, end]
+        for corners in candidate_chains(launch.end, course, end, next_course, site.turn_radius, laps):
+            points = [home, launch.end, *corners, end]
             measures, takeoff_distance = (
                 measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths),
                 math.dist(home, takeoff_end),
             )
-            if measures.fits and takeoff_distance + measures.length >= min_length:
+            is_long_enough = measures.fits and takeoff_distance + measures.length >= min_length
+            if is_long_enough and launch.fits([*points, next_point], site.turn_lengths):
                 yield (
                     takeoff_distance + measures.cost + (_TAILWIND_COST_M if tailwind > _MAX_TAILWIND_MPS else 0.0),
                     course,

@@ -49,6 +49,8 @@ RENAMED = {
     ("report", "layout"): ("foxglove_layout", "file"),
     ("replay", "movie"): ("movie", "out"),
     ("campaign", "refly"): ("campaign_flight", "index"),
+    ("plan", "flights"): ("campaign", "flights"),
+    ("run", "flights"): ("campaign", "flights"),
 }
 # What only a terminal has, and what Python has in `Verdict.to_junit`; of a replay, how the timeline is printed, and
 # that another function is meant; of a check and a battery, whether the file of --json is replaced.

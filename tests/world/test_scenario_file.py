@@ -79,7 +79,7 @@ def test_missing_and_unreadable_files(tmp_path: Path, monkeypatch: pytest.Monkey
         load_scenario(str(tmp_path / "none.toml"))
     with pytest.raises(ScenarioError, match="no such file"):
         load_scenario("x" * 5000)
-    with pytest.raises(ScenarioError, match="cannot be read"):
+    with pytest.raises(ScenarioError, match="is a folder; expected a scenario file"):
         load_scenario(str(tmp_path))
     (tmp_path / "big.toml").write_bytes(b"#" * (16 * 2**20 + 1))
     with pytest.raises(ScenarioError, match="a scenario file has at most 16,777,216"):

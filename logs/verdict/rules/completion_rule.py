@@ -39,7 +39,6 @@ def completion_findings(
         if flown_count < leg_count:
             faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown"))
         faults += _record_faults(aligned)
-    notes = "; ".join(requirements.setup.route.notes)
     reason = (
         finding_reason(faults) if faults else f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
     )
@@ -48,7 +47,7 @@ def completion_findings(
             "completion",
             FLIGHT,
             ok=not faults,
-            reason=reason + (f" (not flown as written: {notes})" if notes else ""),
+            reason=reason,
             faults=faults,
             planned=leg_count,
             flown=flown_count,

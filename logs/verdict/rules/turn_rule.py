@@ -65,22 +65,28 @@ def _turn_finding(
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
+    # If the aircraft's limits are known, the planned turn is judged by them, and the flown turn is only described.
+    is_judged_as_planned = measure is None or bool(requirements.envelope)
+    judged_turn: float | None = planned_turn
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink_distance(requirements, i)
         if lateral is None:
             # The message already states the turn and its limit.
             faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []
         else:
+            judged_turn = None
             facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
     facts += _fly_over_notes(requirements, i, planned_turn)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
-        angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
+        angle = measure.angle
+        if not is_judged_as_planned:
+            tolerance = measure.tolerance or PLAN_TOLERANCE_RAD
+            judged_turn = planned_turn if angle is None else angle
         flown_faults = _flown_faults(requirements, i, measure, limit)
         facts += [text for name, text in _flown_facts(requirements, i, measure) if name not in flown_faults]
-        # If the aircraft's limits are known, the turn is judged by them, and faults of the flown turn are only facts.
-        facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
-        faults += [] if requirements.envelope else flown_faults.values()
+        facts += [fault.brief for fault in flown_faults.values()] if is_judged_as_planned else []
+        faults += [] if is_judged_as_planned else flown_faults.values()
         fit = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
         method = "not flown" if angle is None else fit
     ok: bool | None = not faults
@@ -98,7 +104,7 @@ def _turn_finding(
         limit=math.degrees(limit),
         source=source,
         tolerance=math.degrees(tolerance),
-        margin=math.degrees(limit - (planned_turn if angle is None else angle)),
+        margin=None if judged_turn is None else math.degrees(limit - judged_turn),
         unit="deg",
         method=method,
         facts=_measured_facts(measure),

@@ -141,7 +141,9 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     )
     boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
     found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
-    assert wind_lines(found)[1:5] == [
+    # The answer of calm air comes before the directions that are not judged.
+    assert wind_lines(found)[1].startswith("not judged: 4 of 4 directions")
+    assert [wind_lines(found)[0], *wind_lines(found)[2:5]] == [
         "does not fly with P >= 0.9, by the best estimate, in any wind from 0°, even a light one;"
         " it flies in wind up to 2.0 m/s from 270°",
         "in calm air, 3 of 4 flights fail",
@@ -149,7 +151,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
         "  failed  clearance in 3: leg 4 in 3",
     ]
     nowhere = replace(found, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:]))
-    assert wind_lines(nowhere)[1:3] == [
+    assert wind_lines(nowhere)[::2][:2] == [
         "does not fly with P >= 0.9, by the best estimate, even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]

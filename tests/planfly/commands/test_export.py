@@ -84,7 +84,8 @@ def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
     Path("x8.toml").write_text(f'name = "x"\n{terrain}{area}{ends}[flight]\naircraft = "x8"\n')
     x8 = planfly.aircraft("x8").airspeed
     for source, more, speed, words in (
-        ("m.waypoints", [], 25.0, "that of the default aircraft aerosonde; --scenario names yours"),
+        ("m.waypoints", [], 25.0, "that of the default aircraft aerosonde; --aircraft names yours"),
+        ("m.waypoints", ["--aircraft", "x8"], x8, "that of x8"),
         ("slow.waypoints", [], 19.0, "the mission's"),
         ("m.waypoints", ["--scenario", "x8.toml"], x8, "that of x8"),
         (str(log_file), [], 25.0, "that of aerosonde"),

@@ -158,8 +158,18 @@ def test_short_legs_name_their_method() -> None:
     assert item.ok
     assert item.method == "course change over the turn"
     assert item.flown == pytest.approx(40.0, abs=0.5)
-    assert item.tolerance is not None
-    assert item.tolerance >= 1.0
+
+
+def test_the_margin_and_the_compared_value_are_those_of_the_planned_turn() -> None:
+    """The aircraft swings through more than the turn's limit, but is judged by the turn that the mission asks for."""
+    setup = make_setup(zigzag(40.0, 220.0), limits={"max_turn_deg": 41.0})
+    track = fly_path(setup)
+    stretched = replace(track, position=track.position * np.array([1.2, 1.0, 1.0]))
+    item = of(judge(setup, stretched), "turn", waypoint(2))
+    assert item.ok
+    assert item.flown is not None
+    assert item.flown > 41.5
+    assert (item.value, item.margin) == (pytest.approx(40.0), pytest.approx(1.0))
 
 
 def test_a_leg_that_the_autopilot_left_at_once_is_the_reason_that_is_given() -> None:

@@ -1,0 +1,54 @@
+"""Name what would raise the probability of a planned mission, from the rules that its flights failed."""
+
+import math
+
+from planfly.campaigns.summary import CampaignSummary
+from world.scenario import Scenario
+
+# Step of the lengths that are suggested, m.
+_LENGTH_STEP_M = 10.0
+# What helps against the failures of a rule; rules with a length to suggest are in `_measured_remedies`.
+_REMEDIES = {
+    "energy": "a larger battery or a shorter mission",
+    "fence": "more distance to the fence",
+    "launch": "a faster launch, or another launch course",
+    "loiter": "a larger loiter radius",
+    "slope": "gentler legs, by smaller values of [limits] max_climb_deg and max_dive_deg",
+    "speed": "a lower cruise airspeed",
+    "stall": "a higher cruise airspeed",
+    "threat": "more distance to missiles, by planning with larger kill radii than the flight is judged with",
+    "turn": "gentler turns, by a smaller value of [limits] max_turn_deg, or fewer waypoints",
+}
+# Rules whose margin is a height above ground, m.
+_HEIGHT_RULES = ("clearance", "approach", "climbout")
+
+
+def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
+    """Return what would raise the probability, for the rules that most flights failed; () if no flight failed.
+
+    scenario: scenario of the mission.
+    """
+    texts: dict[str, None] = {}
+    for failures in sorted(summary.by_rule, key=lambda failures: -failures.flights):
+        low_margin = summary.low_margin if failures.rule == summary.deciding else None
+        texts |= dict.fromkeys(_measured_remedies(failures.rule, low_margin, scenario))
+    return (*texts, "less wind or turbulence") if summary.by_rule else ()
+
+
+def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) -> list[str]:
+    """Return what helps against the failures of a rule.
+
+    low_margin: margin that one flight in twenty falls below, m; None if it is unknown.
+    """
+    shortfall = 0.0 if low_margin is None else max(0.0, -low_margin)
+    if rule == "touchdown":
+        # The strip is longer at both ends.
+        longer = _LENGTH_STEP_M * math.ceil(2.0 * shortfall / _LENGTH_STEP_M)
+        texts = [f"a strip that is {longer:.0f} m longer" if longer else "a longer strip"]
+        if scenario.landing is not None and scenario.landing.height_sd is None:
+            texts.insert(0, "a survey of the strip's height ([landing] height_sd_m)")
+        return [*texts, "another approach ([landing] course_deg, approach_m, slope_deg)"]
+    if rule in _HEIGHT_RULES:
+        higher = f"{math.ceil(shortfall)} m higher" if shortfall else "higher"
+        return [f"a path that is {higher} above ground, by planning with a larger [limits] min_clearance_m"]
+    return [_REMEDIES[rule]] if rule in _REMEDIES else []

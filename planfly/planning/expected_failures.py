@@ -1,0 +1,95 @@
+"""Find out without a flight why a safe plan is expected to fail in more than one of twenty dispersed flights.
+
+A plan is safe within the limits of its scenario, in its stated wind and over the heights of its map.  Two causes of
+failures are known from the plan alone: limits that are looser than the aircraft's, and a strip that is too short for
+what is known of its height.  All other causes, such as gusts in the flare, take flights (`planfly plan --flights N`).
+"""
+
+import math
+from dataclasses import replace
+
+from logs.verdict.tolerances import TOUCHDOWN_ERROR_M
+from planfly.workflow.airframe import Airframe
+from planner.evaluation.certify import certify
+from planner.evaluation.problem import make_problem
+from planner.plan import Plan
+from planner.search.lay_ground_ways import MAP_HEIGHT_SD_M
+from world.wind import W20
+
+# Probability with which a plan is to hold in dispersed flights.
+HOLDING_PROBABILITY = 0.95
+# Standard deviation of a touchdown along the strip in light turbulence, with GNSS errors and a surveyed height, m: the
+# largest of ten plans of four aircraft, 24 flights each (16 to 66 m).  It is assumed to grow with the gusts.
+_TOUCHDOWN_SD_IN_LIGHT_TURBULENCE_M = 66.0
+# The same without turbulence: 5 touchdowns of ArduPlane in steady wind were within 15 m of the simulated ones.
+_TOUCHDOWN_SD_IN_CALM_AIR_M = 8.0
+# Quantile of the normal distribution: 95 % of all values are within this number of standard deviations.
+_SIGMAS_OF_95_PERCENT = 1.96
+# Step of the strip lengths that are suggested, m.
+_STRIP_STEP_M = 10.0
+
+
+def expected_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
+    """Return the known causes of failures of a safe plan, each with what would help; () for a plan that is not safe.
+
+    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> airframe = load_airframe(scenario)
+    >>> expected_failures(plan_path(scenario, airframe.limits, seed=1), airframe)[0][:57]
+    'flights are expected to fail, because the limits of the s'
+    """
+    if not plan.safe:
+        return ()
+    return tuple(text for text in (_loose_limits_text(plan, airframe), _short_strip_text(plan)) if text)
+
+
+def _loose_limits_text(plan: Plan, airframe: Airframe) -> str:
+    """Return the first part of a plan that is beyond the aircraft, because the scenario's limits allow it, or ""."""
+    limits = airframe.limits
+    aircraft_limits = replace(limits, max_turn=None, max_climb=None, max_dive=None, tracking=None)
+    if (limits.max_turn, limits.max_climb, limits.max_dive) == (None, None, None):
+        return ""
+    problems = certify(make_problem(plan.scenario, aircraft_limits), plan.waypoints).problems
+    if not problems:
+        return ""
+    return (
+        "flights are expected to fail, because the limits of the scenario are looser than those of the aircraft:"
+        f' {problems[0]}; "aircraft" instead of the numbers in [limits] plans within both'
+    )
+
+
+def _short_strip_text(plan: Plan) -> str:
+    """Return why a strip is too short for the touchdowns to expect, or ""."""
+    strip, descent = plan.scenario.landing, None if plan.ways is None else plan.ways.descent
+    if strip is None or descent is None:
+        return ""
+    room, turbulence = 0.5 * strip.length - TOUCHDOWN_ERROR_M, plan.scenario.wind.turbulence
+    height_sd = MAP_HEIGHT_SD_M if strip.height_sd is None else strip.height_sd
+    flown_sd = max(_TOUCHDOWN_SD_IN_CALM_AIR_M, _TOUCHDOWN_SD_IN_LIGHT_TURBULENCE_M * W20[turbulence] / W20["light"])
+    touchdown_sd = math.hypot(height_sd / descent.slope, flown_sd)
+    probability = math.erf(max(0.0, room) / (math.sqrt(2.0) * touchdown_sd))
+    if probability >= HOLDING_PROBABILITY:
+        return ""
+    remedies = [f"a strip of {_sufficient_strip_length(touchdown_sd):.0f} m"]
+    if strip.height_sd is None:
+        surveyed_length = _sufficient_strip_length(flown_sd)
+        remedies.insert(0, f"a survey of its height ([landing] height_sd_m; then {surveyed_length:.0f} m suffice)")
+    if turbulence != "none":
+        remedies.append("less turbulence")
+    source = "the elevation file" if strip.height_sd is None else "its survey"
+    return (
+        f"only {probability:.2f} of the landings may touch down on the {strip.length:.0f} m of the strip: its height is"
+        f" known within {height_sd:.1f} m by {source}, and the touchdown within {touchdown_sd:.0f} m (standard"
+        f" deviations, by the largest scatter of measured landings); what would help: {', or '.join(remedies)}"
+    )
+
+
+def _sufficient_strip_length(touchdown_sd: float) -> float:
+    """Return the strip length on which 95 % of the touchdowns are, m, rounded up.
+
+    touchdown_sd: standard deviation of the touchdown along the strip, m.
+    """
+    length = 2.0 * (TOUCHDOWN_ERROR_M + _SIGMAS_OF_95_PERCENT * touchdown_sd)
+    return _STRIP_STEP_M * math.ceil(length / _STRIP_STEP_M)

@@ -1,0 +1,80 @@
+"""Fly a finished plan with the default dispersions, and say in how many flights it holds (``--flights N``)."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+import planfly
+from world.errors import ScenarioError
+from world.extras import require_extra
+
+if TYPE_CHECKING:
+    from planfly import CampaignResult, Plan
+    from planfly.terminal.answers import DispersedFlights
+
+
+def check_flights_option(args: argparse.Namespace, excluded: str) -> None:
+    """Raise an error, before anything is planned, if ``--flights`` cannot be flown.
+
+    excluded: name of the option with which no dispersed flights are flown.
+    """
+    if args.flights is None:
+        return
+    if getattr(args, excluded) is not None:
+        raise ScenarioError.of_argument("flights", args.flights, f"not with `{excluded}`")
+    require_extra("campaigns", "--flights needs")
+
+
+def fly_dispersed(args: argparse.Namespace, plan: "Plan") -> "DispersedFlights | None":
+    """Fly a plan N times for ``--flights N``, print and return the result; None without the option."""
+    if args.flights is None:
+        return None
+    from planfly.campaigns.remedies import remedies
+
+    result = planfly.campaign(plan, flights=args.flights)
+    answer = _dispersed_answer(result, remedies(result.summary, plan.scenario))
+    print("\n".join(_dispersed_lines(result, answer)))
+    return answer
+
+
+def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -> "DispersedFlights":
+    """Return the answer for --json.
+
+    remedy_texts: what would raise the probability.
+    """
+    from planfly.campaigns.failure_counts import failures_document
+    from planfly.planning.expected_failures import HOLDING_PROBABILITY
+    from planfly.terminal.answers import DispersedFlights, FailedPlace, FailedRule
+
+    tally = result.summary.estimate.tally
+    failed_by_rule = [
+        FailedRule(**{**entry, "places": [FailedPlace(**place) for place in entry["places"]]})
+        for entry in failures_document(result.summary.by_rule)
+    ]
+    return DispersedFlights(
+        flights=tally.flown,
+        flyable=tally.flyable,
+        probability=tally.share,
+        interval=list(result.interval),
+        holds=result.interval.high >= HOLDING_PROBABILITY,
+        deciding_rule=result.summary.deciding,
+        failed_by_rule=failed_by_rule,
+        remedies=list(remedy_texts),
+    )
+
+
+def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> list[str]:
+    """Return the lines for a terminal."""
+    from planfly.campaigns.failure_counts import failure_lines
+    from planfly.campaigns.summary import deciding_lines
+
+    low, high = answer.interval
+    state = "" if answer.holds else ": less than 0.95"
+    lines = [
+        f"flights   holds in {answer.flyable} of {answer.flights} flights with the default dispersions"
+        f" (P between {low:.2f} and {high:.2f} at 95 %){state}",
+        *failure_lines(result.summary.by_rule),
+        *deciding_lines(result.summary),
+    ]
+    if answer.remedies:
+        lines.append(f"  raises  {'; '.join(answer.remedies)}")
+    return lines

@@ -1,0 +1,95 @@
+"""Causes of failures that are known from a safe plan alone: loose limits, and a strip that is too short."""
+
+import math
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planfly.planning.expected_failures import expected_failures
+from planfly.workflow.airframe import load_airframe
+from planfly.workflow.make_plan import make_plan
+from planner.ground_ways import DepartureAndApproach, Descent
+from planner.plan import Plan
+from world.scenario import Scenario, load_scenario, scenario_from_spec
+
+GLIDE = 0.1
+
+
+@cache
+def plan_of(name: str) -> Plan:
+    scenario = load_scenario(name)
+    return make_plan(scenario, load_airframe(scenario), 1)
+
+
+def said_of(plan: Plan) -> tuple[str, ...]:
+    return expected_failures(plan, load_airframe(plan.scenario))
+
+
+def landing_plan(turbulence: str = "none", **strip: Any) -> Plan:
+    """The plan of the demo in the air, with a strip and a glide of 1 in 10."""
+    plan = plan_of("jacksboro-air")
+    spec = plan.scenario.to_json()
+    spec |= {"landing": {"east_m": -10160.0, "north_m": 2670.0, **strip}, "home": {"place": "start"}}
+    spec["wind"] = {"speed_mps": 5.0, "from_deg": 250.0, "turbulence": turbulence}
+    scenario: Scenario = scenario_from_spec(spec, "landing")
+    descent = Descent(np.zeros((0, 3)), np.zeros((2, 3)), np.zeros(3), 0.0, GLIDE, 70.0)
+    return replace(plan, scenario=scenario, ways=DepartureAndApproach(None, descent))
+
+
+@pytest.mark.parametrize(("name", "part"), [("steep", "leg 4: climbs 18.3 deg"), ("tight", "leg 9: 30 m long")])
+def test_limits_that_are_looser_than_the_aircraft_are_said(name: str, part: str) -> None:
+    (text,) = said_of(plan_of(name))
+    assert text.startswith("flights are expected to fail")
+    assert part in text
+    assert '"aircraft" instead of the numbers in [limits]' in text
+
+
+def test_limits_that_the_aircraft_keeps_are_not_said() -> None:
+    """The plan of `hard-07` turns by up to 45 degrees, and its flight is flyable."""
+    plan = plan_of("hard-07")
+    assert plan.scenario.limits.max_turn_deg == 45.0
+    assert said_of(plan) == ()
+
+
+def test_a_plan_that_is_not_safe_has_its_problems_alone() -> None:
+    plan = plan_of("steep")
+    unsafe = replace(plan, certificate=replace(plan.certificate, problems=("a problem",)))
+    assert said_of(unsafe) == ()
+
+
+def test_a_strip_whose_height_only_the_map_knows_is_too_short() -> None:
+    """5.5 m on a glide of 1 in 10 move the touchdown by 55 m, 8 m more are the flare's; 70 m are 1.26 deviations."""
+    (text,) = said_of(landing_plan(length_m=200.0))
+    assert math.hypot(55.0, 8.0) == pytest.approx(55.6, abs=0.05)
+    assert "only 0.79 of the landings" in text
+    assert "the touchdown within 56 m" in text
+    # 2 x (30 m + 1.96 x 55.6 m) = 278 m; with a survey 2 x (30 m + 1.96 x 8 m) = 91.4 m.
+    assert "a survey of its height ([landing] height_sd_m; then 100 m suffice), or a strip of 280 m" in text
+    assert "less turbulence" not in text
+
+
+def test_a_strip_that_is_long_enough_is_not_said() -> None:
+    assert len(said_of(landing_plan(length_m=270.0))) == 1
+    assert said_of(landing_plan(length_m=280.0)) == ()
+    assert said_of(landing_plan(length_m=200.0, height_sd_m=0.5)) == ()
+
+
+def test_a_strip_that_is_shorter_than_the_error_of_the_touchdown_holds_none() -> None:
+    (text,) = said_of(landing_plan(length_m=50.0, height_sd_m=0.5))
+    assert "only 0.00 of the landings" in text
+
+
+def test_gusts_move_the_touchdown_along_a_surveyed_strip() -> None:
+    """66 m in light turbulence, 132 m in moderate: 70 m are 1.06 and 0.53 deviations."""
+    (light,) = said_of(landing_plan("light", length_m=200.0, height_sd_m=0.0))
+    (moderate,) = said_of(landing_plan("moderate", length_m=200.0, height_sd_m=0.0))
+    assert "only 0.71 of the landings" in light
+    assert "only 0.40 of the landings" in moderate
+    assert light.endswith("a strip of 320 m, or less turbulence")
+
+
+def test_a_plan_without_a_landing_says_nothing_of_strips() -> None:
+    assert said_of(plan_of("jacksboro-air")) == ()
