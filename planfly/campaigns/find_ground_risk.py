@@ -1,9 +1,9 @@
 """Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas.
 
 Each flight of a campaign gives the area over which it flies, with its returns to launch, and the area on which the
-aircraft can fall from there.  The flight geography is a corridor about the path of the flight without variations that
-holds a fraction of the flights; contingency volume and ground risk buffer hold all flights, returns and falls, and the
-volumes by the formulas of SORA's annex A.
+aircraft can fall from there. The flight geography is a corridor about the planned path, and about the path of the
+flight without variations, that holds a fraction of the flights; contingency volume and ground risk buffer hold all
+flights, returns and falls, and the volumes by the formulas of SORA's annex A.
 """
 
 import itertools
@@ -88,7 +88,7 @@ class GroundRiskGoal:
 class ExcursionRow(FlightRow):
     """Row of a flight with the areas that it needs.
 
-    deviation: largest horizontal distance from the path of the flight without variations, m.
+    deviation: largest horizontal distance from the planned path and the path of the flight without variations, m.
     height: largest height above ground in flight, m.
     return_height: largest height above ground in flight or in a return, m.
     ground_speed: highest speed over the ground, m/s.
@@ -104,13 +104,13 @@ class ExcursionRow(FlightRow):
 
 
 def fly_for_excursions(
-    base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: Floats, interval: float, glide: bool
+    base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
 ) -> ExcursionRow:
     """Fly one flight of a campaign, and find the areas below it and its returns, and of the falls from there.
 
     index: number of the flight, from 0.
     wind: mean wind that replaces the scenario's wind, or None.
-    path: path of the flight without variations, m, (n, 2).
+    path: planned path, and that of the flight without variations, m.
     interval: time between two returns, s.
     glide: True to include the glide after an engine failure.
     """
@@ -138,7 +138,7 @@ def fly_for_excursions(
     glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
-    distances = shapely.distance(shapely.points(positions[:, :2]), shapely.LineString(path))
+    distances = shapely.distance(shapely.points(positions[:, :2]), path)
     return replace(
         row,
         duration=float(flown.track.time[-1]),
@@ -359,7 +359,7 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     path = nominal_path(base)
     if goal.population is not None:
         # A bad raster is refused before the flights.
-        least_area = shapely.LineString(path).buffer(min_geography_half_width(aircraft.wing_span))
+        least_area = path.buffer(min_geography_half_width(aircraft.wing_span))
         read_population(goal.population, goal.unit, scenario.origin, least_area)
     rows = _fly_excursions(base, goal, path, workers, advance)
     glide_ratio = _best_glide_ratio(base) if goal.glide else None
@@ -385,17 +385,18 @@ def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
     return replace(result, ground_class=found_class)
 
 
-def nominal_path(base: CampaignBase) -> Floats:
-    """Return the path of the flight without variations, m, (n, 2)."""
-    track = fly_to_end(Flight(base.nominal_setup(), base.airframe.aircraft)).track
+def nominal_path(base: CampaignBase) -> BaseGeometry:
+    """Return the path of the flight without variations, and the lines of the route, m."""
+    setup = base.nominal_setup()
+    track = fly_to_end(Flight(setup, base.airframe.aircraft)).track
     if len(track) < 2:
         raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
     positions, _ = _sampled_flight(track)
-    return shapely.get_coordinates(shapely.LineString(positions[:, :2]).simplify(0.1))
+    return shapely.MultiLineString([positions[:, :2], setup.route.positions[:, :2]]).simplify(0.1)
 
 
 def _fly_excursions(
-    base: CampaignBase, goal: GroundRiskGoal, path: Floats, workers: Workers, advance: Advance
+    base: CampaignBase, goal: GroundRiskGoal, path: BaseGeometry, workers: Workers, advance: Advance
 ) -> tuple[ExcursionRow, ...]:
     """Fly the flights of a campaign for their areas; return the rows with areas in the order of the draws."""
     indices: Iterator[int] = iter(range(goal.flights))
@@ -434,11 +435,15 @@ def _best_glide_ratio(base: CampaignBase) -> float:
 
 
 def make_volumes(
-    base: CampaignBase, goal: GroundRiskGoal, path: Floats, rows: tuple[ExcursionRow, ...], glide_ratio: float | None
+    base: CampaignBase,
+    goal: GroundRiskGoal,
+    path: BaseGeometry,
+    rows: tuple[ExcursionRow, ...],
+    glide_ratio: float | None,
 ) -> GroundRiskResult:
     """Make the volumes from the rows of the flights.
 
-    path: path of the flight without variations, m, (n, 2).
+    path: planned path, and that of the flight without variations, m.
     glide_ratio: best glide ratio; None if glides are not asked for.
     """
     aircraft = base.airframe.aircraft
@@ -449,8 +454,7 @@ def make_volumes(
         float(np.quantile(values, goal.probability, method="median_unbiased"))
         for values in ([row.deviation for row in rows], [row.height for row in rows])
     )
-    line = shapely.LineString(path)
-    geography = line.buffer(max(deviation, min_geography_half_width(aircraft.wing_span)))
+    geography = path.buffer(max(deviation, min_geography_half_width(aircraft.wing_span)))
     flown_area = shapely.union_all([geography, *shapely.from_wkb([row.flown for row in rows])])
     fallen_area = shapely.union_all(shapely.from_wkb([row.fallen for row in rows]))
     flown = FlownVolumes(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
@@ -26,7 +27,7 @@ from world.errors import PlanflyError
 
 # Wing span (m) and highest airspeed (m/s) of the aerosonde, as in its data.
 SPAN, SPEED = 2.8956, 31.0
-PATH = np.array([[0.0, 0.0], [1000.0, 0.0]])
+PATH = shapely.LineString([(0.0, 0.0), (1000.0, 0.0)])
 
 
 @pytest.fixture(scope="module")
@@ -174,16 +175,16 @@ def test_no_known_ground_is_refused(base: CampaignBase) -> None:
 
 
 @pytest.fixture(scope="module")
-def path(base: CampaignBase) -> np.ndarray:
+def path(base: CampaignBase) -> BaseGeometry:
     return nominal_path(base)
 
 
-def test_the_areas_of_a_flight_hold_it_its_returns_and_its_falls(base: CampaignBase, path: np.ndarray) -> None:
+def test_the_areas_of_a_flight_hold_it_its_returns_and_its_falls(base: CampaignBase, path: BaseGeometry) -> None:
     flown_row = fly_for_excursions(base, 0, path=path, interval=30.0, glide=False)
     flown, fallen = shapely.from_wkb(flown_row.flown), shapely.from_wkb(flown_row.fallen)
     assert flown_row.ended == "completed"
     # The flight without variations lies within the corridor of the largest deviation.
-    assert flown.buffer(flown_row.deviation + 1.0).covers(shapely.LineString(path))
+    assert flown.buffer(flown_row.deviation + 1.0).covers(path.geoms[0])
     # Home, around which the returns loiter, is where the flight starts; the loiter of 100 m or more is in the area.
     home = shapely.Point(*base.scenario.start[:2])
     assert flown.distance(home) <= 150.0
@@ -194,7 +195,7 @@ def test_the_areas_of_a_flight_hold_it_its_returns_and_its_falls(base: CampaignB
     assert 0.4 * reach < beyond <= reach + SPAN
 
 
-def test_a_wind_carries_falls_away(base: CampaignBase, path: np.ndarray) -> None:
+def test_a_wind_carries_falls_away(base: CampaignBase, path: BaseGeometry) -> None:
     def beyond_to_south(from_deg: float) -> float:
         """Area of falls to the south of the flight minus that to its north, m2, in a wind of 10 m/s."""
         flown_row = fly_for_excursions(base, 3, GivenWind(10.0, from_deg), path=path, interval=1000.0, glide=False)
@@ -208,7 +209,7 @@ def test_a_wind_carries_falls_away(base: CampaignBase, path: np.ndarray) -> None
     assert beyond_to_south(180.0) < -10_000.0
 
 
-def test_glides_reach_the_ground_beyond_the_flight(base: CampaignBase, path: np.ndarray) -> None:
+def test_glides_reach_the_ground_beyond_the_flight(base: CampaignBase, path: BaseGeometry) -> None:
     without = shapely.from_wkb(fly_for_excursions(base, 0, path=path, interval=30.0, glide=False).fallen)
     with_glides = shapely.from_wkb(fly_for_excursions(base, 0, path=path, interval=30.0, glide=True).fallen)
     assert with_glides.area > without.area
