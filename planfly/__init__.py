@@ -26,6 +26,7 @@ survey                               how much of each photo line of a survey can
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
 battery                              the smallest battery with which a mission and its returns keep the reserve
 compare_campaigns                    whether flights of one campaign are more likely to be flyable than another's
+ground_risk                          the volumes and the ground risk class of a mission by SORA 2.5
 serve                                a MAVLink vehicle for ground stations
 open_studio                          a page on which a mission is dragged, judged, flown and saved
 scenarios, aircraft                  the built-in scenarios and aircraft
@@ -63,6 +64,7 @@ if TYPE_CHECKING:
     from planfly.api.aircraft import aircraft as aircraft
     from planfly.api.aircraft import describe_aircraft as describe_aircraft
     from planfly.api.aircraft import new_aircraft as new_aircraft
+    from planfly.api.assessing import ground_risk as ground_risk
     from planfly.api.campaigns import CampaignFlight as CampaignFlight
     from planfly.api.campaigns import battery as battery
     from planfly.api.campaigns import campaign as campaign
@@ -124,6 +126,7 @@ if TYPE_CHECKING:
     from planfly.campaigns.compare_campaigns import CampaignComparison as CampaignComparison
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_battery import BatteryResult as BatteryResult
+    from planfly.campaigns.find_ground_risk import GroundRiskResult as GroundRiskResult
     from planfly.campaigns.find_winds import WindsResult as WindsResult
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
     from planfly.planning.paper import PaperTables as PaperTables
@@ -170,6 +173,7 @@ _HOMES = {
             "IdentifiedAircraft",
             "identify_aircraft",
         ),
+        "planfly.api.assessing": ("ground_risk",),
         "planfly.api.campaigns": (
             "CampaignFlight",
             "battery",
@@ -256,6 +260,7 @@ _HOMES = {
         "planfly.campaigns.compare_campaigns": ("CampaignComparison",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_battery": ("BatteryResult",),
+        "planfly.campaigns.find_ground_risk": ("GroundRiskResult",),
         "planfly.campaigns.find_winds": ("WindsResult",),
         "planfly.campaigns.dispersions": ("SpreadError",),
         "planfly.workflow.imported_flights": ("ImportedFlight",),

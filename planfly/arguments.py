@@ -78,7 +78,8 @@ RANGES: Mapping[str, Range] = {
     "at_least": _PROBABILITY_RANGE,
     "confidence": _PROBABILITY_RANGE,
     "probability": _PROBABILITY_RANGE,
-    "battery_flights": Range(20, 100_000, "expected a whole number from 20 to 100,000", integer=True),
+    "sample_flights": Range(20, 100_000, "expected a whole number from 20 to 100,000", integer=True),
+    "max_speed": Range(1.0, 300.0, "expected a speed from 1 to 300 m/s"),
     "reserve": Range(0.0, 0.9, "expected a fraction of the battery from 0 to 0.9"),
     "specific_energy": Range(20.0, 2000.0, "expected an energy per battery mass from 20 to 2,000 Wh/kg"),
     "flights": Range(1, 10_000_000, "expected a whole number from 1 to 10,000,000", integer=True),
@@ -104,6 +105,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
     "engine": ("auto", "jsbsim"),
     "log_hz": (60, 30, 20, 10),
     "datum": ("amsl", "ellipsoid"),
+    "population_unit": ("per-cell", "per-km2"),
     "problems": (7, 15, 30, 60),
 }
 
@@ -135,7 +137,7 @@ def check_arguments(**given: Any) -> None:
 
 
 # Keywords in messages, for entries of `RANGES` whose keyword has another range in other calls.
-_KEYWORDS_IN_MESSAGES = {"served_speed": "speed", "front": "count", "battery_flights": "flights"}
+_KEYWORDS_IN_MESSAGES = {"served_speed": "speed", "front": "count", "sample_flights": "flights"}
 
 
 # Largest sensor size across and along the track, and longest focal length, mm.

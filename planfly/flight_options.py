@@ -156,21 +156,28 @@ class WindsOptions(MissionOptions, total=False):
     scheduler: str | None
 
 
-class BatteryOptions(MissionOptions, total=False):
-    """Options of the flights of a search for a battery.
+class SampleOptions(MissionOptions, total=False):
+    """Options of a fixed number of varied flights.
 
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights.
-    confidence: confidence of the capacity's interval.
     workers: number of processes on this machine; None for one per core.
     scheduler: address of a running dask scheduler.
     """
 
     spread: str | Path | None
     flights: Annotated[int, 100]
-    confidence: Annotated[float, 0.95]
     workers: int | None
     scheduler: str | None
+
+
+class BatteryOptions(SampleOptions, total=False):
+    """Options of the flights of a search for a battery.
+
+    confidence: confidence of the capacity's interval.
+    """
+
+    confidence: Annotated[float, 0.95]
 
 
 class FlyOptions(MissionOptions, SimulationOptions, total=False):

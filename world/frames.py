@@ -81,6 +81,18 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
     return lat, lon
 
 
+def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
+    """Convert geodetic positions in degrees to a plane in which every area is that on WGS84, x and y in metres.
+
+    >>> x, y = to_equal_area(GeoOrigin(0.0, 8.0), np.array([0.0, 90.0]), np.array([188.0, 8.0]))
+    >>> bool(abs(4.0 * abs(x[0] * y[1]) / 5.10065621724e14 - 1.0) < 1e-9)
+    True
+    """
+    from pyproj import Proj
+
+    return transform_points(Proj(proj="cea", lon_0=origin.lon_deg, ellps="WGS84"), lon_deg, lat_deg)
+
+
 def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Transform both coordinates of points with pyproj, and keep their shape.
 

@@ -55,7 +55,7 @@ def open_hgt(file: Path, _name: str) -> RasterFile:
     return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile; {expected}")
 
 
-def _open_dataset(file: Path, driver: str) -> Any:
+def open_dataset(file: Path, driver: str) -> Any:
     """Open a file in GDAL with one driver, within the options `GUARD`."""
     import rasterio
 
@@ -76,7 +76,7 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
         with warnings.catch_warnings(), rasterio.Env(**GUARD):
             # For a file without a position on Earth, GDAL would return columns and rows.
             warnings.simplefilter("error", NotGeoreferencedWarning)
-            with _open_dataset(file, driver) as source:
+            with open_dataset(file, driver) as source:
                 _check_layout(file, source)
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _read_crs(file, driver, source)
@@ -85,23 +85,23 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
     except NotGeoreferencedWarning:
         _raise_unplaced(file)
     except (RasterioError, ValueError, TypeError, OSError) as error:
-        raise TerrainError(f"{file}: {failure_text}: {_first_error_line(error)}", file=file) from error
+        raise TerrainError(f"{file}: {failure_text}: {first_error_line(error)}", file=file) from error
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         """Return the heights of a window of rows and columns; NaN for missing data."""
         try:
-            with rasterio.Env(**GUARD), _open_dataset(file, driver) as source:
+            with rasterio.Env(**GUARD), open_dataset(file, driver) as source:
                 heights = _read_strips(source, (top, bottom, left, right), *scale)
                 if may_have_gaps:
-                    _clear_unwritten(source, heights, top, left)
+                    clear_unwritten(source, heights, top, left)
                 return heights
         except (RasterioError, OSError) as error:
-            raise TerrainError(f"{file}: cannot be read: {_first_error_line(error)}", file=file) from error
+            raise TerrainError(f"{file}: cannot be read: {first_error_line(error)}", file=file) from error
 
     return _make_raster_file(file, shape, grid, crs, unit, read)
 
 
-def _first_error_line(error: BaseException) -> str:
+def first_error_line(error: BaseException) -> str:
     """Return the first error of a chain of causes as one line; the last error only refers to earlier ones."""
     while error.__cause__ is not None:
         error = error.__cause__
@@ -139,7 +139,7 @@ def _read_crs(file: Path, driver: str, source: Any) -> str | None:
         return None
     wkt = source.crs.to_wkt(version="WKT2_2019")
     # GDAL drops the height axis of a three-dimensional system in a GeoTIFF 1.0 file, unless it takes EPSG's definition.
-    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _open_dataset(file, driver) as epsg_source:
+    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), open_dataset(file, driver) as epsg_source:
         has_height = "CS[ellipsoidal,3]" in epsg_source.crs.to_wkt(version="WKT2_2019")
     return crs_to_wkt(wkt, with_height=has_height)
 
@@ -225,7 +225,7 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
     return heights
 
 
-def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
+def clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
     """Set the heights in blocks that a GeoTIFF omits to NaN.
 
     top, left: first row and column of ``heights`` in the file.
@@ -261,7 +261,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
     top, bottom, left, right = window
     if top >= bottom or left >= right:
         return
-    with rasterio.Env(**GUARD), _open_dataset(file, "GTiff") as source:
+    with rasterio.Env(**GUARD), open_dataset(file, "GTiff") as source:
         rows, cols = source.block_shapes[0]
         for block_row in range(top // rows, -(-bottom // rows)):
             for block_column in range(left // cols, -(-right // cols)):

@@ -32,6 +32,7 @@ _ORDER = (
         "campaign_flight",
         "winds",
         "battery",
+        "ground_risk",
         "serve",
         "open_studio",
     ),

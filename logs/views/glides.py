@@ -72,14 +72,14 @@ def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]
     layers, place = [], "home, rally point or landing" if len(drawn_returns.glides.sites) > 1 else "home"
     for band in footprint.bands(*extent):
         name = f"{place} in reach from {band.max_height:.0f} m above ground"
-        layers.append(_area_layer(name, BAND_ROLES[band.max_height], band.parts))
+        layers.append(area_layer(name, BAND_ROLES[band.max_height], band.parts))
     flat_parts = footprint.landings(*extent)
     return layers + (
-        [_area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []
+        [area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []
     )
 
 
-def _area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
+def area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
     """Make a layer of areas with holes; NaN separates their rings."""
     gap = np.full((1, 2), np.nan)
     x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T

@@ -31,6 +31,7 @@ from planfly.flight_options import (
     BatteryOptions,
     CampaignOptions,
     MissionOptions,
+    SampleOptions,
     WindsOptions,
     fence_file_names,
     select_mission_options,
@@ -103,7 +104,7 @@ def _command_line_options(base: CampaignBase, options: MissionOptions, spread: s
     }
 
 
-def _make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
+def make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
     """Check the number of workers, the scheduler and the seed, and return the workers.
 
     Raises PlanflyError for invalid arguments, before anything is planned.
@@ -181,7 +182,7 @@ def campaign(
     ...
     world.errors.ArgumentError: prove 1.5: expected at least 0.5 and below 1
     """
-    workers_used = _make_workers(workers, scheduler, options["seed"])
+    workers_used = make_workers(workers, scheduler, options["seed"])
     requested = (options["flights"], options["prove"], options["at_least"], options["confidence"])
     goal, spread = make_goal(*requested), options["spread"]
     with campaign_folder(out, CAMPAIGN_DATABASE, resume=resume, overwrite=overwrite) as directory:
@@ -321,7 +322,7 @@ def winds(
     """
     confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
-    workers_used = _make_workers(options["workers"], options["scheduler"], options["seed"])
+    workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as directory:
         folder = directory.folder
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
@@ -338,6 +339,18 @@ def winds(
 
 # ----------------------------------------------------------------------
 # Find the smallest battery for a mission and its returns.
+
+
+def open_sample(target: Plan | str | Path, options: SampleOptions) -> CampaignBase:
+    """Open the mission of varied flights that are not stored; for a scenario a path is planned.
+
+    Raises PlanflyError for bad input.
+    """
+    dispersions, mission_options = _read_spread(options["spread"]), select_mission_options(options)
+    if isinstance(target, Plan) or is_mission_file(str(target)):
+        return open_campaign(target if isinstance(target, Plan) else str(target), dispersions, mission_options)
+    with stage("planning") as advance:
+        return open_campaign(str(target), dispersions, mission_options, advance=advance)
 
 
 @requires_extra("campaigns")
@@ -378,17 +391,11 @@ def battery(
         reserve=reserve,
         specific_energy=specific_energy,
         every=every,
-        battery_flights=options["flights"],
+        sample_flights=options["flights"],
         confidence=options["confidence"],
     )
-    workers_used = _make_workers(options["workers"], options["scheduler"], options["seed"])
-    dispersions = _read_spread(options["spread"])
-    campaign_target = target if isinstance(target, Plan) else str(target)
-    if isinstance(target, Plan) or is_mission_file(str(target)):
-        base = open_campaign(campaign_target, dispersions, select_mission_options(options))
-    else:
-        with stage("planning") as advance:
-            base = open_campaign(campaign_target, dispersions, select_mission_options(options), advance=advance)
+    workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
+    base = open_sample(target, options)
     goal = BatteryGoal(probability, options["confidence"], options["flights"], every, reserve, specific_energy)
     with stage("flying", "flying for a battery") as advance:
         return find_battery(base, goal, workers_used, advance)

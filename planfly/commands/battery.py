@@ -39,7 +39,7 @@ def add_battery_parser(command_line: LineParser) -> None:
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
-        "--flights", metavar="N", type=number_parser("battery_flights"), help="number of flights (default: 100)"
+        "--flights", metavar="N", type=number_parser("sample_flights"), help="number of flights (default: 100)"
     )
     add_result_options(parser)
 

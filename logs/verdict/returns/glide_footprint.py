@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from logs.verdict.returns.glide_map import GlideMap
@@ -130,9 +131,16 @@ class _CellBlocks(NamedTuple):
         _, ends = np.nonzero(edges == -1)
         south = self.south + rows * self.side
         boxes = shapely.box(self.west + starts * self.side, south, self.west + ends * self.side, south + self.side)
-        areas = shapely.get_parts(shapely.union_all(boxes).simplify(0.0))
-        polygons = [orient(polygon) for polygon in areas if not polygon.is_empty]
-        return tuple(
-            tuple(shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors))
-            for polygon in polygons
-        )
+        return outline_parts(shapely.union_all(boxes).simplify(0.0))
+
+
+def outline_parts(area: BaseGeometry) -> tuple[Part, ...]:
+    """Return the outlines of the polygons of an area, each with its holes; outlines run counter-clockwise.
+
+    >>> [ring.shape for ring in outline_parts(shapely.box(0.0, 0.0, 2.0, 1.0))[0]]
+    [(5, 2)]
+    """
+    polygons = [orient(polygon) for polygon in shapely.get_parts(area) if not polygon.is_empty]
+    return tuple(
+        tuple(shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)) for polygon in polygons
+    )

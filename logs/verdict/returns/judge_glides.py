@@ -8,6 +8,7 @@ path, and stay out of kill spheres.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Literal, NamedTuple
@@ -16,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GROUND_IMPACT, fly_returns
+from flight.autopilots.arduplane.rtl_point_mass import (
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    SimulatedReturns,
+    fly_returns,
+)
 from flight.mission.placing import landing_positions
 from flight.mission.return_path import ReturnCircle, ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
@@ -305,12 +311,24 @@ def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
 def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> list[EngineOutReturn]:
     """Simulate ArduPlane's own return without thrust from each start.
 
-    A return that continues with a landing is simulated only up to its loiter.  If returns follow the terrain, none is
-    simulated, and each has the outcome "not flown".
+    If returns follow the terrain, none is simulated, and each has the outcome "not flown".
     """
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.unjudged_parts:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
+    outcomes = fly_without_engine(world, starts, targets).results
+    return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
+
+
+def fly_without_engine(
+    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], *, store_paths: bool = False
+) -> SimulatedReturns:
+    """Simulate ArduPlane's own return without thrust from n starts to their targets.
+
+    A return that continues with a landing is simulated only up to its loiter.
+
+    store_paths: True to store the paths.
+    """
     radius = ArduPlane(world.parameters).returns.rules.radius
     return_circles = [
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
@@ -318,16 +336,16 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     landing_sequences = [
         target.landing._replace(next_stops=()) if target.landing and target.straight else None for target in targets
     ]
-    outcomes = fly_returns(
+    return fly_returns(
         starts.rows,
         return_circles,
         world.parameters,
         world.aircraft,
         world.environment,
         landings=landing_sequences,
+        store_positions=store_paths,
         engine_out=True,
-    ).results
-    return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
+    )
 
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:

@@ -77,6 +77,11 @@ EVERY = {
             ("battery", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--json", "new.json"),
             (0, 3, 4),
         ),
+        Given(
+            ("ground-risk", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--out", "out"),
+            (3,),
+            "out",
+        ),
         Given(("paper", "--problems", "7", "--runs", "1", "--jobs", "1", "--out", "out"), target="out"),
         Given(("aircraft", "aerosonde")),
         Given(("scenarios",)),

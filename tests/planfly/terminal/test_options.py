@@ -125,6 +125,10 @@ def test_a_signal_asks_to_stop_and_its_handler_comes_back(number: signal.Signals
         ("battery", "--reserve", "0.91"),
         ("battery", "--specific-energy", "19"),
         ("battery", "--flights", "19"),
+        ("ground-risk", "--flights", "19"),
+        ("ground-risk", "--max-speed", "0"),
+        ("ground-risk", "--probability", "1"),
+        ("ground-risk", "--population-unit", "people"),
     ],
 )
 def test_bad_values_get_one_line(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

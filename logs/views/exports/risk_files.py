@@ -1,0 +1,66 @@
+"""Export the volumes of the ground risk as KML and GeoJSON (RFC 7946)."""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from flight.simulation.setup import FlightSetup
+from logs.verdict.returns.glide_footprint import outline_parts
+from logs.views.exports.map_files import MapZone, kml_text, plan_line
+from logs.views.ground_risk import RiskVolume
+from world.arrays import Floats
+from world.frames import to_geo
+from world.raster_file import longitude_near
+
+
+def risk_kml(setup: FlightSetup, volumes: Sequence[RiskVolume]) -> str:
+    """Return a KML document of the volumes and the route."""
+    zones = [
+        MapZone(
+            one.name,
+            tuple(tuple(_to_degrees(setup, ring)[:, ::-1] for ring in part) for part in outline_parts(one.area)),
+            one.height,
+            above_ground=True,
+            folder="ground risk",
+            role=one.role,
+        )
+        for one in volumes
+    ]
+    return kml_text(f"{setup.scenario.name}: ground risk", [plan_line(setup)], zones)
+
+
+def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: dict[str, Any]) -> str:
+    """Return a GeoJSON document with a feature for each volume.
+
+    properties: properties of each feature in addition to its name and its height above ground.
+
+    Across the antimeridian longitudes continue beyond 180 degrees, so that no area is torn.
+    """
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": one.name, "height_above_ground_m": _rounded(one.height), **properties},
+            "geometry": {
+                "type": "MultiPolygon",
+                "coordinates": [
+                    [_to_degrees(setup, ring).round(7).tolist() for ring in part] for part in outline_parts(one.area)
+                ],
+            },
+        }
+        for one in volumes
+    ]
+    return json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"
+
+
+def _rounded(height: float | None) -> float | None:
+    """Return a height in decimetres, or None."""
+    return None if height is None else round(height, 1)
+
+
+def _to_degrees(setup: FlightSetup, ring: Floats) -> Floats:
+    """Convert an outline (n, 2) in m to longitude and latitude, deg, (n, 2)."""
+    origin = setup.scenario.origin
+    lat, lon = to_geo(origin, ring[:, 0], ring[:, 1])
+    return np.column_stack([longitude_near(lon, origin.lon_deg), lat])

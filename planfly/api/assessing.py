@@ -1,0 +1,115 @@
+"""Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Unpack
+
+from planfly.api.campaigns import make_workers, open_sample
+from planfly.arguments import check_arguments
+from planfly.campaigns.find_ground_risk import GroundRiskGoal, GroundRiskResult, find_ground_risk
+from planfly.flight_options import SampleOptions, takes_options
+from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import GROUND_RISK_FILES, check_output_folder, clean_folder
+from planner.plan import Plan
+from world.extras import requires_extra
+from world.files import write_atomically
+from world.population import PopulationUnit
+
+
+@requires_extra("campaigns")
+@with_warm_up(*PLANNING_AND_FLYING)
+@takes_options
+def ground_risk(
+    target: Plan | str | Path,
+    *,
+    population: str | Path | None = None,
+    population_unit: PopulationUnit = "per-cell",
+    controlled: bool = False,
+    max_speed: float | None = None,
+    probability: float = 0.95,
+    glide: bool = False,
+    every: float = 10.0,
+    out: str | Path | None = None,
+    overwrite: bool = True,
+    **options: Unpack[SampleOptions],
+) -> GroundRiskResult:
+    """Find a mission's volumes and its intrinsic ground risk class by SORA 2.5, from many flights and by formulas.
+
+    The flights vary as in `planfly.campaign`.  From each flight, returns to launch and falls to the ground are
+    simulated.
+
+    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    population: a GeoTIFF of the population, such as GHS-POP or WorldPop; None leaves the class open.
+    population_unit: unit of its numbers, people "per-cell" or "per-km2".
+    controlled: True for a controlled ground area, where only involved people are.
+    max_speed: highest speed of the aircraft, m/s; None for the highest airspeed of its model.
+    probability: fraction of the flights that the flight geography holds.
+    glide: True to include glides after an engine failure in the ground risk buffer.
+    every: time between two returns, s.
+    out: folder for ``ground-risk.kml``, ``.geojson``, ``.png`` and ``.md``; None writes none.  overwrite: True replaces
+    them.
+    flights: number of flights.  spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see
+    `planfly.fly`.
+    A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
+    Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
+
+    >>> ground_risk("paper-07", max_speed=0.0)
+    Traceback (most recent call last):
+    ...
+    world.errors.ArgumentError: max_speed 0.0: expected a speed from 1 to 300 m/s
+    """
+    check_arguments(population_unit=population_unit, max_speed=max_speed, probability=probability, every=every)
+    check_arguments(sample_flights=options["flights"])
+    workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
+    if out is not None:
+        check_output_folder(Path(out), overwrite)
+    base = open_sample(target, options)
+    goal = GroundRiskGoal(
+        probability=probability,
+        flights=options["flights"],
+        interval=every,
+        glide=glide,
+        speed=max_speed,
+        controlled=controlled,
+        population=None if population is None else Path(population),
+        unit=population_unit,
+    )
+    with stage("flying", "flying for the ground risk") as advance:
+        result = find_ground_risk(base, goal, workers_used, advance)
+    return result if out is None else _with_files(result, Path(out), overwrite=overwrite)
+
+
+def _with_files(result: GroundRiskResult, folder: Path, *, overwrite: bool) -> GroundRiskResult:
+    """Write volumes, map and table of a result into a folder, and return the result with the files."""
+    # Imported here: only pictures need matplotlib.
+    from logs.views.exports.risk_files import risk_geojson, risk_kml
+    from logs.views.figures import draw_pictures
+    from logs.views.ground_risk import RiskVolume, ground_risk_map
+    from planfly.campaigns.ground_risk_text import table_text
+
+    setup = result.base.nominal_setup()
+    volumes = (
+        RiskVolume("flight geography", "flight-geography", result.geography, result.flown.height),
+        RiskVolume(
+            "operational volume: flight geography and contingency volume",
+            "contingency-volume",
+            result.volume,
+            result.volume_height,
+        ),
+        RiskVolume("operational volume and ground risk buffer", "ground-risk-buffer", result.footprint, None),
+    )
+    properties = {"mission": result.base.name, "ground_risk_class": result.ground_class}
+    with stage("drawing", "drawing the ground risk"):
+        pictures = draw_pictures({"ground-risk": ground_risk_map(setup, volumes, result.population)})
+    contents: dict[str, str | bytes] = {
+        "ground-risk.kml": risk_kml(setup, volumes),
+        "ground-risk.geojson": risk_geojson(setup, volumes, properties),
+        "ground-risk.png": pictures["ground-risk.png"],
+        "ground-risk.md": table_text(result),
+    }
+    clean_folder(folder, GROUND_RISK_FILES, overwrite=overwrite)
+    for name in GROUND_RISK_FILES:
+        write_atomically(folder / name, contents[name])
+    return replace(result, files=tuple(folder / name for name in GROUND_RISK_FILES))

@@ -1,0 +1,488 @@
+"""Find the volumes and the ground risk class of a mission by SORA 2.5, from many flights and by formulas.
+
+Each flight of a campaign gives the area over which it flies, with its returns to launch, and the area on which the
+aircraft can fall from there. The flight geography is a corridor about the planned path, and about the path of the
+flight without variations, that holds a fraction of the flights; contingency volume and ground risk buffer hold all
+flights, returns and falls, and the volumes by the formulas of SORA's annex A.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import Flight, fly_to_end
+from flight.simulation.track import Track
+from logs.verdict.returns.glide_map import glide_slopes
+from logs.verdict.returns.judge_glides import fly_without_engine
+from logs.verdict.returns.judge_returns import make_return_world, simulate_returns
+from logs.verdict.returns.return_starts import flown_starts
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
+from planfly.campaigns.dispersions import draw_flight
+from planfly.campaigns.fall import impact_points, plate_drag
+from planfly.campaigns.flight_requests import FlightRequest
+from planfly.campaigns.flight_row import FlightRow, Outcome
+from planfly.campaigns.sora import (
+    ContingencyFormula,
+    ballistic_buffer,
+    glide_buffer,
+    ground_risk_class,
+    min_geography_half_width,
+    one_to_one_buffer,
+)
+from planfly.campaigns.worker_pool import Workers, worker_pool
+from planfly.runtime.stages import Advance
+from world.airspace.zones_on_map import zone_parts
+from world.arrays import Floats
+from world.errors import FlightError, ScenarioError, StartError
+from world.population import Population, PopulationUnit, read_population
+from world.terrain import Terrain
+from world.wind import Wind
+
+# Time between the positions of a flight from which falls begin, s.
+_SAMPLE_INTERVAL_S = 1.0
+# Number of seconds between the positions of a return from which falls begin.
+_RETURN_SAMPLE_ROWS = 5
+# Deviation of a simplified outline, m.
+_OUTLINE_TOLERANCE_M = 0.5
+# End reason of a flight that flew its mission to the end.
+_COMPLETED = "completed"
+
+
+@dataclass(frozen=True, slots=True)
+class GroundRiskGoal:
+    """Question about the ground risk of a mission.
+
+    probability: fraction of the flights that the flight geography holds.
+    flights: number of flights.
+    interval: time between two returns, s.
+    glide: True to include the glide after an engine failure.
+    speed: highest speed of the aircraft, m/s; None for the highest airspeed of its model.
+    controlled: True for a controlled ground area.
+    population: file of the population raster, or None.
+    unit: unit of its numbers.
+    """
+
+    probability: float = 0.95
+    flights: int = 100
+    interval: float = 10.0
+    glide: bool = False
+    speed: float | None = None
+    controlled: bool = False
+    population: Path | None = None
+    unit: PopulationUnit = "per-cell"
+
+
+@dataclass(frozen=True, slots=True)
+class ExcursionRow(FlightRow):
+    """Row of a flight with the areas that it needs.
+
+    deviation: largest horizontal distance from the planned path and the path of the flight without variations, m.
+    height: largest height above ground in flight, m.
+    return_height: largest height above ground in flight or in a return, m.
+    ground_speed: highest speed over the ground, m/s.
+    flown, fallen: areas below flight and returns, and of the falls from there, as WKB in m on the map.
+    """
+
+    deviation: float = math.nan
+    height: float = math.nan
+    return_height: float = math.nan
+    ground_speed: float = math.nan
+    flown: bytes = b""
+    fallen: bytes = b""
+
+
+def fly_for_excursions(
+    base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
+) -> ExcursionRow:
+    """Fly one flight of a campaign, and find the areas below it and its returns, and of the falls from there.
+
+    index: number of the flight, from 0.
+    wind: mean wind that replaces the scenario's wind, or None.
+    path: planned path, and that of the flight without variations, m.
+    interval: time between two returns, s.
+    glide: True to include the glide after an engine failure.
+    """
+    draw = draw_flight(base.dispersions, base.seed, index)
+    varied = vary_flight(base, draw, wind)
+    setup, off_nominal = varied.setup, varied.off_nominal
+    try:
+        flight = Flight(setup, varied.airframe.aircraft, off_nominal.variation, start_offset=off_nominal.start_offset)
+    except StartError as error:
+        return ExcursionRow(draw=draw, outcome="not flyable", ended=str(error))
+    flown = fly_to_end(flight)
+    outcome: Outcome = "flyable" if flown.ended == _COMPLETED else "not flyable"
+    row = ExcursionRow(draw=draw, outcome=outcome, ended=flown.ended)
+    terrain = setup.scenario.terrain
+    if len(flown.track) < 2 or terrain is None:
+        return row
+    positions, velocities = _sampled_flight(flown.track)
+    paths = _return_paths(setup, flown.track, interval, glide=glide)
+    airframe = varied.airframe.aircraft
+    sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
+    half_span = 0.5 * airframe.wing_span
+    lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
+    flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns)])
+    falls = _fall_areas(sampled, airframe, setup.scenario.wind, terrain)
+    glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
+    fallen_area = shapely.union_all([flown_area, *falls, *glides])
+    height = _largest_height(positions, terrain)
+    distances = shapely.distance(shapely.points(positions[:, :2]), path)
+    return replace(
+        row,
+        duration=float(flown.track.time[-1]),
+        deviation=float(distances.max()),
+        height=height,
+        return_height=max([height, *(_largest_height(each, terrain) for each in paths.returns)]),
+        ground_speed=float(np.hypot(velocities[:, 0], velocities[:, 1]).max()),
+        flown=shapely.to_wkb(flown_area.simplify(_OUTLINE_TOLERANCE_M)),
+        fallen=shapely.to_wkb(fallen_area.buffer(half_span).simplify(_OUTLINE_TOLERANCE_M)),
+    )
+
+
+def _sampled_flight(track: Track) -> tuple[Floats, Floats]:
+    """Return positions and ground velocities of a track at intervals, and at its end, m and m/s, (n, 3) each."""
+    is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.velocity).all(axis=1)
+    rows = np.flatnonzero(is_usable)
+    steps = np.floor(track.time[rows] / _SAMPLE_INTERVAL_S + 1e-9)
+    is_kept = np.concatenate([[True], np.diff(steps) > 0.0])
+    is_kept[-1] = True
+    kept = rows[is_kept]
+    return track.position[kept], track.velocity[kept].astype(np.float64)
+
+
+def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
+    """Return positions and ground velocities of a return with a position each second, m and m/s, (n, 3) each."""
+    rows = np.union1d(np.arange(0, len(path), _RETURN_SAMPLE_ROWS), [len(path) - 1])
+    return path[rows], np.gradient(path, axis=0)[rows]
+
+
+class _ReturnPaths(NamedTuple):
+    """Paths of the returns from a flight, in order of their starts.
+
+    returns: positions, m, (n, 3) each.
+    loiters: areas of their loiters, m.
+    glides: paths of glides to the ground, m, (n, 3) each.
+    """
+
+    returns: list[Floats]
+    loiters: list[BaseGeometry]
+    glides: list[Floats]
+
+
+def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: bool) -> _ReturnPaths:
+    """Return the paths of the returns from a track; none without a home.
+
+    interval: time between two returns, s.
+    glide: True to simulate the returns without an engine, too.
+    """
+    none = _ReturnPaths([], [], [])
+    if setup.mission.home is None:
+        return none
+    world, starts = make_return_world(setup), flown_starts(setup, track, interval)
+    if not len(starts):
+        return none
+    targets = [world.target(row) for row in starts.rows]
+    _, paths = simulate_returns(world, starts, targets, store_paths=True)
+    radius = abs(ArduPlane(world.parameters).returns.rules.radius)
+    positions = {target.position[:2] for target in targets if not target.straight}
+    glides: list[Floats] = []
+    if glide and world.aircraft.glides:
+        gliding = fly_without_engine(world, starts, targets, store_paths=True)
+        glides = [
+            one
+            for one, result in zip(gliding.tracks, gliding.results, strict=True)
+            if len(one) > 1 and result["outcome"] == RETURN_GROUND_IMPACT
+        ]
+    loiters = [shapely.Point(position).buffer(radius) for position in positions]
+    return _ReturnPaths([path for path in paths if len(path) > 1], loiters, glides)
+
+
+def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
+    """Return the areas between neighbouring returns: a return may begin at any time between theirs."""
+    lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
+    rings = [np.concatenate([one, other[::-1]]) for one, other in itertools.pairwise(lines)]
+    return [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
+
+
+def _fall_areas(
+    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind: Wind, terrain: Terrain
+) -> list[BaseGeometry]:
+    """Return the areas on which an aircraft can fall from paths: the hull of each piece of a path and its impacts.
+
+    sampled: positions and velocities of each path, m and m/s, (n, 3) each.
+    """
+    positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
+    impacts = [impact_points(positions, velocities, drag, wind, terrain) for drag in (0.0, plate_drag(aircraft))]
+    points = np.stack([positions[:, :2], *impacts], axis=1)
+    ends = np.cumsum([len(each) for each, _ in sampled])[:-1]
+    areas = []
+    for part in np.split(points, ends):
+        corners = np.concatenate([part[:-1], part[1:]], axis=1)
+        hulls = shapely.convex_hull(shapely.multipoints(shapely.points(corners)))
+        areas.append(shapely.union_all(hulls))
+    return areas
+
+
+def _largest_height(positions: Floats, terrain: Terrain) -> float:
+    """Return the largest height above ground of positions, m; -inf if no ground is known."""
+    heights = positions[:, 2] - terrain.height(positions[:, 0], positions[:, 1])
+    return float(np.max(heights, where=np.isfinite(heights), initial=-math.inf))
+
+
+class FlownVolumes(NamedTuple):
+    """Dimensions of the volumes that the flights need, m.
+
+    deviation: distance from the path that holds the goal's fraction of the flights.
+    height: height above ground that holds the same fraction.
+    contingency_width: largest distance of a flight or a return beyond the flight geography.
+    contingency_height: largest height above ground of a flight or a return.
+    buffer_width: largest distance of an impact beyond flights, returns and flight geography.
+    """
+
+    deviation: float
+    height: float
+    contingency_width: float
+    contingency_height: float
+    buffer_width: float
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class GroundRiskResult:
+    """Result of `planfly.ground_risk`.
+
+    flown: dimensions that the flights need.
+    formula: contingency volume by formula.
+    glide_ratio: best glide ratio of the aircraft; None if glides are not asked for.
+    speed: highest speed of the aircraft, m/s.
+    geography, volume, footprint: flight geography; operational volume, which is flight geography and contingency
+        volume; and operational volume with ground risk buffer, on the map, m.
+    population: population in the footprint; None without a raster.
+    ground_class: intrinsic ground risk class; None if it is not judged, or if the operation is not part of SORA.
+    files: files written; empty if no folder was named.
+    """
+
+    goal: GroundRiskGoal
+    base: CampaignBase
+    rows: tuple[ExcursionRow, ...]
+    flown: FlownVolumes
+    formula: ContingencyFormula
+    glide_ratio: float | None
+    speed: float
+    geography: BaseGeometry
+    volume: BaseGeometry
+    footprint: BaseGeometry
+    population: Population | None = None
+    ground_class: int | None = None
+    files: tuple[Path, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<GroundRiskResult {self.base.name}: {self.ground_class}>"
+
+    @property
+    def aircraft(self) -> Aircraft:
+        """The aircraft."""
+        return self.base.airframe.aircraft
+
+    @property
+    def lost(self) -> int:
+        """Number of flights that could not be flown."""
+        return self.goal.flights - len(self.rows)
+
+    @property
+    def half_width(self) -> float:
+        """Distance from the path to the edge of the flight geography, m."""
+        return max(self.flown.deviation, min_geography_half_width(self.aircraft.wing_span))
+
+    @property
+    def volume_height(self) -> float:
+        """Height of the operational volume above ground, m: the larger of the flown one and the formula's."""
+        return max(self.flown.contingency_height, self.formula.height)
+
+    @property
+    def one_to_one_buffer(self) -> float:
+        """Width of the ground risk buffer by the 1:1 rule, m."""
+        return one_to_one_buffer(self.volume_height, self.aircraft.wing_span)
+
+    @property
+    def ballistic_buffer(self) -> float:
+        """Width of the ground risk buffer by a fall without drag, m; for comparison only."""
+        return ballistic_buffer(self.volume_height, self.aircraft.wing_span, self.speed)
+
+    @property
+    def glide_buffer(self) -> float | None:
+        """Width of the ground risk buffer by a glide, m; None if glides are not asked for."""
+        return None if self.glide_ratio is None else glide_buffer(self.volume_height, self.glide_ratio)
+
+    @property
+    def formula_buffer(self) -> float:
+        """Width of the ground risk buffer by formula, m."""
+        return max(self.one_to_one_buffer, self.glide_buffer or 0.0)
+
+    @property
+    def is_judged(self) -> bool:
+        """True if the class is known, or known to be outside SORA."""
+        return self.goal.controlled or (self.population is not None and self.population.is_complete)
+
+    @property
+    def entered_zones(self) -> tuple[str, ...]:
+        """Names of the scenario's zones whose area the operational volume meets, whatever their heights."""
+        zones = (*self.base.scenario.zones,)
+        areas = (
+            shapely.union_all([shapely.Polygon(outline, holes) for outline, *holes in zone_parts(zone)])
+            for zone in zones
+        )
+        return tuple(zone.name for zone, area in zip(zones, areas, strict=True) if area.intersects(self.volume))
+
+
+def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers, advance: Advance) -> GroundRiskResult:
+    """Find the volumes of a mission, and its ground risk class if the population is known.
+
+    Raises ScenarioError without terrain, FlightError if no flight can be flown, and PlanflyError for a population
+    raster that cannot be used.
+    """
+    scenario, aircraft = base.scenario, base.airframe.aircraft
+    if scenario.terrain is None:
+        message = f"{base.name}: heights above ground need an elevation file: name a terrain"
+        raise ScenarioError(message, file=base.name, field="terrain")
+    path = nominal_path(base)
+    if goal.population is not None:
+        # A bad raster is refused before the flights.
+        least_area = path.buffer(min_geography_half_width(aircraft.wing_span))
+        read_population(goal.population, goal.unit, scenario.origin, least_area)
+    rows = _fly_excursions(base, goal, path, workers, advance)
+    glide_ratio = _best_glide_ratio(base) if goal.glide else None
+    return with_ground_class(make_volumes(base, goal, path, rows, glide_ratio))
+
+
+def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
+    """Return a result with the population of its footprint and its ground risk class.
+
+    Raises PlanflyError for a population raster that cannot be used.
+    """
+    goal, aircraft = result.goal, result.aircraft
+    if goal.population is not None:
+        origin = result.base.scenario.origin
+        population = read_population(goal.population, goal.unit, origin, result.footprint)
+        result = replace(result, population=population)
+    if not result.is_judged:
+        return result
+    density = 0.0 if result.population is None else result.population.max_density
+    found_class = ground_risk_class(
+        density, aircraft.wing_span, result.speed, aircraft.mass, controlled=goal.controlled
+    )
+    return replace(result, ground_class=found_class)
+
+
+def nominal_path(base: CampaignBase) -> BaseGeometry:
+    """Return the path of the flight without variations, and the lines of the route, m."""
+    setup = base.nominal_setup()
+    track = fly_to_end(Flight(setup, base.airframe.aircraft)).track
+    if len(track) < 2:
+        raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
+    positions, _ = _sampled_flight(track)
+    return shapely.MultiLineString([positions[:, :2], setup.route.positions[:, :2]]).simplify(0.1)
+
+
+def _fly_excursions(
+    base: CampaignBase, goal: GroundRiskGoal, path: BaseGeometry, workers: Workers, advance: Advance
+) -> tuple[ExcursionRow, ...]:
+    """Fly the flights of a campaign for their areas; return the rows with areas in the order of the draws."""
+    indices: Iterator[int] = iter(range(goal.flights))
+
+    def next_request() -> FlightRequest | None:
+        index = next(indices, None)
+        return None if index is None else FlightRequest(index)
+
+    fly = partial(fly_for_excursions, path=path, interval=goal.interval, glide=goal.glide)
+    rows: dict[int, ExcursionRow] = {}
+    with worker_pool(workers, base, fly) as pool:
+        for count, finished in enumerate(pool.fly(next_request), 1):
+            advance(count, goal.flights, f"{count} of {goal.flights} flights")
+            if isinstance(finished.row, ExcursionRow) and finished.row.flown:
+                rows[finished.request.index] = finished.row
+    if not rows:
+        raise FlightError(f"{base.name}: no flight could be flown", file=base.name)
+    return tuple(rows[index] for index in sorted(rows))
+
+
+def _best_glide_ratio(base: CampaignBase) -> float:
+    """Return the largest distance per height lost of a glide in calm air.
+
+    Raises FlightError for a model without trims with the throttle closed.
+    """
+    from flight.autopilots.arduplane.point_mass import make_point_mass
+
+    aircraft, setup = base.airframe.aircraft, base.nominal_setup()
+    model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())
+    if not model.glides:
+        message = f"{aircraft.name}: its model has no trim with the throttle closed, so its glide is unknown"
+        raise FlightError(message, file=aircraft.name)
+    altitude = float(setup.route.positions[0, 2])
+    airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 20)
+    return max(1.0 / float(glide_slopes(model, float(one), altitude, altitude + 1.0).table.min()) for one in airspeeds)
+
+
+def make_volumes(
+    base: CampaignBase,
+    goal: GroundRiskGoal,
+    path: BaseGeometry,
+    rows: tuple[ExcursionRow, ...],
+    glide_ratio: float | None,
+) -> GroundRiskResult:
+    """Make the volumes from the rows of the flights.
+
+    path: planned path, and that of the flight without variations, m.
+    glide_ratio: best glide ratio; None if glides are not asked for.
+    """
+    aircraft = base.airframe.aircraft
+    if not all(math.isfinite(row.height) for row in rows):
+        message = f"{base.name}: no ground is known below some flights; name an elevation file that covers them"
+        raise ScenarioError(message, file=base.name, field="terrain")
+    deviation, height = (
+        float(np.quantile(values, goal.probability, method="median_unbiased"))
+        for values in ([row.deviation for row in rows], [row.height for row in rows])
+    )
+    geography = path.buffer(max(deviation, min_geography_half_width(aircraft.wing_span)))
+    flown_area = shapely.union_all([geography, *shapely.from_wkb([row.flown for row in rows])])
+    fallen_area = shapely.union_all(shapely.from_wkb([row.fallen for row in rows]))
+    flown = FlownVolumes(
+        deviation=deviation,
+        height=height,
+        contingency_width=_reach(flown_area, geography),
+        contingency_height=max(row.return_height for row in rows),
+        buffer_width=_reach(fallen_area, flown_area),
+    )
+    speed = goal.speed or aircraft.airspeed_max
+    formula = ContingencyFormula(speed, height)
+    volume = shapely.union_all([flown_area, geography.buffer(formula.width)])
+    result = GroundRiskResult(goal, base, rows, flown, formula, glide_ratio, speed, geography, volume, footprint=volume)
+    footprint = shapely.union_all([volume.buffer(result.formula_buffer), fallen_area])
+    return replace(result, volume=_without_filled_holes(volume, footprint), footprint=footprint)
+
+
+def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGeometry:
+    """Return an area without the holes that a footprint fills, such as gaps between returns.
+
+    >>> ring = shapely.Point(0.0, 0.0).buffer(10.0) - shapely.Point(0.0, 0.0).buffer(2.0)
+    >>> len(_without_filled_holes(ring, shapely.box(-20.0, -20.0, 20.0, 20.0)).interiors)
+    0
+    """
+    holes = [shapely.Polygon(ring) for part in shapely.get_parts(area) for ring in part.interiors]
+    return shapely.union_all([area, *(hole for hole in holes if footprint.covers(hole))])
+
+
+def _reach(outer: BaseGeometry, inner: BaseGeometry) -> float:
+    """Return the largest distance of an area's outline beyond another area, m."""
+    return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max())

@@ -1,0 +1,228 @@
+"""Describe the ground risk of a mission in lines, and in a table for an application."""
+
+from logs.verdict.conditions import flown_lines
+from planfly.campaigns.find_ground_risk import GroundRiskResult
+from planfly.campaigns.sora import IGRC_COLUMNS
+from world.population import DENSITY_LIMITS_PER_KM2, Population, density_band
+from world.wording import count_text
+
+# Statement of what the result is not.
+DISCLAIMER = (
+    "This is a computation, not an approval: the authority decides on the population data, the volumes and the class."
+    " It has no mitigations, no final ground risk class, and no air risk class: of the airspace it knows only the zones"
+    " that it was given."
+)
+
+
+def answer_line(result: GroundRiskResult) -> str:
+    """Return the ground risk class in one line."""
+    if not result.is_judged:
+        return f"class not judged: {_unknown_reason(result)}"
+    where = "a controlled ground area" if result.goal.controlled else density_text(result.population)
+    aircraft_text = f"{result.aircraft.wing_span:g} m span, {result.speed:g} m/s, {where}"
+    if result.ground_class is None:
+        return f"not part of SORA: {aircraft_text} (main body, table 2)"
+    return f"intrinsic ground risk class {result.ground_class}: {aircraft_text}"
+
+
+def density_text(population: Population | None) -> str:
+    """Return the highest density as text."""
+    return "population unknown" if population is None else f"at most {population.max_density:,.4g} people/km²"
+
+
+def _unknown_reason(result: GroundRiskResult) -> str:
+    """Return why the class is not judged."""
+    if result.population is None:
+        return "no population raster was named (--population)"
+    known = result.population.known_fraction
+    shown = "over 99.9%" if known > 0.999 else f"{known:.1%}"
+    return (
+        f"{result.population.source} has data for {shown} of the footprint's cells"
+        f" ({density_text(result.population)} there)"
+    )
+
+
+def risk_lines(result: GroundRiskResult) -> list[str]:
+    """Return the lines below the answer: volumes, population, zones, flights, and what the result is not."""
+    flown, formula = result.flown, result.formula
+    lines = [
+        f"flight geography: {result.half_width:.0f} m to either side of the path, {flown.height:.0f} m above ground"
+        f" ({_share_text(result)} stay within)",
+        f"contingency volume: {flown.contingency_width:.0f} m beyond it, {flown.contingency_height:.0f} m above ground"
+        f" in flights and returns; {formula.width:.0f} m, {formula.height:.0f} m by Annex A",
+        f"ground risk buffer: {flown.buffer_width:.0f} m beyond flights and returns by falls"
+        f"{' and glides' if result.goal.glide else ''};"
+        f" {result.one_to_one_buffer:.0f} m by the 1:1 rule{_glide_text(result)}",
+        f"areas: operational volume {result.volume.area / 1e6:.2f} km², with its ground risk buffer"
+        f" {result.footprint.area / 1e6:.2f} km²",
+    ]
+    if result.population is not None:
+        lines.append(_population_line(result.population))
+    if result.entered_zones:
+        lines.append(f"zones below or in the operational volume: {', '.join(result.entered_zones)}")
+    lines += _flight_lines(result)
+    return [*lines, DISCLAIMER]
+
+
+def _share_text(result: GroundRiskResult) -> str:
+    """Return the fraction of the flights in the flight geography."""
+    return f"{result.goal.probability:.0%} of {count_text(len(result.rows), 'flight')}"
+
+
+def _glide_text(result: GroundRiskResult) -> str:
+    """Return the buffer by a glide, if it was asked for."""
+    if result.glide_buffer is None or result.glide_ratio is None:
+        return ""
+    return f", {result.glide_buffer:.0f} m by a glide of {result.glide_ratio:.1f} : 1"
+
+
+def _population_line(population: Population) -> str:
+    """Return the line on the population of the footprint."""
+    lat, lon = population.max_position
+    return (
+        f"population: {density_text(population)}, at {lat:.5f}, {lon:.5f};"
+        f" mean {population.mean_density:,.4g} people/km²"
+        f" (cells of {population.cell_size:.0f} m of {population.source})"
+    )
+
+
+def _flight_lines(result: GroundRiskResult) -> list[str]:
+    """Return the lines on the flights."""
+    lines = []
+    if result.lost:
+        lines.append(f"{result.lost} of {result.goal.flights} flights could not be flown, and do not count")
+    endings = [row.ended for row in result.rows if row.ended != "completed"]
+    if endings:
+        most_frequent = max(set(endings), key=endings.count)
+        lines.append(
+            f"{len(endings)} of {len(result.rows)} flights do not complete the mission, most of them: {most_frequent};"
+            " their positions count too"
+        )
+    if result.base.mission.home is None:
+        lines.append("the mission has no home, so no returns were simulated")
+    ground_speed = max(row.ground_speed for row in result.rows)
+    if ground_speed > result.speed:
+        lines.append(
+            f"flights reach {ground_speed:.1f} m/s over the ground, more than the highest speed of"
+            f" {result.speed:g} m/s in the formulas (--max-speed)"
+        )
+    spread = result.base.dispersions.name
+    lines.append(
+        f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}; returns to launch by"
+        f" ArduPlane's law every {result.goal.interval:g} s"
+    )
+    return lines
+
+
+def table_text(result: GroundRiskResult) -> str:
+    """Return the table for an application, as Markdown."""
+    table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in _table_rows(result))
+    conditions = "\n".join(f"- {line}" for line in (*flown_lines(result.base.conditions()), *_flight_lines(result)))
+    return (
+        f"# Ground risk of {result.base.name}\n\n{answer_line(result)}\n\n"
+        f"| quantity | value | source |\n|---|---|---|\n{table}\n\n"
+        "Larger values count: the operational volume holds the flown contingency volume and that by formula, and the"
+        " ground risk buffer holds the falls and the width by formula. Formulas: SORA 2.5, Annex A, with the values of"
+        " the guides of LBA and FOCA. Class: SORA 2.5, main body, table 2.\n\n"
+        f"## Flights\n\n{conditions}\n\n## What this is not\n\n{DISCLAIMER}\n"
+    )
+
+
+def _table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
+    """Return the rows of the table: quantity, value and source."""
+    flown, formula, goal = result.flown, result.formula, result.goal
+    span = result.aircraft.wing_span
+    flown_by = _share_text(result)
+    return [
+        ("**aircraft**", "", ""),
+        ("aircraft", result.aircraft.title, ""),
+        ("characteristic dimension CD", f"{span:g} m", "wing span"),
+        ("highest speed v", f"{result.speed:g} m/s", "stated" if goal.speed else "highest airspeed of the model"),
+        ("take-off mass", f"{result.aircraft.mass:g} kg", ""),
+        ("**flight geography**", "", ""),
+        ("half width", f"{result.half_width:.1f} m", f"{flown_by}: {flown.deviation:.1f} m; at least 1.5 CD"),
+        ("height H_FG above ground", f"{flown.height:.1f} m", flown_by),
+        ("**contingency volume**", "", ""),
+        ("flown width", f"{flown.contingency_width:.1f} m", "all flights and their returns, beyond flight geography"),
+        (
+            "width S_CV by formula",
+            f"{formula.width:.1f} m",
+            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
+        ),
+        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
+        (
+            "height H_CV by formula",
+            f"{formula.height:.1f} m",
+            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
+        ),
+        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
+        ("**ground risk buffer**", "", ""),
+        (
+            "flown width",
+            f"{flown.buffer_width:.1f} m",
+            f"falls from all flights and returns{', and glides' if goal.glide else ''}, with the wind",
+        ),
+        ("width by the 1:1 rule", f"{result.one_to_one_buffer:.1f} m", "H + CD/2"),
+        *(
+            [("width by a glide", f"{result.glide_buffer:.1f} m", f"E H, E = {result.glide_ratio:.1f}")]
+            if result.glide_buffer is not None
+            else []
+        ),
+        (
+            "for comparison: ballistic",
+            f"{result.ballistic_buffer:.1f} m",
+            "v √(2 H/g) + CD/2, accepted for rotorcraft only",
+        ),
+        ("**areas**", "", ""),
+        ("operational volume", f"{result.volume.area / 1e6:.3f} km²", ""),
+        ("with ground risk buffer (footprint)", f"{result.footprint.area / 1e6:.3f} km²", ""),
+        *_class_rows(result),
+        ("**airspace**", "", ""),
+        (
+            "zones met by the operational volume",
+            ", ".join(result.entered_zones) or "none of those given",
+            f"{count_text(len(result.base.scenario.zones), 'zone')} given, whatever their heights",
+        ),
+    ]
+
+
+def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
+    """Return the rows of population and class."""
+    rows = [("**intrinsic ground risk class**", "", "")]
+    population = result.population
+    if population is not None:
+        lat, lon = population.max_position
+        rows += [
+            (
+                "highest population density",
+                f"{population.max_density:,.4g} people/km²",
+                f"cell at {lat:.5f}, {lon:.5f}, of all cells that the footprint touches",
+            ),
+            ("mean population density", f"{population.mean_density:,.4g} people/km²", "mean of these cells"),
+            (
+                "population raster",
+                population.source,
+                f"cells of {population.cell_size:.0f} m; data for {population.known_fraction:.1%} of the footprint",
+            ),
+        ]
+    if not result.is_judged:
+        return [*rows, ("class", "not judged", _unknown_reason(result))]
+    class_text = "not part of SORA" if result.ground_class is None else str(result.ground_class)
+    return [*rows, ("**class**", f"**{class_text}**", _row_and_column_text(result))]
+
+
+def _row_and_column_text(result: GroundRiskResult) -> str:
+    """Return the row and the column of the class in SORA's table."""
+    row = "controlled ground area"
+    if not result.goal.controlled and result.population is not None:
+        limits = [*(f"below {limit:,.0f}" for limit in DENSITY_LIMITS_PER_KM2), "from 50,000"]
+        row = f"{limits[density_band(result.population.max_density)]} people/km²"
+    column = next(
+        (
+            f"up to {widest:g} m and {fastest:g} m/s"
+            for widest, fastest in IGRC_COLUMNS
+            if result.aircraft.wing_span <= widest and result.speed <= fastest
+        ),
+        "beyond the last column",
+    )
+    return f"{row}; {column}"
