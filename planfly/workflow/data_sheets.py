@@ -688,6 +688,13 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
     ]
 
 
+def _climb_lines(file_parameters: Mapping[str, float]) -> list[str]:
+    """Return a line of ``README.md`` on the throttle of the file's climb rate; [] if it is full throttle."""
+    if not {"TECS_CLMB_MAX", "THR_MAX"} <= file_parameters.keys():
+        return []
+    return ["TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX; the table has the climb at full throttle."]
+
+
 def _readme_text(
     name: str,
     sized: SizedAircraft,
@@ -714,12 +721,7 @@ def _readme_text(
             lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in sized.guessed else 'stated'} |")
     if file_parameters:
         values_text = ", ".join(f"{key} {value:g}" for key, value in file_parameters.items())
-        lines += ["", f"From the parameter file: {values_text}."]
-    if {"TECS_CLMB_MAX", "THR_MAX"} <= file_parameters.keys():
-        lines += [
-            "",
-            "TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX; the table has the climb at full throttle.",
-        ]
+        lines += ["", f"From the parameter file: {values_text}.", *_climb_lines(file_parameters)]
     lines += [
         "",
         f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"

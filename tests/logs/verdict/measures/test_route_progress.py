@@ -127,7 +127,7 @@ def return_track(setup: FlightSetup, radius: float, end_bearing_deg: float) -> T
     points = np.vstack([corners, circle])
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
     along = np.arange(0.0, run[-1], 5.0)
-    still = np.zeros((len(along), 3))
+    still = np.zeros((len(along), 3), dtype=np.float32)
     level = fly_path(make_setup([[0, 0, 300], [0, 5.0 * len(along) + 500.0, 300]]), rate=5.0).rows(0, len(along))
     position = np.column_stack([np.interp(along, run, points[:, axis]) for axis in range(3)])
     return replace(level, position=position, velocity=still)
