@@ -37,7 +37,7 @@ class DataSheet:
     area: wing area, m^2.
     cruise, stall, top: airspeeds in level flight, m/s.
     bank: bank limit in turns.
-    climb: maximum climb angle at cruise.
+    climb: maximum climb angle at cruise, at `climb_throttle`.
     sink: sink rate at cruise without power, m/s.
     trim_throttle: throttle in level flight at cruise, 0..1.
     volts: battery voltage.
@@ -46,6 +46,7 @@ class DataSheet:
     propeller: diameter and pitch, m.
     fuel: fuel mass, kg; an aircraft with fuel has no battery.
     layout: control surfaces.
+    climb_throttle: throttle of the stated climb, 0..1.
     """
 
     mass: float
@@ -64,6 +65,7 @@ class DataSheet:
     propeller: tuple[float, float] = (0.0, 0.0)
     fuel: float = 0.0
     layout: Layout = "tail"
+    climb_throttle: float = 1.0
 
     @property
     def burns_fuel(self) -> bool:
@@ -591,7 +593,7 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
         if result.climb <= MAX_CLIMB:
             return motor, result
         # With more thrust than that, the climb is limited.
-        return _solve_motor(stated_sheet, replace(sheet, climb=MAX_CLIMB), drag, ["climb"])
+        return _solve_motor(stated_sheet, replace(sheet, climb=MAX_CLIMB, climb_throttle=1.0), drag, ["climb"])
     if stated_sheet.climb and stated_sheet.trim_throttle and not stated_sheet.top:
         # The climb that an autopilot is configured with is often less than the motor gives.
         with contextlib.suppress(_NoPropellerError):
@@ -787,10 +789,11 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
     """Return the relative excess of a motor's thrust over the thrust that a field of the sheet requires.
 
-    field: "climb" and "top" require their thrust at full throttle, "trim_throttle" requires the drag at that throttle.
+    field: "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`; "trim_throttle" requires
+        the drag at that throttle.
     """
     speed = sheet.top if field == "top" else sheet.cruise
-    throttle = sheet.trim_throttle if field == "trim_throttle" else 1.0
+    throttle = {"trim_throttle": sheet.trim_throttle, "climb": sheet.climb_throttle}.get(field, 1.0)
     needed_thrust = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if field == "climb" else 0.0)
     return motor.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
 
@@ -898,4 +901,4 @@ def _with_performance(sheet: DataSheet, motor: Motor, drag: Drag) -> DataSheet:
         airspeed = 0.5 * (min_speed + max_speed)
         has_excess = motor.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
         min_speed, max_speed = (airspeed, max_speed) if has_excess else (min_speed, airspeed)
-    return replace(sheet, climb=climb, top=min_speed)
+    return replace(sheet, climb=climb, top=min_speed, climb_throttle=1.0)

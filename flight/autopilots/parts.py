@@ -132,12 +132,16 @@ class SpeedRules:
     min_ground_speed: minimum ground speed until the mission sets another one, m/s; 0 for none.  The autopilot raises
         its airspeed to keep this ground speed.
     cruise_parameter: parameter of the cruise airspeed; "" without such a parameter.
+    max_throttle: upper limit of the throttle in flight, 0..1; 1 for full throttle.
+    max_throttle_name: parameter of this limit with its value in the autopilot's unit; "" for full throttle.
     """
 
     limits: SpeedLimits | None = None
     equivalent: bool = False
     min_ground_speed: float = 0.0
     cruise_parameter: str = ""
+    max_throttle: float = 1.0
+    max_throttle_name: str = ""
 
     def true_airspeed_factor(self, amsl: float) -> float:
         """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""

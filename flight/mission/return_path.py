@@ -181,10 +181,11 @@ class ReturnAbility(NamedTuple):
     """Abilities of the aircraft for the path of an RTL.
 
     turn_radius: radius of an arc at the bank limit between two courses (rad) at an altitude (m AMSL), m.
-    min_loiter_radius: m.
+    min_loiter_radius: radius of the tightest circle that the aircraft can fly in the wind, m.
     climb_slope, dive_slope: steepest slopes (tangents) that the aircraft can hold in any direction and in turns.
     max_bank: rad.
     airspeed: m/s.
+    loiter_radius_scale: ratio of the flown radius of the loiter to its stated radius.
     """
 
     turn_radius: Callable[[float, float, float], float]
@@ -193,6 +194,7 @@ class ReturnAbility(NamedTuple):
     dive_slope: float
     max_bank: float
     airspeed: float
+    loiter_radius_scale: float = 1.0
 
 
 def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally: Sequence[ReturnPoint]) -> ReturnTarget:
@@ -317,7 +319,8 @@ def rtl_waypoints(
         if len(previous_points) > 1
         else _course(start, target.position)
     )
-    radius = math.copysign(max(abs(rules.radius), ability.min_loiter_radius), rules.radius)
+    stated_radius = ability.loiter_radius_scale * abs(rules.radius)
+    radius = math.copysign(max(stated_radius, ability.min_loiter_radius), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive_slope, rules.max_sink_rate / ability.airspeed)
     builder = _ReturnBuilder(circle, target.slope_base, rules.min_slope_height, ability, dive, start, next_position)

@@ -492,7 +492,7 @@ def route_through_stops(
     _note_unsimulated_loiters(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
-        return_fields, landing = _append_rtl(placed_mission, return_stop, points, return_rules, limits, notes)
+        return_fields, landing = _append_rtl(placed_mission, return_stop, points, rules, limits, notes)
         if landing is not None:
             points += lay_out(read_stops(landing.stops, len(all_stops)))[0]
     _check_point_count(mission.source, len(points))
@@ -638,7 +638,7 @@ def _append_rtl(
     placed_mission: PlacedMission,
     stop: RoutePoint,
     points: list[RoutePoint],
-    rules: ReturnRules,
+    route_rules: RouteRules,
     limits: Limits | None,
     notes: Notes,
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
@@ -649,6 +649,7 @@ def _append_rtl(
     """
     source, start = placed_mission.mission.source, points[-1].map_position
     home, *rally = placed_mission.return_points
+    rules = route_rules.returns
     target = choose_target(rules, start, home, rally)
     target_altitude = target.position[2]
     if not MIN_ALTITUDE_M <= target_altitude <= MAX_ALTITUDE_M:
@@ -660,12 +661,15 @@ def _append_rtl(
         turn_radius=lambda a, b, amsl: (
             DEFAULT_LOITER_RADIUS_M if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
         ),
-        min_loiter_radius=_default_radius_function(limits)(stop.airspeed, target_altitude),
+        min_loiter_radius=_tightest_circle_radius(limits, stop.airspeed, target_altitude) or 0.0,
         climb_slope=climb_slope,
         dive_slope=dive_slope,
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
+        loiter_radius_scale=route_rules.loiters.radius_scale(target_altitude) if rules.radius else 1.0,
     )
+    if not rules.radius:
+        rules = replace(rules, radius=_default_radius_function(limits)(stop.airspeed, target_altitude))
     landing = _find_landing(placed_mission, target.position, notes) if rules.landing_join == "circle" else None
     next_text = (
         ""
@@ -684,7 +688,7 @@ def _append_rtl(
     start_index = len(points) - 1
     next_position = None if landing is None else landing.start.position
     points += rtl_waypoints(points, stop, target, rules, ability, next_position)
-    circle = ReturnCircle(*target.position, rules.radius or ability.min_loiter_radius, target.slope_base)
+    circle = ReturnCircle(*target.position, rules.radius, target.slope_base)
     return {"rtl_start": start_index, "rtl_loiter": circle}, landing
 
 
@@ -790,14 +794,21 @@ def _default_radius_function(limits: Limits | None) -> DefaultRadius:
     """
 
     def radius(airspeed: float, up: float) -> float:
-        if limits is None:
-            return DEFAULT_LOITER_RADIUS_M
-        min_radius = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
-        if not math.isfinite(min_radius):
-            return DEFAULT_LOITER_RADIUS_M
+        min_radius = _tightest_circle_radius(limits, airspeed, up) or 0.0
         return max(DEFAULT_LOITER_RADIUS_M, math.ceil(LOITER_RADIUS_MARGIN * min_radius / 10.0) * 10.0)
 
     return radius
+
+
+def _tightest_circle_radius(limits: Limits | None, airspeed: float, up: float) -> float | None:
+    """Return the radius of the tightest circle that the aircraft can fly in the wind, m; None if it is unknown.
+
+    The radius is also unknown if the wind is too strong for some of the circle's courses.
+    """
+    if limits is None:
+        return None
+    radius = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
+    return radius if math.isfinite(radius) else None
 
 
 def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:

@@ -119,14 +119,14 @@ SPEED_MEMORY_S = 12.0
 MIN_AIRBORNE_AIRSPEED_MPS = 10.0
 # Fraction of a window during which the throttle must be at a limit for the window to be saturated.
 SATURATED_FRACTION = 0.8
-# Throttle 0..1.  The throttle is at its upper limit from this on.
+# Throttle, relative to the autopilot's limit.  The throttle is at its upper limit from this on.
 FULL_THROTTLE_FRACTION = 0.99
 # Throttle 0..1.  The throttle is at its lower limit up to this.
 IDLE_THROTTLE_FRACTION = 0.01
 # A.  The motor is off up to this battery current.
 ZERO_CURRENT_A = 0.02
-# Throttle 0..1.  An aircraft's ability shows only at its full throttle: 1 % of the Aerosonde's throttle is 0.6 degrees
-# of climb.
+# Throttle, relative to the autopilot's limit.  An ability to climb shows only at this limit: 1 % of the Aerosonde's
+# throttle is 0.6 degrees of climb.
 SATURATED_THROTTLE_FRACTION = 0.999
 # s.  Least time over which an ability is measured.
 ABILITY_WINDOW_S = 1.5

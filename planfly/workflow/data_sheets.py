@@ -63,7 +63,7 @@ from world.files import temporary_folder
 # Parameters that are used.  Speeds are equivalent airspeeds, and are used as the airspeeds of the sheet.
 _USED_PARAMETERS = (
     *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
-    *("TECS_CLMB_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
+    *("TECS_CLMB_MAX", "THR_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
 )
 # Ratio of AIRSPEED_MIN to the stall speed.
 _MIN_AIRSPEED_STALL_RATIO = 1.2
@@ -103,6 +103,8 @@ def _stated_value(entries: Mapping[str, Entry], name: str, deprecated: tuple[str
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
     """Return a data sheet whose missing values are taken from ArduPlane parameters.
 
+    TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX (libraries/AP_TECS/AP_TECS.cpp).
+
     >>> sheet = DataSheet(2.1, 1.6, 0.0, 0.0)
     >>> filled = with_parameters(sheet, {"AIRSPEED_CRUISE": 15.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 3.0})
     >>> filled.cruise, filled.stall, round(math.degrees(filled.climb), 2)
@@ -118,7 +120,8 @@ def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSh
     )
     climb = parameters.get("TECS_CLMB_MAX", 0.0)
     if not filled.climb and climb and filled.cruise > climb:
-        filled = replace(filled, climb=math.asin(climb / filled.cruise))
+        climb_throttle = 0.01 * parameters.get("THR_MAX", 100.0)
+        filled = replace(filled, climb=math.asin(climb / filled.cruise), climb_throttle=climb_throttle)
     return filled
 
 
@@ -685,6 +688,13 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
     ]
 
 
+def _climb_lines(file_parameters: Mapping[str, float]) -> list[str]:
+    """Return a line of ``README.md`` on the throttle of the file's climb rate; [] if it is full throttle."""
+    if not {"TECS_CLMB_MAX", "THR_MAX"} <= file_parameters.keys():
+        return []
+    return ["TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX; the table has the climb at full throttle."]
+
+
 def _readme_text(
     name: str,
     sized: SizedAircraft,
@@ -711,7 +721,7 @@ def _readme_text(
             lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in sized.guessed else 'stated'} |")
     if file_parameters:
         values_text = ", ".join(f"{key} {value:g}" for key, value in file_parameters.items())
-        lines += ["", f"From the parameter file: {values_text}."]
+        lines += ["", f"From the parameter file: {values_text}.", *_climb_lines(file_parameters)]
     lines += [
         "",
         f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"

@@ -233,7 +233,7 @@ class ArduPlane(Autopilot):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds from AIRSPEED_MIN, AIRSPEED_MAX, AIRSPEED_CRUISE and MIN_GROUNDSPEED.
+        """Rules of airspeeds from AIRSPEED_MIN, AIRSPEED_MAX, AIRSPEED_CRUISE, MIN_GROUNDSPEED and THR_MAX.
 
         A commanded speed outside the limits changes nothing: commanded to fly at 17 m/s with AIRSPEED_MIN 18, ArduPlane
         4.6 flew on at its 25 m/s.
@@ -241,7 +241,12 @@ class ArduPlane(Autopilot):
         parameters = self.parameters
         limits = SpeedLimits(parameters.airspeed_min, parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
         return SpeedRules(
-            limits, equivalent=True, min_ground_speed=parameters.ground_speed_min, cruise_parameter="AIRSPEED_CRUISE"
+            limits,
+            equivalent=True,
+            min_ground_speed=parameters.ground_speed_min,
+            cruise_parameter="AIRSPEED_CRUISE",
+            max_throttle=parameters.throttle_max,
+            max_throttle_name=f"THR_MAX {100.0 * parameters.throttle_max:g} %" if parameters.throttle_max < 1.0 else "",
         )
 
     @property

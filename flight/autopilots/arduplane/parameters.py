@@ -582,6 +582,7 @@ HEIGHT_CANDIDATES = (
     Candidate("TECS_CLMB_MAX", 0.5, 10.0, "m/s"),
     Candidate("TECS_SINK_MAX", 0.5, 10.0, "m/s"),
     Candidate("TECS_TIME_CONST", 0.2, 3.0, "s"),
+    Candidate("THR_MAX", 5.0, 100.0, "%"),
 )
 SIDE_CANDIDATES = (
     Candidate("NAVL1_PERIOD", 1.0, 10.0, "s"),

@@ -349,10 +349,20 @@ class Px4(Autopilot):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds; a speed outside FW_AIRSPD_MIN and FW_AIRSPD_MAX is replaced by the nearest limit."""
+        """Rules of airspeeds and of the throttle limit FW_THR_MAX.
+
+        A speed outside FW_AIRSPD_MIN and FW_AIRSPD_MAX is replaced by the nearest limit.
+        """
         min_airspeed, max_airspeed = self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"]
         limits = SpeedLimits(min_airspeed, max_airspeed, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
-        return SpeedRules(limits, equivalent=True, cruise_parameter="FW_AIRSPD_TRIM")
+        max_throttle = self.parameters["FW_THR_MAX"]
+        return SpeedRules(
+            limits,
+            equivalent=True,
+            cruise_parameter="FW_AIRSPD_TRIM",
+            max_throttle=max_throttle,
+            max_throttle_name=f"FW_THR_MAX {max_throttle:g}" if max_throttle < 1.0 else "",
+        )
 
     @property
     def returns(self) -> ReturnBehaviour:

@@ -340,6 +340,7 @@ HEIGHT_CANDIDATES = (
     Candidate("FW_T_SINK_R_SP", 0.5, 6.0, "m/s"),
     Candidate("FW_T_HRATE_FF", 0.1, 1.0, ""),
     Candidate("FW_T_ALT_TC", 0.5, 2.0, "s"),
+    Candidate("FW_THR_MAX", 0.05, 1.0, ""),
 )
 SIDE_CANDIDATES = (
     Candidate("NAV_ACC_RAD", 5.0, 60.0, "m"),

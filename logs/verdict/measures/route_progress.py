@@ -6,11 +6,13 @@ recorded about itself are not read.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.route import Route
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.tolerances import CAPTURE_RADIUS_M
@@ -147,20 +149,44 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
                 for k in range(i, len(points))
                 if route.stops[k] == route.stops[i] and route.arc_radii[i : k + 1].all()
             ]
-            positions[-1][-1], radii[-1][-1] = _loiter_center(route, points[corners], float(route.arc_radii[i]), i)
+            positions[-1][-1], radii[-1][-1] = _loiter_center(route, corners)
     return _Samples(np.concatenate(positions), np.concatenate(radii), np.concatenate(distances), sample_of_waypoint)
 
 
-def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
-    """Return the center of a loiter's corners, m, (2,), and the radius around it within which the loiter is flown, m.
+def _loiter_center(route: Route, waypoints: Sequence[int]) -> tuple[Floats, float]:
+    """Return the center of a loiter, m, (2,), and the radius around it within which the loiter is flown, m.
 
-    first: waypoint of the loiter's first corner.
+    waypoints: waypoints at the loiter's corners.
     """
+    loiter_circle = rtl_arrival_circle(route)
+    # The arcs of an RTL before its last one are turns on the way to its loiter.
+    is_rtl_loiter = (
+        waypoints[0] in rtl_waypoints(route) and not route.arc_radii[waypoints[-1] + 1 : route.rtl_end].any()
+    )
+    if loiter_circle is not None and is_rtl_loiter:
+        return loiter_circle
+    corners = route.positions[waypoints, :2]
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    reach_radius = float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
-    if route.rtl_start is not None and route.rtl_start < first < route.rtl_end:
-        reach_radius = max(reach_radius, RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
-    return center, reach_radius
+    return center, float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
+
+
+def rtl_waypoints(route: Route) -> range:
+    """Return the waypoints of an RTL, which represent the path that the autopilot chooses; empty without an RTL."""
+    return range(0) if route.rtl_start is None else range(route.rtl_start + 1, route.rtl_end)
+
+
+def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
+    """Return the center of an RTL's loiter, m, (2,), and the radius within which the RTL has arrived at it, m.
+
+    Return None without an RTL.  A simulated flight arrives within the same radius
+    (`flight.simulation.tick.update_rtl_loiter`), which does not depend on the waypoints that represent the loiter.
+    """
+    loiter = route.rtl_loiter
+    if loiter is None:
+        return None
+    # True radii grow with altitude as the square of true airspeed.
+    radius = abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
+    return np.array(loiter[:2]), max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
 
 
 @compiled

@@ -284,10 +284,13 @@ def _saturation_times(
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
-    """Return two masks (n,): True for rows with full throttle, and True for rows with idle throttle."""
+    """Return two masks (n,): True for rows with full throttle, and True for rows with idle throttle.
+
+    Full throttle is the autopilot's own upper limit.
+    """
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
-    is_full = throttle >= FULL_THROTTLE_FRACTION
+    is_full = throttle >= FULL_THROTTLE_FRACTION * requirements.setup.autopilot.speeds.max_throttle
     is_idle = throttle <= IDLE_THROTTLE_FRACTION
     if not requirements.setup.envelope.motor_braking and aligned.draws_current:
         is_idle |= (track.current[rows] <= ZERO_CURRENT_A) & ~is_full
@@ -308,7 +311,8 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     if rows.stop - rows.start < 3:
         return None
     is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
-    is_at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
+    max_throttle = requirements.setup.autopilot.speeds.max_throttle
+    is_at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION * max_throttle
     distance_along, _ = project_onto_leg(requirements, leg, track.position[rows])
     span_start, span_end = straight_span(requirements, leg, 0.0)
     is_measured = _rows_after_run(is_at_full if sign > 0.0 else is_at_idle, round(ABILITY_SETTLING_S / aligned.tick))

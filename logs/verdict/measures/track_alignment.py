@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.simulation.setup import FlightSetup
-from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
+from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import acceptance_condition
 from logs.verdict.measures.path_sweeps import path_clearance
-from logs.verdict.measures.route_progress import RouteProgress, route_progress
+from logs.verdict.measures.route_progress import RouteProgress, route_progress, rtl_arrival_circle, rtl_waypoints
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.tolerances import (
     CAPTURE_RADIUS_M,
@@ -122,11 +121,11 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     progress = route_progress(
         requirements.setup.route, usable_track.position, anywhere=requirements.setup.source is not None
     )
-    arrival_radius = _arrival_radii(requirements)
-    progress = _advance_target_to_arrival(requirements, usable_track, progress, arrival_radius)
+    centers, arrival_radius = _arrival_circles(requirements)
+    progress = _advance_target_to_arrival(usable_track, progress, centers, arrival_radius)
     rows, distance = _find_passage_rows(usable_track, apexes, progress)
-    distances = np.hypot(*(usable_track.position[rows, :2] - requirements.points[:, :2]).T)
-    # A waypoint was passed if the track goes on after its nearest row, or ends within its arrival radius; but a
+    distances = np.hypot(*(usable_track.position[rows, :2] - centers).T)
+    # A waypoint was passed if the track goes on after its nearest row, or ends within its arrival circle; but a
     # waypoint that is far ahead along the route was not passed.
     is_far_ahead = progress.remaining_distance > arrival_radius + _MISSED_MARGIN_M
     is_far_ahead[-1] = False
@@ -134,7 +133,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     passed &= np.arange(len(rows)) <= progress.target
     passed = np.logical_and.accumulate(passed)
     rows[~passed] = last_row
-    _advance_last_leg(requirements, usable_track, rows, passed, arrival_radius)
+    _advance_last_leg(requirements, usable_track, rows, passed, centers, arrival_radius)
     steps = np.diff(usable_track.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
     terrain = requirements.setup.scenario.terrain
@@ -158,45 +157,46 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     )
 
 
-def _arrival_radii(requirements: RouteRequirements) -> Floats:
-    """Return the radius around each waypoint within which a track that ends has arrived at the waypoint, m, (w,)."""
+def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
+    """Return the circle around each waypoint within which a track that ends has arrived at the waypoint.
+
+    Return the centers, m, (w, 2), and the radii, m, (w,).
+    """
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.turns.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.points))
-    radii = [
-        max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
-        for i, offset in enumerate(offsets)
-    ]
-    first_return = route.rtl_start
-    if first_return is not None:
-        # A return may end anywhere on its loiter, and the flown loiter may differ from the drawn one.
-        end_return, loiter = route.rtl_end, route.rtl_loiter
-        loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
-        return_radius = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
-        radii[first_return + 1 : end_return] = [
-            max(return_radius, radius) for radius in radii[first_return + 1 : end_return]
-        ]
+    centers, radii = (
+        requirements.points[:, :2].copy(),
+        np.array(
+            [
+                max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
+                for i, offset in enumerate(offsets)
+            ]
+        ),
+    )
+    loiter_circle = rtl_arrival_circle(route)
+    if loiter_circle is not None:
+        # The autopilot chooses the path of an RTL and where on the loiter it ends, so the drawn waypoints do not count.
+        centers[rtl_waypoints(route)], radii[rtl_waypoints(route)] = loiter_circle
     if requirements.setup.autopilot.loiters.steers_to_center:
         # A mission that ends on a loiter may end anywhere on the loiter, which may be flown wider than drawn.
         k, item = route.arc_radii.size - 1, route.items[-1]
         while k > 0 and route.items[k] == item and route.arc_radii[k - 1]:
             radii[k] = max(radii[k], RTL_ARRIVAL_RADIUS_M)
             k -= 1
-    return np.array(radii)
+    return centers, radii
 
 
 def _advance_target_to_arrival(
-    requirements: RouteRequirements, track: Track, progress: RouteProgress, arrival_radius: Floats
+    track: Track, progress: RouteProgress, centers: Floats, arrival_radius: Floats
 ) -> RouteProgress:
     """Return the progress with its target advanced past each waypoint that the track has reached for good.
 
-    Once inside a waypoint's arrival radius, without leaving it again, the aircraft already flies to the next waypoint.
+    Once inside a waypoint's arrival circle, without leaving it again, the aircraft already flies to the next waypoint.
     """
-    points, final_row, target = requirements.points, len(track) - 1, progress.target
+    final_row, target = len(track) - 1, progress.target
     first_row, last_row = progress.first.copy(), progress.last.copy()
-    while target + 1 < len(points):
-        rows_outside = np.flatnonzero(
-            np.hypot(*(track.position[:, :2] - points[target, :2]).T) > arrival_radius[target]
-        )
+    while target + 1 < len(centers):
+        rows_outside = np.flatnonzero(np.hypot(*(track.position[:, :2] - centers[target]).T) > arrival_radius[target])
         entry_row = int(rows_outside[-1]) + 1 if rows_outside.size else 0
         if entry_row > final_row:
             break
@@ -206,11 +206,16 @@ def _advance_target_to_arrival(
 
 
 def _advance_last_leg(
-    requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrival_radius: Floats
+    requirements: RouteRequirements,
+    track: Track,
+    rows: RowNumbers,
+    passed: NDArray[np.bool_],
+    centers: Floats,
+    arrival_radius: Floats,
 ) -> None:
-    """Move the start of the track's last leg in ``rows`` to the row at which the track entered the arrival radius.
+    """Move the start of the track's last leg in ``rows`` to the row at which the track entered the arrival circle.
 
-    ``rows`` changes only if the track ends inside the arrival radius of the last passed waypoint, before the waypoint:
+    ``rows`` changes only if the track ends inside the arrival circle of the last passed waypoint, before the waypoint:
     the autopilot is then already on the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
@@ -220,7 +225,7 @@ def _advance_last_leg(
         or requirements.setup.route.arc_radii[last_passed] > 0.0
     ):
         return
-    distances = np.hypot(*(track.position[:, :2] - requirements.points[last_passed, :2]).T)
+    distances = np.hypot(*(track.position[:, :2] - centers[last_passed]).T)
     rows_outside = np.flatnonzero(distances[rows[last_passed - 1] :] > arrival_radius[last_passed])
     rows[last_passed] = min(
         rows[last_passed] - 1, rows[last_passed - 1] + (int(rows_outside[-1]) + 1 if rows_outside.size else 0)

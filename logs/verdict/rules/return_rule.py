@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import Command
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
-from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
+from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
 from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
 from logs.verdict.measures.mission_ends import judged_return_text, judges_return_after_last_item
+from logs.verdict.measures.route_progress import rtl_arrival_circle
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -210,16 +210,12 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
     The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
     (`flight.simulation.tick.update_rtl_loiter`).
     """
-    loiter = requirements.setup.route.rtl_loiter
-    if loiter is None:
+    loiter, arrival_circle = requirements.setup.route.rtl_loiter, rtl_arrival_circle(requirements.setup.route)
+    if loiter is None or arrival_circle is None:
         return False
     track = aligned.track
     east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
-    # True radii grow with altitude as the square of true airspeed.
-    radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * eas_to_tas_ratio(loiter.up) ** 2
-    is_at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, radius)) & (
-        np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
-    )
+    is_at_loiter = (np.hypot(east, north) < arrival_circle[1]) & (np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M)
     if not is_at_loiter.any():
         return False
     first = int(np.argmax(is_at_loiter))

@@ -67,7 +67,7 @@ def _leg_finding(
     if measure is not None:
         performance_faults = _performance_faults(requirements, leg, measure)
         flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-        facts += [text for name, text in _flown_facts(measure) if name not in flown_faults]
+        facts += [text for name, text in _flown_facts(requirements, measure) if name not in flown_faults]
         # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
         # on the leg is only reported.
         facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
@@ -249,6 +249,12 @@ def _distance_text(distance: float) -> str:
     return f"{distance / 1000.0:.1f} km" if distance >= 1000.0 else f"{distance:.0f} m"
 
 
+def _throttle_text(requirements: RouteRequirements, name: str) -> str:
+    """Describe a throttle limit: "throttle at full", or at the autopilot's limit if that is lower."""
+    limit_name = requirements.setup.autopilot.speeds.max_throttle_name
+    return f"throttle at its limit {limit_name}" if name == "full" and limit_name else f"throttle at {name}"
+
+
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
     """Return name, duration (s), speed error (m/s) and direction of the error for each throttle limit."""
     return (
@@ -257,7 +263,7 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
     )
 
 
-def _flown_facts(measure: SlopeMeasure) -> list[tuple[str, str]]:
+def _flown_facts(requirements: RouteRequirements, measure: SlopeMeasure) -> list[tuple[str, str]]:
     """Return texts on how a leg was flown, each with the name of its quantity: (name, text)."""
     facts = []
     if measure.slope is not None:
@@ -265,7 +271,7 @@ def _flown_facts(measure: SlopeMeasure) -> list[tuple[str, str]]:
     if measure.height_error is not None:
         facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of the leg"))
     facts += [
-        (name, f"throttle at {name} for {duration:.0f} s")
+        (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
         for name, duration, _, _ in _throttle_times(measure)
         if duration >= 1.0
     ]
@@ -323,7 +329,8 @@ def _flown_faults(
             and error > max_error
             and not (has_ability and name == _throttle_limit(planned_slope))
         ):
-            brief = f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}"
+            throttle_text = _throttle_text(requirements, name)
+            brief = f"{throttle_text} for {duration:.0f} s and {error:.1f} m/s too {direction}"
             faults[name] = message(brief, f" (at most {max_error:.1f} m/s)")
     return faults
 
@@ -341,10 +348,12 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
     if ability.slope - abs(planned_slope) >= -ABILITY_TOLERANCE_RAD - ABILITY_SIGMAS * ability.error:
         return []
     verb = "climb" if planned_slope >= 0.0 else "sink"
+    limit_name = requirements.setup.autopilot.speeds.max_throttle_name if planned_slope >= 0.0 else ""
+    throttle_text = limit_name or f"{_throttle_limit(planned_slope)} throttle"
     speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
-            f"in {ability.duration:.0f} s at {_throttle_limit(planned_slope)} throttle the aircraft showed that"
+            f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
             f" it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
             f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",

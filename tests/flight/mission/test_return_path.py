@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Command
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S, RoutePoint
 from flight.mission.return_path import (
@@ -18,7 +20,7 @@ from flight.mission.return_path import (
     rtl_waypoints,
 )
 from flight.mission.route import RouteRules, make_route
-from tests.mission_lines import ORIGIN, mission, refusal, route, wp
+from tests.mission_lines import ORIGIN, mission, refusal, route, setup_of, wp
 from world.frames import to_geo
 
 HOME = ReturnPoint(0.0, 0.0, 300.0)
@@ -259,6 +261,22 @@ def test_a_route_goes_back_where_its_rules_say() -> None:
     assert flown.rtl_loiter is not None
     assert flown.rtl_loiter[:4] == pytest.approx((0.0, 0.0, 400.0, 80.0), abs=0.01)
     assert flown.positions[-1, 2] == pytest.approx(400.0, abs=0.01)
+
+
+@pytest.mark.parametrize("radius", [50.0, -200.0])
+def test_the_circle_of_a_return_is_drawn_with_its_stated_radius_as_flown_at_its_height(radius: float) -> None:
+    """`AP_L1_Control::loiter_radius`: the radius grows with the square of the ratio of true to equivalent airspeed."""
+    law = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=50.0, RTL_RADIUS=radius, RTL_ALTITUDE=100.0))
+    setup = setup_of(wp(0, 3000, 400), wp(2000, 3000, 400), RTL)
+    for limits in (None, setup.limits):
+        laid_out = make_route(setup.mission, ORIGIN, setup.scenario.terrain, 25.0, False, limits, law.route_rules)
+        # The standard atmosphere at 400 m AMSL; an aircraft that flies 25 m/s turns no tighter than 110 m.
+        expected = abs(radius) * (1.0 - 2.25577e-5 * 400.0) ** -4.25588
+        if limits is not None:
+            expected = max(expected, limits.turn_radius(0.0, math.pi, 400.0, 25.0))
+        assert laid_out.arc_radii[-2] == pytest.approx(expected, rel=1e-4)
+        assert laid_out.rtl_loiter is not None
+        assert laid_out.rtl_loiter.radius == radius
 
 
 def test_a_rally_point_is_named_by_its_place_in_the_file() -> None:

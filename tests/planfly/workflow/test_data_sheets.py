@@ -160,6 +160,24 @@ def test_parameters_are_data(tmp_path: Path) -> None:
     assert "TECS_CLMB_MAX 4\n" in (made.folder / "ardupilot.parm").read_text()
 
 
+def test_the_climb_of_a_parameter_file_is_that_at_its_throttle_limit(tmp_path: Path) -> None:
+    """ArduPlane's reference: TECS_CLMB_MAX is the best climb rate with the throttle at THR_MAX, at cruise speed."""
+    file = tmp_path / "mine.parm"
+    file.write_text("AIRSPEED_CRUISE 16\nAIRSPEED_MIN 12\nTECS_CLMB_MAX 3\nTHR_MAX 75\n")
+    assert stated_parameters(file)["THR_MAX"] == 75.0
+    made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
+    fdm = Fdm(made, is_tested=True)
+    # 3 m/s at 16 m/s take three quarters of the throttle.
+    climbing = steady_flight(fdm, 16.0, 500.0, climb=math.asin(3.0 / 16.0))
+    assert climbing is not None
+    assert climbing.throttle == pytest.approx(0.75, abs=0.02)
+    steepest = full_throttle_climb(fdm, 16.0, 500.0)
+    assert steepest is not None
+    assert math.degrees(steepest.climb) > 15.0
+    assert "THR_MAX 75\n" in (made.folder / "ardupilot.parm").read_text()
+    assert "TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX" in (made.folder / "README.md").read_text()
+
+
 @pytest.mark.parametrize("stated", [30.0, 0.0])
 def test_another_trim_throttle_than_the_models_is_explained(tmp_path: Path, stated: float) -> None:
     file = tmp_path / "mine.parm"

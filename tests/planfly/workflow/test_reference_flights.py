@@ -89,6 +89,21 @@ def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> 
     assert flights.count <= 5
 
 
+@pytest.mark.parametrize(
+    ("law", "name", "values", "unit"),
+    [
+        (ArduPlane(ArduPilotParameters.defaults()).with_parameters(THR_MAX=75.0), "THR_MAX", (75.0, 85.0), "%"),
+        (Px4(Px4Parameters.defaults("1.17")).with_parameters(FW_THR_MAX=0.75), "FW_THR_MAX", (0.75, 0.85), ""),
+    ],
+)
+def test_a_throttle_limit_that_is_too_low_is_named(
+    law: Autopilot, name: str, values: tuple[float, float], unit: str
+) -> None:
+    found = find_passing_parameter(law, (LOW, HEIGHTS), lambda other: other.speeds.max_throttle > 0.81)
+    assert found is not None
+    assert (found.name, found.current, found.passing, found.unit) == (name, *values, unit)
+
+
 @pytest.mark.parametrize(("present", "passing"), [(30.0, 35.0), (40.0, 41.0)])
 def test_no_value_below_the_documented_range_is_named(present: float, passing: float) -> None:
     def banks_further(law: Autopilot) -> bool:

@@ -6,10 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from tests.logs.verdict.judging import failing, judge, of, waypoint
+from tests.logs.verdict.rules.test_return_rule import by_arduplane
+from tests.mission_lines import setup_of, wp
 from tests.synthetic import fly_path, make_setup
 
 Points = list[list[float]]
@@ -110,3 +113,44 @@ def test_a_flight_that_ends_within_reach_of_a_turning_point_did_not_fly_back() -
     assert aligned is not None
     assert aligned.passed.tolist() == [True, True, False, False]
     assert aligned.leg_at(len(aligned.track) - 1) == 1
+
+
+RTL = "0 20 0 0 0 0 0 0 0"
+
+
+def return_track(setup: FlightSetup, radius: float, end_bearing_deg: float) -> Track:
+    """Straight legs to the waypoint where the return begins, on to home's circle, and twice around to a bearing."""
+    corners = setup.route.positions[: (setup.route.rtl_start or 0) + 1]
+    arrival = math.atan2(*corners[-1, :2])
+    bearings = arrival + np.linspace(0.0, 4.0 * math.pi + (math.radians(end_bearing_deg) - arrival) % math.tau, 500)
+    circle = np.column_stack([radius * np.sin(bearings), radius * np.cos(bearings), np.full(500, 200.0)])
+    points = np.vstack([corners, circle])
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    along = np.arange(0.0, run[-1], 5.0)
+    still = np.zeros((len(along), 3), dtype=np.float32)
+    level = fly_path(make_setup([[0, 0, 300], [0, 5.0 * len(along) + 500.0, 300]]), rate=5.0).rows(0, len(along))
+    position = np.column_stack([np.interp(along, run, points[:, axis]) for axis in range(3)])
+    return replace(level, position=position, velocity=still)
+
+
+@pytest.mark.parametrize("radius", [30.0, 50.0, 95.0, 140.0])
+@pytest.mark.parametrize("end_bearing_deg", range(0, 360, 45))
+def test_a_return_is_passed_wherever_on_its_circle_it_ends(radius: float, end_bearing_deg: float) -> None:
+    # The return begins 320 m from home, which is within the arrival radius of 300 m of its drawn turn.
+    setup = by_arduplane(setup_of(wp(1500, -300, 200), wp(200, -250, 200), RTL, home="36.5 -84.2 100"))
+    aligned = align_track(route_requirements(setup), return_track(setup, radius, end_bearing_deg))
+    assert aligned is not None
+    assert aligned.passed.all()
+
+
+def test_a_return_that_ends_on_its_way_home_is_not_passed() -> None:
+    setup = by_arduplane(setup_of(wp(1500, -300, 200), wp(3200, -250, 200), RTL, home="36.5 -84.2 100"))
+    track = return_track(setup, 50.0, 0.0)
+    # A return has arrived 300 m from home; the track has a row every 5 m.
+    distance = np.hypot(*track.position[:, :2].T)
+    past_turn = int(np.argmax(distance))
+    for away, is_passed in ((306.0, False), (294.0, True)):
+        row = past_turn + int(np.argmax(distance[past_turn:] < away))
+        aligned = align_track(route_requirements(setup), track.rows(0, row + 1))
+        assert aligned is not None
+        assert bool(aligned.passed[-1]) is is_passed

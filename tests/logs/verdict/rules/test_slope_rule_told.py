@@ -1,9 +1,16 @@
 """What the slope rule tells of a leg: climbs and dives by turns, their limits in wind, and throttle at a limit."""
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
@@ -150,3 +157,40 @@ def test_a_leg_straight_up_says_its_height() -> None:
     points = [[0, 0, 300], [0, 1500, 300], [0, 1500.45, 360], [0, 3000, 360]]
     reason = of(judge_geometry(make_setup(points)), "slope", leg(1)).reason
     assert reason.startswith("leg 1 climbs 60 m vertically")
+
+
+@pytest.mark.parametrize(
+    ("law", "limit", "throttle"),
+    [
+        (ArduPlane(ArduPilotParameters.defaults()).with_parameters(THR_MAX=75.0), "THR_MAX 75 %", 0.75),
+        (
+            Px4(Px4Parameters.defaults("1.17")).with_parameters(FW_THR_MAX=0.7, FW_AIRSPD_MAX=30.0),
+            "FW_THR_MAX 0.7",
+            0.7,
+        ),
+    ],
+)
+def test_the_autopilots_throttle_limit_is_named_where_it_limits_the_climb(
+    law: Autopilot, limit: str, throttle: float
+) -> None:
+    setup = replace(make_setup(hill(5.0)), autopilot=law)
+    requirements = route_requirements(setup, envelope=True)
+
+    def flown(shortfall_deg: float, throttle: float) -> Finding:
+        """The climb of 5 degrees, flown for 1500 m at a slope that falls short of it, at this throttle."""
+        lost = math.tan(math.radians(5.0)) - math.tan(math.radians(5.0 - shortfall_deg))
+        track = fly_path(
+            setup,
+            up=lambda s: -lost * np.clip(s - 1200.0, 0.0, 1500.0),
+            throttle=lambda s: (throttle - 0.6) * ((s > 1200.0) & (s < 2700.0)),
+            airspeed=lambda s: 0.5 * np.sin(s / 100.0),
+        )
+        return slope_findings(requirements, align_track(requirements, track))[1]
+
+    short = flown(2.0, throttle)
+    assert short.ok is False
+    assert f"at {limit} the aircraft showed that it can climb 3." in short.reason
+    assert f"throttle at its limit {limit} for 60 s" in short.reason
+    # Two hundredths below the limit the throttle shows nothing of it.
+    assert flown(2.0, throttle - 0.02).ok
+    assert flown(0.0, throttle).ok
