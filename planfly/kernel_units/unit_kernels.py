@@ -108,7 +108,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         _LAYOUT + "_write_message_header",
         _LAYOUT + "_stamp_messages",
         _LAYOUT + "last_log_time",
-        "logs.verdict.measures.path_sweeps._segment_clearances",
+        "logs.verdict.measures.path_sweeps._path_clearances",
         "logs.verdict.measures.path_sweeps._sphere_visits",
         "logs.verdict.measures.route_progress._match_rows",
         "logs.verdict.measures.track_alignment._match_chords",

@@ -226,7 +226,7 @@ def test_files_are_named_when_they_cannot_be_read(tmp_path: Path) -> None:
     file.write_bytes(b"\xff")
     with pytest.raises(MissionError, match=r"plan\.json: not a text file in UTF-8 \(byte 0\)"):
         read_plan(file)
-    with pytest.raises(MissionError, match=f"^{tmp_path}: cannot be read: "):
+    with pytest.raises(MissionError, match=f"^{tmp_path}: is a folder that holds plan.json; expected a plan file"):
         read_plan(tmp_path)
     text = plan_json(made()).replace('"name": "small"', '"name": 5')
     file.write_text(text, encoding="utf-8")

@@ -71,7 +71,7 @@ def test_a_name_of_sixteen_characters_is_one() -> None:
 def test_what_is_no_text_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="cannot be read"):
         read_parameter_file(tmp_path / "missing.parm")
-    with pytest.raises(ParameterError, match="cannot be read"):
+    with pytest.raises(ParameterError, match="is a folder; expected a parameter file"):
         read_parameter_file(tmp_path)
     file = tmp_path / "bytes.parm"
     file.write_bytes(b"WP_RADIUS 90\n\xff\xfe 1\n")

@@ -298,7 +298,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
         (("--from", "c172x", "--prop", ""), "--from c172x: cannot be combined with prop"),
         ((*SIX, "--fuel", "0"), "--fuel 0.0 kg: allowed 0.05..12 kg"),
         (("--battery", ""), "--battery : expected volts and capacity"),
-        ((*SIX, "--params", ""), "cannot be read"),
+        ((*SIX, "--params", ""), "is a folder; expected a parameter file"),
         ((*SIX, "--params", "none.parm"), "none.parm: cannot be read"),
         ((*SIX, "--climb", "nan"), "--climb nan degrees: allowed 2..35 degrees"),
     ],

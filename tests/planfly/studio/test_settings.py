@@ -88,7 +88,7 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
     [
         ({"limits": {"min_clearance_m": 6000.0}}, "limits.min_clearance_m: 6000.0: allowed 0..5000"),
         ({"limits": {"max_height_m": 20.0}}, "limits: max_height_m: 20: must be above min_clearance_m 60"),
-        ({"limits": {"max_turn_deg": 400.0}}, 'limits.max_turn_deg: 400.0: allowed above 0..180, or "aircraft"'),
+        ({"limits": {"max_turn_deg": 400.0}}, 'limits.max_turn_deg: 400.0: allowed above 0, up to 180, or "aircraft"'),
         ({"ceiling": -9999.0}, "area.ceiling_amsl_m: -9999.0: allowed -500..9000"),
         ({"wind_speed": 500.0}, "wind: speed_mps: 500.0: allowed 0..40"),
         # One range on both sides, the aircraft's (its TOML); the Zagi flies from 11 m/s, and a scenario takes 15 m/s.
