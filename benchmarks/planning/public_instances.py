@@ -154,26 +154,31 @@ def angle_cost(path: Floats) -> float:
 
 
 @compiled
-def is_above_ground(path: Floats, ground: Floats) -> bool:
-    """Return True if all sampled places of a path (w, 4) are above the bilinear ground.
+def elevation_below(east: float, north: float, ground: Floats) -> float:
+    """Return the bilinear elevation of the ground at a place; infinity where there is none.
 
-    The ground is read one cell to the east and north of the place, as in the package; a place without ground there is
-    not above it.
+    The ground is read one cell to the east and north of the place, as in the package.
     """
     rows, columns = ground.shape
+    if east > columns - 1.0 or north > rows - 1.0:
+        return math.inf
+    column, row = min(int(east), columns - 2), min(int(north), rows - 2)
+    u, v = east - column, north - row
+    south = (1.0 - u) * ground[row, column] + u * ground[row, column + 1]
+    further = (1.0 - u) * ground[row + 1, column] + u * ground[row + 1, column + 1]
+    return (1.0 - v) * south + v * further
+
+
+@compiled
+def is_above_ground(path: Floats, ground: Floats) -> bool:
+    """Return True if all sampled places of a path (w, 4) are above the ground."""
     for i in range(path.shape[0] - 1):
         for k in range(PLACES_PER_LEG):
             share = k / (PLACES_PER_LEG - 1)
             east = path[i, 0] + share * (path[i + 1, 0] - path[i, 0])
             north = path[i, 1] + share * (path[i + 1, 1] - path[i, 1])
-            if east > columns - 1.0 or north > rows - 1.0:
-                return False
-            column, row = min(int(east), columns - 2), min(int(north), rows - 2)
-            u, v = east - column, north - row
-            south = (1.0 - u) * ground[row, column] + u * ground[row, column + 1]
-            further = (1.0 - u) * ground[row + 1, column] + u * ground[row + 1, column + 1]
             altitude = path[i, 3] + share * (path[i + 1, 3] - path[i, 3])
-            if altitude <= (1.0 - v) * south + v * further:
+            if altitude <= elevation_below(east, north, ground):
                 return False
     return True
 
