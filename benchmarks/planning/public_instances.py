@@ -213,12 +213,12 @@ def make_instances(seed: int, count: int, folder: Path) -> list[PublicInstance]:
         if file.exists():
             with np.load(file) as stored:
                 fields = {name: stored[name] for name in ("ground", "threats", "start", "end")}
-                rng.set_state(("MT19937", stored["state"], int(stored["position"]), 0, 0.0))
-                rng.set_state((*rng.get_state()[:3], int(stored["has_gauss"]), float(stored["gauss"])))
+                gauss = int(stored["has_gauss"]), float(stored["gauss"])
+                rng.set_state(("MT19937", stored["state"], int(stored["position"]), *gauss))
             instances.append(PublicInstance(**fields))
             continue
         instance = make_instance(rng, 15 if number < 0.5 * count else 30)
-        _, state, position, has_gauss, gauss = rng.get_state()
+        _, state, position, has_gauss, next_gauss = rng.get_state()
         np.savez(
             file,
             ground=instance.ground,
@@ -228,7 +228,7 @@ def make_instances(seed: int, count: int, folder: Path) -> list[PublicInstance]:
             state=state,
             position=position,
             has_gauss=has_gauss,
-            gauss=gauss,
+            gauss=next_gauss,
         )
         instances.append(instance)
     return instances

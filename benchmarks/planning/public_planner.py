@@ -169,7 +169,7 @@ class PublicPlan:
         rows, columns = ground.shape
         axis_east = np.round(np.linspace(1.0, columns - 1.0, max(3, round(columns / spacing))))
         axis_north = np.round(np.linspace(1.0, rows - 1.0, max(3, round(rows / spacing))))
-        centres = np.stack(np.meshgrid(axis_east, axis_north), axis=2).reshape(-1, 2)
+        centres: Floats = np.stack(np.meshgrid(axis_east, axis_north), axis=2).reshape(-1, 2).astype(np.float64)
         candidates: list[tuple[float, bool, Floats]] = []
         for places in (centres, find_highest(centres, ground, int(0.5 * spacing))):
             candidates += self._search_places(np.insert(places, 2, END_HEIGHT_M, axis=1))

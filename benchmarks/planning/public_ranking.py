@@ -42,7 +42,7 @@ KEPT = Path("runs") / "public-ranking.json"
 FIRST_SEED = 100
 # Relative difference below which a value equals the best one.
 EQUAL = 1e-9
-MODELS: tuple[Model, ...] = ("umda", "emna", "multistart", "differential")
+MODELS: tuple[Model, ...] = ("umda", "emna", "multistart", "partial", "differential")
 # Names in minionpy of its methods.
 MINION = ("LSHADE", "jSO", "NLSHADE_RSP", "j2020", "AGSK", "IMODE", "LSRTDE", "ARRDE", "JADE", "ABC", "SPSO2011")
 
