@@ -10,16 +10,23 @@ from numpy.typing import ArrayLike
 from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
 from planner.optimisers.multistart import Multistart
+from planner.optimisers.partial_resampling import PartialResampling
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from world.arrays import Floats
 
 # "umda" uses independent Gaussians, as in the paper; "emna" one Gaussian with full covariance; "multistart" Gaussians
-# with full covariance from many starts; "differential" is differential evolution, which is not an EDA and is included
-# for comparison.
-Model = Literal["umda", "emna", "multistart", "differential"]
+# with full covariance from many starts; "partial" redraws a part of the variables of each point; "differential" is
+# differential evolution, which is not an EDA and is included for comparison.
+Model = Literal["umda", "emna", "multistart", "partial", "differential"]
 # Optimiser class of each model.
-_MODELS = {"umda": Umda, "emna": Emna, "multistart": Multistart, "differential": DifferentialEvolution}
+_MODELS = {
+    "umda": Umda,
+    "emna": Emna,
+    "multistart": Multistart,
+    "partial": PartialResampling,
+    "differential": DifferentialEvolution,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +82,7 @@ class Optimiser:
         """Return points in the box to evaluate, (n, d).
 
         The first call returns the whole population, later calls return half of it.  "multistart" returns as many points
-        as the current generation of its search has.
+        as the current generation of its search has, and "partial" as many as its population has.
         """
         return np.array(self._search.ask())
 
@@ -172,10 +179,10 @@ def optimise(
 
     lower, upper: bounds of the box, (d,).
     model: "umda", the paper's univariate Gaussians; "emna", one Gaussian with full covariance; "multistart", Gaussians
-    with full covariance from starts of many widths, for a cost with walls, gaps or several valleys; "differential",
-    differential evolution, for comparison.
-    population: even number of points, at least 4; half of them are drawn again in each generation.  For "multistart",
-    this is the size of the largest generation.
+    with full covariance from many starts of many widths, for a cost with walls, gaps or several valleys; "partial", a
+    Gaussian that redraws parts of points, for few evaluations; "differential", differential evolution, for comparison.
+    population: even number of points, at least 4, half of them drawn again in each generation; for "multistart" and
+    "partial", which draw all points, the size of the largest generation.
     seed: a whole number, or a generator of random numbers.
     initial: first points, (population, d); None draws uniform points.
     Raises ValueError for invalid bounds or an invalid population.

@@ -15,7 +15,7 @@ from planner.search.plan_path import plan_path
 from planner.search.search_state import KILL, LENGTH, Search
 from world.scenario import load_scenario, with_planner
 
-EDAS: tuple[Model, ...] = ("umda", "emna", "multistart")
+EDAS: tuple[Model, ...] = ("umda", "emna", "multistart", "partial")
 
 
 @pytest.mark.parametrize("model", ["umda", "emna", "differential"])
@@ -176,7 +176,7 @@ def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]
     [
         ({"population": 2}, "even number from 4"),
         ({"population": 5}, "even number from 4"),
-        ({"model": "ga"}, "allowed umda, emna, multistart, differential"),
+        ({"model": "ga"}, "allowed umda, emna, multistart, partial, differential"),
         ({"initial": [[0.5]]}, r"shape \(1, 1\): expected finite numbers of shape \(100, 1\)"),
         ({"initial": [[np.nan]] * 100}, "finite"),
     ],

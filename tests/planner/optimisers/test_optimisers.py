@@ -3,17 +3,19 @@
 import numpy as np
 import pytest
 
+from planner.optimisers.box_search import BoxSearch
 from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
 from planner.optimisers.markov_chain import MarkovChain, draw_chain, fit_chain
 from planner.optimisers.multistart import Multistart, reflect_into_box
+from planner.optimisers.partial_resampling import MAX_STALLED_GENERATIONS, PartialResampling
 from planner.optimisers.preference import Level, ranks
 from planner.optimisers.umda import Umda
 
 BY_VALUE = (Level((0,), (-np.inf,)),)
 LOWER, UPPER = np.array([-1.0, 10.0]), np.array([1.0, 40.0])
-Optimiser = type[Umda] | type[DifferentialEvolution] | type[Multistart]
-# UMDA knows no two variables together: a turned valley is not for it.
+Optimiser = type[Umda] | type[DifferentialEvolution] | type[Multistart] | type[PartialResampling]
+# UMDA knows no two variables together, and partial resampling moves few at once: a turned valley is not for them.
 OPTIMISERS = (DifferentialEvolution, Emna, MarkovChain)
 
 
@@ -22,7 +24,7 @@ def rank(scores: np.ndarray) -> np.ndarray:
     return ranks(scores, BY_VALUE)
 
 
-def least_after(search: Umda | DifferentialEvolution | Multistart, target: np.ndarray, generations: int) -> float:
+def least_after(search: BoxSearch, target: np.ndarray, generations: int) -> float:
     """Least value of a narrow, turned valley after some generations; every sample is in the box."""
     for _ in range(generations):
         asked = search.ask()
@@ -43,7 +45,7 @@ def test_finds_the_bottom_of_a_turned_valley(kind: Optimiser) -> None:
     assert least_after(search, np.linspace(-1.0, 2.0, 6), 150) < 0.05
 
 
-@pytest.mark.parametrize("kind", [Umda, Multistart, *OPTIMISERS])
+@pytest.mark.parametrize("kind", [Umda, Multistart, PartialResampling, *OPTIMISERS])
 def test_same_seed_same_samples(kind: Optimiser) -> None:
     """The samples after five generations, bit by bit."""
     ends = []
@@ -51,7 +53,7 @@ def test_same_seed_same_samples(kind: Optimiser) -> None:
         search = kind(np.zeros(6), np.ones(6), rank, 20, np.random.default_rng(5))
         least_after(search, np.full(6, 0.3), 5)
         ends.append(search.samples)
-    np.testing.assert_array_equal(*ends)
+    np.testing.assert_array_equal(ends[0], ends[1])
 
 
 @pytest.mark.parametrize("kind", [Umda, DifferentialEvolution])
@@ -123,3 +125,36 @@ def test_many_starts_leave_what_is_worth_nothing_and_share_their_evaluations() -
         search.tell(far_corner(samples))
         asked += len(samples)
     assert search.scores.min() == pytest.approx(6 * 0.4**2, abs=0.05)
+
+
+def test_partial_resampling_replaces_samples_only_by_better_ones() -> None:
+    """Each sample of the population stays, or gives way to a better one: the sorted values never rise."""
+    search = PartialResampling(np.full(8, -2.0), np.full(8, 6.0), rank, 40, np.random.default_rng(2))
+    values = None
+    for _ in range(20):
+        search.tell((search.ask() ** 2).sum(axis=1)[:, None])
+        after = search.scores[1:, 0]
+        assert values is None or (after <= values).all()
+        values = after
+
+
+def test_partial_resampling_keeps_variables_of_the_parent() -> None:
+    """One of four variables at least is drawn, and at the start half of them on average."""
+    search = PartialResampling(np.full(4, -2.0), np.full(4, 6.0), rank, 2000, np.random.default_rng(2))
+    search.tell((search.ask() ** 2).sum(axis=1)[:, None])
+    changed = (np.abs(search.ask() - search.samples[1:]) > 1e-9).sum(axis=1)
+    assert changed.min() >= 1
+    assert 1.5 < changed.mean() < 3.0
+
+
+def test_partial_resampling_starts_again_with_twice_the_population() -> None:
+    """Without any better sample; the best of all starts is kept."""
+    search = PartialResampling(np.zeros(10), np.ones(10), rank, 200, np.random.default_rng(2))
+    counts = []
+    for generation in range(3 * MAX_STALLED_GENERATIONS):
+        asked = search.ask()
+        counts.append(len(asked))
+        search.tell(np.full((len(asked), 1), 1.0 if generation == 0 else 2.0))
+    assert counts[0] == 60
+    assert counts[MAX_STALLED_GENERATIONS + 2 :][:3] == [120, 120, 120]
+    assert search.scores[0, 0] == 1.0

@@ -1,0 +1,156 @@
+"""Estimation of distribution that redraws only a part of the variables of each sample.
+
+A new sample of a whole distribution loses what its parent had right in variables that do not matter to the others.
+Here every sample keeps a part of its variables and draws the rest from a Gaussian with the covariance of the
+population, around one of the best samples; it replaces its parent only if it is better.  The fraction of redrawn
+variables and the width of the Gaussian follow those of successful samples, as the parameters of adaptive differential
+evolution do (Zhang and Sanderson, "JADE: adaptive differential evolution with optional external archive", IEEE
+Transactions on Evolutionary Computation 13, 2009).  A search that stalls starts again with twice the population (after
+Auger and Hansen, "A restart CMA evolution strategy with increasing population size", CEC 2005).  Only ranks are used.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.optimisers.box_search import BoxSearch
+from planner.optimisers.linear_algebra import multiply_by_sparse
+from planner.optimisers.multistart import reflect_into_box
+from world.arrays import Floats, Ints
+
+# Number of samples of the first population, per variable.
+FIRST_POPULATION_PER_VARIABLE = 2
+# Minimum number of samples of the first population.
+MIN_POPULATION = 60
+# Fraction of the population around which samples are drawn.
+CENTRE_FRACTION = 0.1
+# Fraction of redrawn variables at the start.
+FIRST_REDRAWN_FRACTION = 0.5
+# Standard deviation of the redrawn fraction among samples.
+REDRAWN_FRACTION_DEVIATION = 0.1
+# Minimum redrawn fraction.
+MIN_REDRAWN_FRACTION = 0.02
+# Width of the Gaussian at the start, as a factor on the population's deviations.
+FIRST_WIDTH = 0.3
+# Standard deviation of the logarithm of the width among samples.
+LOG_WIDTH_DEVIATION = 0.3
+# Fraction of samples whose width differs by up to a factor of e to the power of `WILD_LOG_WIDTH`.
+WILD_FRACTION = 0.3
+# Largest additional logarithm of the width of such a sample.
+WILD_LOG_WIDTH = 1.5
+# Rate at which both parameters follow those of successful samples.
+LEARNING_RATE = 0.2
+# Number of generations without a better sample after which the search starts again.
+MAX_STALLED_GENERATIONS = 30
+# Factor on the population at a new start.
+POPULATION_GROWTH = 2
+
+
+class PartialResampling(BoxSearch):
+    """Resampling of parts: replace samples by better ones that differ from them in some variables.
+
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = PartialResampling(np.full(3, -2.0), np.full(3, 6.0), rank, 40, np.random.default_rng(1))
+    >>> for generation in range(60):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-4)
+    True
+
+    The arguments are the same as for `BoxSearch`; population is the largest population, reached after some starts.
+    First samples, if given, are the first population.
+
+    samples and scores are the best sample of all and the current population, (n, d) and (n, c), best first; empty
+    before the first `tell`.
+    """
+
+    def __init__(
+        self,
+        lower: Floats,
+        upper: Floats,
+        rank: Callable[[Floats], Ints],
+        population: int,
+        rng: np.random.Generator,
+        *,
+        initial: Floats | None = None,
+    ) -> None:
+        super().__init__(lower, upper, rank, population, rng, initial=initial)
+        self._max_count = population
+        self._count = min(population, max(MIN_POPULATION, FIRST_POPULATION_PER_VARIABLE * lower.size))
+        self._best: tuple[Floats, Floats] | None = None
+        self._start()
+        if initial is None:
+            self._pending_samples = self._pending_samples[: self._count]
+
+    def _start(self) -> None:
+        """Forget the population and the adapted parameters."""
+        self._points: Floats = np.empty((0, self.lower.size))
+        self._point_scores: Floats = np.empty((0, 0))
+        self._redrawn_fraction, self._width = FIRST_REDRAWN_FRACTION, FIRST_WIDTH
+        self._stalled_generations = 0
+
+    def tell(self, scores: Floats) -> None:
+        """Keep the samples of the last `ask` that are better than their parents, by their scores (n, c)."""
+        if not len(self._points):
+            self._points, self._point_scores = self._pending_samples.copy(), scores.copy()
+        else:
+            self._replace_parents(scores)
+        order = np.lexsort((self._rng.random(len(self._points)), self._rank(self._point_scores)))
+        self._points, self._point_scores = self._points[order], self._point_scores[order]
+        self._store()
+        if self._stalled_generations > MAX_STALLED_GENERATIONS:
+            self._start()
+            self._count = min(self._max_count, POPULATION_GROWTH * self._count)
+            self._pending_samples = self._rng.uniform(self.lower, self.upper, (self._count, self.lower.size))
+        else:
+            self._draw()
+
+    def _replace_parents(self, scores: Floats) -> None:
+        """Replace parents by better samples, and let both parameters follow those of the better samples."""
+        count = len(self._points)
+        ranks = self._rank(np.concatenate([self._point_scores, scores]))
+        gains = ranks[:count] - ranks[count:]
+        better = gains > 0
+        # The population is sorted, so that the best parent is the first.
+        self._stalled_generations = 0 if ranks[count:].min() < ranks[0] else self._stalled_generations + 1
+        if better.any():
+            weights = gains[better] / gains[better].sum()
+            fractions = self._fractions[better]
+            follow = float((weights * fractions**2).sum() / (weights * fractions).sum())
+            self._redrawn_fraction += LEARNING_RATE * (follow - self._redrawn_fraction)
+            log_ratio = float((weights * np.log(self._widths[better] / self._width)).sum())
+            self._width *= math.exp(LEARNING_RATE * log_ratio)
+        self._points[better], self._point_scores[better] = self._pending_samples[better], scores[better]
+
+    def _store(self) -> None:
+        """Store the population after the best sample of all starts."""
+        if self._best is None or self._rank(np.stack([self._best[1], self._point_scores[0]]))[1] == 0:
+            self._best = self._points[0].copy(), self._point_scores[0].copy()
+        self.samples = np.concatenate([self._best[0][None], self._points])
+        self.scores = np.concatenate([self._best[1][None], self._point_scores])
+
+    def _draw(self) -> None:
+        """Draw a sample for each sample of the population, which is sorted."""
+        count, size = self._points.shape
+        points = (self._points - self.lower) / (self.upper - self.lower)
+        deviations = (points - points.mean(axis=0)) / math.sqrt(count)
+        self._fractions = np.clip(
+            self._redrawn_fraction + REDRAWN_FRACTION_DEVIATION * self._rng.standard_normal(count),
+            MIN_REDRAWN_FRACTION,
+            1.0,
+        )
+        is_wild = self._rng.random(count) < WILD_FRACTION
+        self._widths = self._width * np.exp(
+            LOG_WIDTH_DEVIATION * self._rng.standard_normal(count)
+            + is_wild * self._rng.uniform(-WILD_LOG_WIDTH, WILD_LOG_WIDTH, count)
+        )
+        centres = points[self._rng.integers(0, max(2, round(CENTRE_FRACTION * count)), count)]
+        # Random combinations of the population's deviations have the population's covariance.
+        steps = multiply_by_sparse(self._rng.standard_normal((count, count)), deviations)
+        is_redrawn = self._rng.random((count, size)) < self._fractions[:, None]
+        is_redrawn[np.arange(count), self._rng.integers(0, size, count)] = True
+        drawn = reflect_into_box(centres + self._widths[:, None] * steps)
+        samples = self.lower + np.where(is_redrawn, drawn, points) * (self.upper - self.lower)
+        self._pending_samples = np.clip(samples, self.lower, self.upper)
