@@ -81,7 +81,7 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     assert found.from_deg(3) == 270.0
     assert found.lost == ()
     # The wind is what is asked for: none is stated, whatever the scenario's is.
-    aircraft, world, pilot = wind_lines(found)[1:4]
+    aircraft, world, pilot = wind_lines(found)[2:5]
     assert aircraft.startswith("Aircraft: aerosonde, 11 kg, 25 m/s")
     assert world.startswith("Conditions: wind from each direction, light turbulence; ")
     assert pilot.startswith("Flown by: ")
@@ -280,7 +280,7 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
         found = find_winds(wind_base, goal, Workers(1), store, lambda *one: told.append(one), surer_but_in_the_west)
     # What it takes at least is said before the first flight.
     assert told.pop(0) == (0.0, 4 * 36.0, "0 of 144 flights at least")
-    pattern = r"(\d) of 4 directions settled, (\d+) flights, \d+ a minute(, \d+ s left at least)?"
+    pattern = r"(\d) of 4 directions settled, (\d+) flights?, \d+ a minute(, \d+ s left at least)?"
     lines = [re.fullmatch(pattern, remark) for _, _, remark in told]
     assert all(lines)
     flights = len(found.flights)
