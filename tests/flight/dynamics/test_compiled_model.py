@@ -65,7 +65,8 @@ def first_difference(fdm: Fdm, model: CompiledModel, seconds: float) -> tuple[in
 def test_every_tick_equals_jsbsims(name: str, hz: int) -> None:
     fdm, model = begun(load_aircraft(name), hz)
     assert first_difference(fdm, model, SECONDS) is None
-    assert fdm.properties.read("position/h-sl-ft") > 1000.0
+    # In the 20 minutes of a soak an open-loop flight may descend without end; there is no ground below it.
+    assert SOAK or fdm.properties.read("position/h-sl-ft") > 1000.0
 
 
 @pytest.mark.skipif(not SOAK, reason="takes seconds to make an aircraft: in make soak")
