@@ -108,9 +108,17 @@ def run(most: int = FLIGHTS, *, whole: bool = False) -> dict[str, Any]:
         for _ in range(ROUNDS):
             two.append(flights_a_minute(base, 2, most))
             one.append(flights_a_minute(base, 1, max(2, most // 2)))
+        scenario_rates = {
+            name: statistics.median(
+                flights_a_minute(open_campaign(name, default_dispersions(), {"seed": 1}), 2, most)
+                for _ in range(ROUNDS)
+            )
+            for name in ("jacksboro-air", "jacksboro")
+        }
         flights, seconds = proof(folder, share)
         found: dict[str, Any] = {
             "flights a minute, 13 km, two workers": statistics.median(two),
+            **{f"flights a minute, {name}, two workers": rate for name, rate in scenario_rates.items()},
             "two workers / one": statistics.median(a / b for a, b in zip(two, one, strict=True)),
             "a campaign's flight / simulate alone": over_simulate(base, min(20, most)),
             f"--prove {share} on the demo: flights": flights,
