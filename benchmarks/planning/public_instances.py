@@ -155,7 +155,7 @@ def angle_cost(path: Floats) -> float:
 
 @compiled
 def elevation_below(east: float, north: float, ground: Floats) -> float:
-    """Return the bilinear elevation of the ground at a place; infinity where there is none.
+    """Return the bilinear elevation of the ground at a position; infinity outside the ground.
 
     The ground is read one cell to the east and north of the place, as in the package.
     """

@@ -1,4 +1,4 @@
-"""Name what would raise the probability of a planned mission, from the rules that its flights failed."""
+"""Suggest changes that raise the probability of a planned mission, from the rules that its flights failed."""
 
 import math
 

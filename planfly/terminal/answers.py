@@ -177,7 +177,7 @@ class DispersedFlights:
     """Rule that most flights failed, or with the smallest margin if none failed."""
     failed_by_rule: list[FailedRule]
     remedies: list[str]
-    """What would raise the probability."""
+    """Changes that would raise the probability."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -26,7 +26,8 @@ from tests.world.made.elevation_files import from_origin, write_raster
 from world.errors import PlanflyError
 
 # Wing span (m) and highest airspeed (m/s) of the aerosonde, as in its data.
-SPAN, SPEED = 2.8956, 31.0
+SPAN_M = 2.8956
+SPEED_MPS = 31.0
 PATH = shapely.LineString([(0.0, 0.0), (1000.0, 0.0)])
 
 
@@ -72,7 +73,7 @@ def test_the_flight_geography_holds_the_quantile_of_the_flights(base: CampaignBa
 
 def test_a_narrow_flight_geography_is_three_spans_wide(base: CampaignBase) -> None:
     result = volumes(base, [row(1.0, 10.0, 20.0)] * 20)
-    assert result.half_width == pytest.approx(1.5 * SPAN)
+    assert result.half_width == pytest.approx(1.5 * SPAN_M)
 
 
 def test_flown_widths_are_measured_beyond_the_volume_inside(base: CampaignBase) -> None:
@@ -91,7 +92,7 @@ def test_the_larger_of_flights_and_formula_counts(base: CampaignBase) -> None:
     far = volumes(base, [replace(row(50.0, 400.0, 900.0), return_height=200.0)] * 20)
     assert far.volume_height == 200.0
     assert far.volume.bounds[3] == pytest.approx(400.0)
-    assert far.one_to_one_buffer == pytest.approx(200.0 + 0.5 * SPAN)
+    assert far.one_to_one_buffer == pytest.approx(200.0 + 0.5 * SPAN_M)
     assert far.footprint.bounds[3] == pytest.approx(900.0)
 
 
@@ -192,7 +193,7 @@ def test_the_areas_of_a_flight_hold_it_its_returns_and_its_falls(base: CampaignB
     # A fall at the flown speed from the flown height goes about v sqrt(2 h / g) ahead.
     reach = flown_row.ground_speed * math.sqrt(2.0 * flown_row.return_height / 9.81)
     beyond = shapely.distance(shapely.points(shapely.get_coordinates(fallen)), flown).max()
-    assert 0.4 * reach < beyond <= reach + SPAN
+    assert 0.4 * reach < beyond <= reach + SPAN_M
 
 
 def test_a_wind_carries_falls_away(base: CampaignBase, path: BaseGeometry) -> None:

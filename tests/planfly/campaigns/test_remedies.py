@@ -1,4 +1,4 @@
-"""What would raise the probability, by the rules that fail."""
+"""Suggested changes for each rule that fails."""
 
 from dataclasses import replace
 from pathlib import Path
