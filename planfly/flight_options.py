@@ -14,7 +14,16 @@ from planfly.workflow.file_autopilots import with_file_autopilot
 from world.argument_types import check_types
 from world.errors import ArgumentError
 from world.files import absolute_path, did_you_mean
-from world.scenario import Scenario, load_scenario, with_flight, with_flight_time, with_terrain, with_wind
+from world.scenario import (
+    Scenario,
+    load_scenario,
+    with_flight,
+    with_flight_time,
+    with_forecast,
+    with_terrain,
+    with_wind,
+    without_forecast,
+)
 from world.scenario_tables import Guidance, Navigation
 
 # Wind speed, m/s, and the direction from which the wind blows, degrees.
@@ -37,6 +46,8 @@ class FlightOptions(TypedDict, total=False):
     terrain: an elevation file that replaces the terrain of the scenario.
     wind: speed, m/s, and the direction from which the wind blows, degrees.
     turbulence: "none", "light" or "moderate".
+    forecast: a file of a weather forecast (NetCDF, GRIB, or the JSON of Open-Meteo), which states the wind in time,
+    height and place instead of `wind`; `at` states the take-off.
     at: time of the flight, "START" or "START/END", in ISO 8601 with offsets from UTC; zones that are inactive at this
     time are ignored.  None keeps all zones.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
@@ -49,6 +60,7 @@ class FlightOptions(TypedDict, total=False):
     terrain: str | Path | None
     wind: Wind | None
     turbulence: str | None
+    forecast: str | Path | None
     at: str | None
     aircraft: str | Path | None
     airspeed: float | None
@@ -288,22 +300,35 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
 
     program: the autopilot program that flies, or None for a simulated autopilot.
     If no autopilot is named, the parameter file determines it.
-    Raises ScenarioError for values that a scenario file must not have, and ParameterError for the file of another
-    autopilot.
+    Raises ScenarioError for values that a scenario file must not have, ParameterError for the file of another
+    autopilot, and ForecastError for a forecast that cannot be used or that does not cover the flight.
 
     >>> changed = apply_options(load_scenario("tight"), {"wind": (8.0, 270.0), "airspeed": 28.0})
     >>> changed.wind.speed, changed.flight.airspeed_mps
     (8.0, 28.0)
     """
-    wind = options.get("wind")
+    wind, forecast = options.get("wind"), options.get("forecast")
+    if wind is not None and forecast is not None:
+        raise ArgumentError.of_argument("wind", wind, "not with forecast, which states the wind", shown="")
     speed, from_deg = (None, None) if wind is None else _wind_numbers(wind)
     if from_deg is not None and not is_valid_wind(0.0, from_deg):
         raise ArgumentError.of_argument(
             "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
         )
     from_course = None if from_deg is None else math.radians(from_deg)
+    if forecast is not None:
+        # With the time of flight first, so that the file is read once, for this time.
+        scenario = without_forecast(scenario)
     new_scenario = with_flight(with_flight_time(scenario, options.get("at")), **flight_entries(options, program))
-    return with_wind(with_file_autopilot(new_scenario), speed, from_course, options.get("turbulence"))
+    if forecast is not None:
+        new_scenario = with_forecast(new_scenario, str(forecast))
+    new_scenario = with_wind(with_file_autopilot(new_scenario), speed, from_course, options.get("turbulence"))
+    table = new_scenario.spec.wind
+    if table.forecast is not None and new_scenario.spec.at is None:
+        raise ArgumentError.of_argument(
+            "at", None, "missing: a forecast needs the time of take-off, as in 2026-05-01T10:00+02:00", shown=""
+        )
+    return new_scenario
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:

@@ -334,7 +334,13 @@ def plan_json(plan: Plan) -> str:
 
 
 def parse_plan(
-    text: str, source: str, *, base: Path | None = None, terrain: str | None = None, ground: Terrain | None = None
+    text: str,
+    source: str,
+    *,
+    base: Path | None = None,
+    terrain: str | None = None,
+    ground: Terrain | None = None,
+    is_stored: bool = False,
 ) -> Plan:
     """Parse the plan in the text of a ``plan.json``.
 
@@ -342,6 +348,7 @@ def parse_plan(
     base: folder to which the scenario's paths are relative.
     terrain: file that replaces the scenario's terrain.
     ground: terrain already loaded (from a log); then no elevation file is opened.
+    is_stored: True for the plan of a log; then no forecast is opened.
 
     >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
     Traceback (most recent call last):
@@ -364,7 +371,7 @@ def parse_plan(
     scenario_spec = (
         plan_file.scenario if terrain is None else with_amsl_endpoints(plan_file.scenario, waypoints[0], waypoints[-1])
     )
-    scenario = scenario_from_spec(scenario_spec, source, base=base, terrain=terrain, ground=ground)
+    scenario = scenario_from_spec(scenario_spec, source, base=base, terrain=terrain, ground=ground, is_stored=is_stored)
     history = np.array([[np.nan if value is None else value for value in row] for row in plan_file.history]).reshape(
         -1, 3
     )

@@ -106,6 +106,10 @@ class TerrainError(PlanflyError):
     """An elevation file cannot be read, or does not cover the required area."""
 
 
+class ForecastError(PlanflyError):
+    """A forecast of the wind cannot be read, or does not cover the mission."""
+
+
 class MissionError(PlanflyError):
     """A plan or mission file cannot be read or flown."""
 

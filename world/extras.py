@@ -63,6 +63,18 @@ EXTRAS = {
             ("h5py", "pandas", "pyarrow", "scipy"),
         ),
         Extra(
+            "forecast",
+            "a forecast as NetCDF needs",
+            "`--forecast FILE.nc` and `planfly window`",
+            ("h5netcdf", "pandas", "scipy", "xarray"),
+        ),
+        Extra(
+            "grib",
+            "a forecast as GRIB needs",
+            "`--forecast FILE.grib2`",
+            ("cfgrib", "eccodes", "pandas", "scipy", "xarray"),
+        ),
+        Extra(
             "identification",
             "identifying an aircraft needs",
             "`planfly aircraft --identify LOG`",

@@ -27,6 +27,8 @@ from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean
+from world.forecast.forecast import Forecast
+from world.forecast.scenario_wind import forecast_wind, scenario_forecast
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
 from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
@@ -137,6 +139,22 @@ class Scenario:
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    def wind_velocity(self, position: Sequence[float], seconds: float = 0.0) -> tuple[float, float]:
+        """Return the mean wind at a position (east, north, up, m) and time (s after take-off), m/s, east and north.
+
+        >>> windy = with_wind(load_scenario("tight"), 5.0, math.radians(270.0), None)
+        >>> windy.wind_velocity((0.0, 0.0, 75.0))
+        (5.0, ...)
+        """
+        east, north = self.wind.velocity_at(float(position[2]))
+        if self.wind.field is None:
+            return east, north
+        latitude, longitude = to_geo(self.origin, [position[0]], [position[1]])
+        deviation = self.wind.field.velocities_at(
+            np.array([seconds]), latitude, longitude, np.array([position[2]], dtype=np.float64)
+        )[0]
+        return east + float(deviation[0]), north + float(deviation[1])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -272,6 +290,7 @@ def scenario_from_spec(
     terrain: str | None = None,
     ground: Terrain | None = None,
     external: bool = False,
+    is_stored: bool = False,
 ) -> Scenario:
     """Make a scenario from a checked file, or from the data of `Scenario.to_json`.
 
@@ -280,19 +299,17 @@ def scenario_from_spec(
     terrain: an elevation file that replaces the scenario's own.
     ground: terrain that is already loaded (from a log).
     external: see `Scenario`.
-    Raises ScenarioError and TerrainError as `load_scenario` does.
+    is_stored: True for the scenario of a log, whose wind has the mean profile of its forecast: no forecast is read.
+    Raises ScenarioError, TerrainError and ForecastError as `load_scenario` does.
 
     >>> again = scenario_from_spec(load_scenario("tight").to_json(), "a plan")
     >>> again.name, again.bounds.tolist()
     ('tight', [[-300.0, 2900.0], [-150.0, 150.0]])
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
-    if spec.zones_file is not None:
-        # Stored with the scenario's own zones, so that a log without the files makes the same scenario.
-        file_zones = read_zone_files(spec.zones_file, source, base)
-        spec = spec.model_copy(update={"zones_file": None})
-    else:
-        file_zones = FileZones()
+    # Stored with the scenario's own zones, so that a log without the files makes the same scenario.
+    file_zones = FileZones() if spec.zones_file is None else read_zone_files(spec.zones_file, source, base)
+    spec = spec.model_copy(update={"zones_file": None})
     if terrain is not None:
         spec, base = _replace_terrain(spec, terrain, source, base), None
     raster = None
@@ -310,13 +327,12 @@ def scenario_from_spec(
     else:
         raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from", file=source, field="area")
     if ground is None:
-        if raster is not None:
-            ground = _read_terrain_of_area(raster, origin, bounds)
-        else:
-            ground = _make_terrain(spec.terrain, bounds)
+        ground = (
+            _make_terrain(spec.terrain, bounds) if raster is None else _read_terrain_of_area(raster, origin, bounds)
+        )
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
-    spec = spec.model_copy(update={"flight": _with_absolute_paths(spec.flight, base)})
+    spec = _with_absolute_paths(spec, base)
     # Values taken from the tile are stored, so that a log without the tile makes the same scenario.
     origin_table = checked_table(
         lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin"
@@ -327,20 +343,23 @@ def scenario_from_spec(
     spec = _with_file_zones(
         spec.model_copy(update={"origin": origin_table, "area": area_table}), file_zones, source, origin, bounds
     )
-    return _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
+    scenario = _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
+    return scenario if is_stored else _with_forecast_wind(scenario)
 
 
-def _with_absolute_paths(flight: FlightTable, base: Path | None) -> FlightTable:
-    """Return a copy of the table with absolute paths of the aircraft's folder and the parameter file.
+def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
+    """Return a scenario's file with absolute paths of the aircraft's folder, the parameter file and the forecast.
 
     base: folder of relative paths.
     """
-    changes = {}
+    flight, wind, changes = spec.flight, spec.wind, {}
     if names_folder(flight.aircraft):
         changes["aircraft"] = absolute_path(Path(base or "", flight.aircraft))
     if flight.params is not None:
         changes["params"] = absolute_path(Path(base or "", flight.params))
-    return flight.model_copy(update=changes)
+    if wind.forecast is not None:
+        wind = wind.model_copy(update={"forecast": absolute_path(Path(base or "", wind.forecast))})
+    return spec.model_copy(update={"flight": flight.model_copy(update=changes), "wind": wind})
 
 
 def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
@@ -548,7 +567,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     table = scenario.spec.wind
     changes: dict[str, Any] = {}
     if speed is not None and from_course is not None:
-        changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
+        changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course), "forecast": None}
     if turbulence is not None:
         changes["turbulence"] = turbulence
     changed_table = checked_table(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
@@ -559,7 +578,57 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
         from_course=math.radians(spec.wind.from_deg),
         turbulence=spec.wind.turbulence,
     )
-    return replace(scenario, spec=spec, wind=wind)
+    changed_scenario = replace(scenario, spec=spec, wind=wind)
+    if speed is None:
+        return changed_scenario
+    return replace(changed_scenario, wind=replace(wind, field=None, forecast=None))
+
+
+def with_forecast(scenario: Scenario, forecast: str, source: str = "") -> Scenario:
+    """Return a scenario in the wind of a weather forecast, from the scenario's time of flight on.
+
+    forecast: file that `world.forecast.read_forecast` reads.
+    source: beginning of messages about the value.
+
+    Without a time of flight, the scenario has no wind until `with_flight_time` states one.
+    Raises ForecastError for a file that cannot be used, or that does not cover the start and the destination.
+    """
+    changes = {"forecast": absolute_path(Path(forecast)), "speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0}
+    table = checked_table(
+        lambda: WindTable(**(scenario.spec.wind.model_dump() | changes)), f"{source or scenario.name}: wind"
+    )
+    return _with_forecast_wind(replace(scenario, spec=scenario.spec.model_copy(update={"wind": table})))
+
+
+def without_forecast(scenario: Scenario) -> Scenario:
+    """Return a scenario without its forecast, in the forecast's mean profile; unchanged if it has none."""
+    table = scenario.spec.wind
+    if table.forecast is None:
+        return scenario
+    spec = scenario.spec.model_copy(update={"wind": table.model_copy(update={"forecast": None})})
+    return replace(scenario, spec=spec, wind=replace(scenario.wind, field=None, forecast=None))
+
+
+def forecast_of_scenario(scenario: Scenario) -> Forecast:
+    """Read the forecast that a scenario's [wind] names, around its map.  Raises ForecastError."""
+    ground = math.nan
+    if scenario.terrain is not None:
+        ground = float(scenario.terrain.height(scenario.start[0], scenario.start[1]))
+    start_ground = float(scenario.start[2]) if math.isnan(ground) else ground
+    return scenario_forecast(scenario.spec.wind, scenario.origin, scenario.bounds, start_ground)
+
+
+def _with_forecast_wind(scenario: Scenario) -> Scenario:
+    """Return the scenario with the wind of the forecast that its file names, if it states the time of flight.
+
+    Raises ForecastError.
+    """
+    if scenario.spec.wind.forecast is None or scenario.spec.at is None:
+        return scenario
+    ends = (scenario.start, scenario.destination)
+    forecast = forecast_of_scenario(scenario)
+    wind, table = forecast_wind(scenario.spec.wind, forecast, scenario.spec.at, scenario.origin, ends)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
 
 
 def with_link(scenario: Scenario, **entries: Any) -> Scenario:
@@ -661,7 +730,7 @@ def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
         raise ScenarioError.of_argument("at", at, str(error)) from error
     spec = scenario.spec.model_copy(update={"at": at})
     zones = make_zones(_active_zones(spec), scenario.name, scenario.origin, scenario.terrain)
-    return replace(scenario, spec=spec, zones=zones)
+    return _with_forecast_wind(replace(scenario, spec=spec, zones=zones))
 
 
 def with_threats(

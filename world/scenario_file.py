@@ -36,6 +36,13 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         raise ScenarioError(
             f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"', file=source, field="terrain.kind"
         )
+    wind = data.get("wind")
+    if isinstance(wind, dict) and "forecast" in wind:
+        for name in ("speed_mps", "from_deg", "gradient"):
+            if name in wind:
+                raise ScenarioError.at(
+                    source, f"wind.{name}", wind[name], "not with wind.forecast, which states the wind"
+                )
     spec = check_scenario(data, source)
     if "aircraft" in spec.flight.model_fields_set:
         return spec

@@ -524,13 +524,18 @@ class FlightTable(ScenarioTable):
 
 
 class WindTable(ScenarioTable):
-    """[wind]: gradient in m/s per metre of height above the start."""
+    """[wind]: gradient in m/s per metre of height above the start.
+
+    forecast: file of a weather forecast, which states the wind instead; speed_mps, from_deg and gradient are then those
+    of its mean profile around the start, and a scenario file must not state them.
+    """
 
     speed_mps: Annotated[float, in_range(0.0, 40.0)] = 0.0
     from_deg: Course = 0.0
     gradient: Annotated[float, in_range(-0.05, 0.05)] = 0.0
     turbulence: Literal["none", "light", "moderate"] = "none"
     seed: Seed | None = None
+    forecast: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
 
 
 class HomeTable(PositionTable):

@@ -7,6 +7,8 @@ from typing import Literal
 import numpy as np
 
 from world.arrays import Floats
+from world.forecast.forecast import ForecastFacts
+from world.forecast.wind_field import WindField
 from world.kernels import compiled, compiled_inline
 
 Turbulence = Literal["none", "light", "moderate"]
@@ -37,6 +39,9 @@ class Wind:
     gradient: increase of the speed in m/s per metre of altitude, 1/s; the speed is never below 0.
     turbulence: level of MIL-F-8785C, see `W20`.
     seed: seed of the turbulence; None for the seed of the flight.
+    field: deviation of a forecast's wind from this mean wind, with times in s after take-off, which the flight adds;
+        None for a wind that is the same everywhere.
+    forecast: the forecast that the wind was made from; None for a stated wind.
     """
 
     speed: float = 0.0
@@ -45,6 +50,8 @@ class Wind:
     turbulence: Turbulence = "none"
     seed: int | None = None
     reference_amsl: float = 0.0
+    field: WindField | None = None
+    forecast: ForecastFacts | None = None
 
     @property
     def to_course(self) -> float:

@@ -104,7 +104,8 @@ class Airborne(ABC):
         self._airspeeds = setup.autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
-        self._workspace = Workspace(self._gains, self.path, waypoints, None if self._law is None else self._law.memory)
+        own = None if self._law is None else self._law.memory
+        self._workspace = Workspace(self._gains, self.path, waypoints, own, setup.scenario.wind.field)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
@@ -150,8 +151,9 @@ class Airborne(ABC):
             wind.gradient,
             wind.reference_amsl,
             w20,
+            0.0,
         )
-        self._windy = bool(wind.speed or wind.gradient or w20)
+        self._windy = bool(wind.speed or wind.gradient or w20 or wind.field)
         self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
         start_gusts(self._random.standard_normal(5), record.gusts)
         sigma, time_constant = ERRORS[setup.nav]

@@ -334,6 +334,7 @@ class Flight(Airborne):
         self._prepare_route(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
             setattr(self._work, name, getattr(old_record, name))
+        self._work.wind.start_time += old_record.timing.tick * self.dt
         for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
         self._law.initialise(self.memory, self._workspace.own)

@@ -63,7 +63,7 @@ def find_start(
     convergence = local_map.convergence(lat, lon)
     # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed that
     # the aircraft can hold; the verdict reports it.
-    east_wind, north_wind = setup.scenario.wind.velocity_at(up)
+    east_wind, north_wind = setup.scenario.wind_velocity((east, north, up))
     cos, sin = math.cos(convergence), math.sin(convergence)
     return Start(
         lat_deg=lat,
@@ -139,7 +139,7 @@ def find_release(
         position[2] += max(stand_heights, default=0.0)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
     convergence = local_map.convergence(lat, lon)
-    east, north = setup.scenario.wind.velocity_at(float(position[2]))
+    east, north = setup.scenario.wind_velocity(position.tolist())
     ground_altitude = ground.height(float(position[0]), float(position[1]))
     return Release(
         position=(lat, lon, float(position[2])),

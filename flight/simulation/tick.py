@@ -24,6 +24,7 @@ from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_ROW
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
 from world.arrays import Floats, Heights
+from world.forecast.wind_field import WindField, interpolate_field
 from world.frames import POLYMAP, polymap
 from world.geometry import wrap
 from world.kernels import Record, compiled, field_names, inner, record_dtype
@@ -65,6 +66,7 @@ MEAN_WIND = record_dtype(
     "gradient",  # 1/s
     "reference_amsl",  # m
     "w20",  # m/s, turbulence's wind at 20 ft
+    "start_time",  # s, time of the first tick on the field's axis of time
 )
 # Time and rows of the flight.
 TIMING = record_dtype(
@@ -82,6 +84,7 @@ SETTINGS = record_dtype(
     ("pieces", np.int64),  # number of path table rows that hold a piece
     ("nodes", np.int64),
     ("waypoints", np.int64),
+    ("field", np.int64),  # index in the block of the packed wind field; 0 for a wind without a field
     ("on_last_leg", np.bool_),  # for a flight by an external program, as the program reports
 )
 # The i-th piece, node and waypoint of a path in one row.
@@ -125,7 +128,7 @@ class Workspace:
     Numba checks the type of each argument of a call, and takes twice as long for a record as for an array of numbers.
     Therefore all data is passed to compiled code as one block.
 
-    block: (n,) numbers of the workspace, of the control law's own record, and of the path.
+    block: (n,) numbers of the workspace, of the control law's own record, of the path, and of the wind field.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
     own: the control law's own record, or None.
@@ -140,17 +143,28 @@ class Workspace:
     """
 
     def __init__(
-        self, gains: Gains, path: FlyByPath, waypoints: Records, own: np.dtype[np.record] | None = None
+        self,
+        gains: Gains,
+        path: FlyByPath,
+        waypoints: Records,
+        own: np.dtype[np.record] | None = None,
+        field: WindField | None = None,
     ) -> None:
         parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
         rows_of_path = max(map(len, parts.values()))
         path_begins = WORKSPACE_NUMBERS + (0 if own is None else own.itemsize // 8)
-        self.block: Floats = np.zeros(path_begins + rows_of_path * PATH_ROW.itemsize // 8)
+        packed_field = np.empty(0) if field is None else field.packed()
+        # The path's records are a view of the rest of the block, so the field takes a whole number of them.
+        row_numbers = PATH_ROW.itemsize // 8
+        field_begins = path_begins + rows_of_path * row_numbers
+        self.block: Floats = np.zeros(field_begins + math.ceil(packed_field.size / row_numbers) * row_numbers)
+        self.block[field_begins : field_begins + packed_field.size] = packed_field
         self.array: Records = self.block[:WORKSPACE_NUMBERS].view(WORKSPACE)
-        self.path: Records = self.block[path_begins:].view(PATH_ROW)
+        self.path: Records = self.block[path_begins:field_begins].view(PATH_ROW)
         self.own: Record = None if own is None else self.block[WORKSPACE_NUMBERS:path_begins].view(own)[0]
         self.record: Record = self.array[0]
         self.record.gains = gains.record()
+        self.record.settings.field = 0 if field is None else field_begins
         for name, rows in parts.items():
             self.path[name][: len(rows)] = rows
             setattr(self.record.settings, f"{name}s", len(rows))
@@ -290,12 +304,14 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
 
 
 @inner
-def end_tick(workspace: Record) -> int:
+def end_tick(workspace: Record, block: Floats) -> int:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
+
+    block: of the `Workspace`, with the wind field.
 
     Return the code of the flight's end, a key of `ENDS`, or 0 if the flight continues.
     """
-    fill_tick(workspace)
+    fill_tick(workspace, block)
     return airborne_end_code(workspace)
 
 
@@ -313,13 +329,18 @@ def airborne_end_code(workspace: Record) -> int:
 
 
 @inner
-def fill_tick(workspace: Record) -> None:
-    """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units."""
+def fill_tick(workspace: Record, block: Floats) -> None:
+    """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
+
+    block: of the `Workspace`, with the wind field.
+    """
     state, true, air, timing, place = workspace.state, workspace.true, workspace.air, workspace.timing, workspace.place
     cos, sin = place.north_cos, place.north_sin
     row = workspace.rows[timing.row]
     turbulence = workspace.noise[timing.row].turbulence
     _update_wind(state, workspace.wind, workspace.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
+    if workspace.settings.field > 0:
+        _add_wind_field(state, workspace, block, cos, sin)
     air.ground = place.ground if not math.isnan(place.ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0
     _fill_row(
@@ -463,6 +484,26 @@ def _update_wind(
         air.gust_north = gust_downwind * cos - gust_crosswind * sin
         air.gust_east = gust_downwind * sin + gust_crosswind * cos
         air.gust_down = gust_down
+
+
+@inner
+def _add_wind_field(
+    state: Record, workspace: Record, block: Floats, convergence_cos: float, convergence_sin: float
+) -> None:
+    """Add the deviation of the wind field at the aircraft to the mean wind in ``air``.
+
+    convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
+    """
+    timing, air = workspace.timing, workspace.air
+    east, north = interpolate_field(
+        block[workspace.settings.field :],
+        workspace.wind.start_time + timing.tick * timing.dt,
+        math.degrees(state.latitude),
+        math.degrees(state.longitude),
+        workspace.true.up,
+    )
+    air.wind_north += north * convergence_cos + east * convergence_sin
+    air.wind_east += east * convergence_cos - north * convergence_sin
 
 
 @inner

@@ -9,7 +9,7 @@ import hashlib
 import json
 import math
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import PurePath
 from typing import Annotated, Any, Final, Literal
@@ -36,12 +36,15 @@ from logs.recording.setup_schema import (
 )
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, ParameterError, PlanflyError
+from world.forecast.forecast import ForecastFacts
+from world.forecast.wind_field import MAX_FIELD_NUMBERS, WindField
 from world.frames import MAX_TERMS, PolyMap
 from world.raster import MAX_PIXELS
 from world.scenario import Scenario, scenario_from_spec
 from world.scenario_file import first_fault
 from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
+from world.wind import Wind
 
 # ----------------------------------------------------------------------
 # The attachments of a flight log: their names and media types.
@@ -54,6 +57,8 @@ SCENARIO_FILE: Final = "scenario.json"
 PLAN_FILE: Final = "plan.json"
 MISSION_FILE: Final = "mission.waypoints"
 TERRAIN_FILE: Final = "terrain.json"
+FORECAST_FILE: Final = "forecast.json"
+WIND_FILE: Final = "forecast.wind"
 REFERENCE_FILE: Final = "beside.json"
 VERDICT_FILE: Final = "verdict.json"
 RESULT_FILE: Final = "result.json"
@@ -63,6 +68,7 @@ _MEDIA_TYPES: Final = {
     ".json": "application/json",
     ".waypoints": "text/plain",
     ".heights": "application/octet-stream",
+    ".wind": "application/octet-stream",
 }
 
 
@@ -225,6 +231,58 @@ _PACKAGES = (
 )
 
 
+# ----------------------------------------------------------------------
+# The wind of a forecast inside a log.
+
+FORECAST_SCHEMA = "planfly.forecast/1"
+_FIELD_ENCODING = "float64, little endian, zstd: counts (t, y, x, k), axes, and altitude, east, north of each node"
+
+
+class _ForecastFile(SetupModel):
+    """Content of `forecast.json`: what is said of the forecast, and whether the wind deviates from its mean profile."""
+
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
+    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{FORECAST_SCHEMA}$")] = FORECAST_SCHEMA
+    encoding: Annotated[str, Field(max_length=200)] = _FIELD_ENCODING
+    facts: ForecastFacts
+    numbers: Annotated[int, Field(ge=0, le=MAX_FIELD_NUMBERS)]
+
+
+def pack_forecast(wind: Wind) -> dict[str, bytes]:
+    """Encode the forecast of a wind as attachments, bytes by name; none for a stated wind."""
+    if wind.forecast is None:
+        return {}
+    numbers = np.empty(0) if wind.field is None else wind.field.packed()
+    file = _ForecastFile(facts=wind.forecast, numbers=numbers.size)
+    attachments = {FORECAST_FILE: json.dumps(file.model_dump(by_alias=True, mode="json"), indent=1).encode()}
+    if numbers.size:
+        attachments[WIND_FILE] = zstandard.ZstdCompressor(level=6).compress(numbers.astype("<f8").tobytes())
+    return attachments
+
+
+def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind) -> Wind:
+    """Return a wind with the forecast of its attachments; the same wind without any.
+
+    Raises LogError for an attachment that is missing or has the wrong content.
+    """
+    if FORECAST_FILE not in attachments:
+        return wind
+    try:
+        file = _ForecastFile.model_validate_json(attachments[FORECAST_FILE])
+    except ValidationError as error:
+        raise LogError(**first_fault(error).at(source, FORECAST_FILE)) from error
+    if not file.numbers:
+        return replace(wind, forecast=file.facts)
+    try:
+        data = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(attachments[WIND_FILE])
+        raw = data.read(8 * file.numbers + 1)
+        field = WindField.unpacked(np.frombuffer(raw, "<f8").astype(np.float64), file.numbers)
+    except (KeyError, ValueError, zstandard.ZstdError) as error:
+        message = f"{source}: {WIND_FILE}: not the {file.numbers:,} numbers that {FORECAST_FILE} states"
+        raise LogError(message, file=source, field=WIND_FILE) from error
+    return replace(wind, field=field, forecast=file.facts)
+
+
 class _SetupFile(SetupModel):
     """Content of `setup.json`: all of a setup that has no attachment of its own."""
 
@@ -302,6 +360,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         attachments[PLAN_FILE] = plan_json(setup.plan).encode()
     if setup.scenario.terrain is not None:
         attachments |= pack_terrain(setup.scenario.terrain)
+    attachments |= pack_forecast(setup.scenario.wind)
     stored_autopilot = setup.autopilot.store()
     file = _SetupFile(
         aircraft=setup.aircraft,
@@ -428,9 +487,10 @@ def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain 
         raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
     _check_terrain_is_stored(spec, terrain, file_name)
     try:
-        return scenario_from_spec(spec, file_name, ground=terrain, external=external)
+        scenario = scenario_from_spec(spec, file_name, ground=terrain, external=external, is_stored=True)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
+    return replace(scenario, wind=unpack_forecast(attachments, source, scenario.wind))
 
 
 def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
@@ -443,7 +503,7 @@ def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | No
         raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
     _check_terrain_is_stored(data.get("scenario") if isinstance(data, dict) else None, terrain, file_name)
     try:
-        return parse_plan(text, file_name, ground=terrain)
+        return parse_plan(text, file_name, ground=terrain, is_stored=True)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
 

@@ -51,7 +51,7 @@ class Conditions(DocumentConfig):
     """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
     wind_mps: float | None
     wind_from_deg: float | None
-    """Both fields of the wind are null if the wind is the result."""
+    """Both fields of the wind are null if the wind is the result; in a forecast, they are its mean at the start."""
     turbulence: Turbulence | None
     """Null if the flight was not simulated, as is navigation."""
     navigation: Navigation | None
@@ -64,6 +64,8 @@ class Conditions(DocumentConfig):
     height_datum: str | None
     zones: int = 0
     """Number of zones of the scenario and of the mission's fence."""
+    forecast: str = ""
+    """Forecast of the wind with its time of issue, age, grid and levels; empty for a stated wind."""
     unused_parameters: tuple[str, ...] = ()
     """Names in the parameter file that have no effect on the simulated flight."""
 
@@ -95,6 +97,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
         zones=len(scenario.zones),
+        forecast="" if wind.forecast is None else wind.forecast.describe(),
         unused_parameters=() if autopilot.parameters is None else autopilot.parameters.unused,
     )
 
@@ -174,6 +177,8 @@ def _world_line(conditions: Conditions) -> str:
         wind_text = "wind from each direction"
     elif conditions.wind_mps > 0.0:
         wind_text = f"wind {conditions.wind_mps:.3g} m/s from {conditions.wind_from_deg:.0f} degrees"
+    if conditions.forecast:
+        wind_text = f"wind of {conditions.forecast}; {wind_text} at the start"
     turbulence_text = ""
     if conditions.turbulence is not None:
         turbulence_text = (

@@ -130,7 +130,7 @@ def add_time_option(group: OptionGroup) -> None:
         metavar="TIME",
         help=(
             "time of the flight, START or START/END in ISO 8601 format, as in 2026-05-01T10:00+02:00: zones "
-            "that are not active then are ignored (default: all zones are active)"
+            "that are not active then are ignored, and a forecast begins there (default: all zones are active)"
         ),
     )
 
@@ -160,7 +160,19 @@ def add_aircraft_and_wind_options(parser: CommandParser) -> None:
         "(default: the scenario's, or none)",
     )
     add_turbulence_option(group)
+    add_forecast_option(group)
     add_time_option(group)
+
+
+def add_forecast_option(group: OptionGroup) -> None:
+    """Add the option for the forecast of the wind."""
+    option = group.add_argument(
+        "--forecast",
+        metavar="FILE",
+        help="weather forecast (NetCDF, GRIB, or the JSON of Open-Meteo) that states the wind in time, height and "
+        "place; --at states the take-off",
+    )
+    with_completer(option, file_completer("nc", "nc4", "grib", "grib2", "grb2", "json"))
 
 
 def add_turbulence_option(group: OptionGroup) -> None:

@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import MissionDialect, RtlSettings, SpeedLimits
 from flight.mission.fences import fence_zones
@@ -12,7 +14,7 @@ from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import OTHER_VEHICLES, Command, Mission, command_name
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.preflight_notes import preflight_notes
-from flight.mission.route import route_through_stops, with_end_courses
+from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from planfly.flight_options import MissionOptions, apply_options, load_scenario_with_options
@@ -20,8 +22,9 @@ from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.file_autopilots import with_file_autopilot
 from planner.plan import Plan, parse_plan, plan_json, read_plan
-from world.errors import MissionError
+from world.errors import ForecastError, MissionError
 from world.files import did_you_mean, missing_text
+from world.frames import to_geo
 from world.scenario import Scenario
 
 # Name of a plan without a file, in messages about its mission.
@@ -190,6 +193,7 @@ def make_setup(
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
+    _check_forecast(scenario, route, airspeed)
     file_parameters, assumed_parameters = (
         {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
     )
@@ -212,6 +216,29 @@ def make_setup(
         guidance_hz=scenario.flight.guidance_hz,
         fdm_hz=fdm_hz,
     )
+
+
+def _check_forecast(scenario: Scenario, route: Route, airspeed: float) -> None:
+    """Raise ForecastError if a route leaves the box, the levels or the times of the forecast that states the wind.
+
+    airspeed: m/s, for the duration of the flight, without wind.
+    """
+    facts = scenario.wind.forecast
+    if facts is None:
+        return
+    positions, file = route.positions, str(scenario.spec.wind.forecast)
+    latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
+    if fault := facts.place_fault(latitudes, longitudes) or facts.altitude_fault(positions[:, 2].tolist()):
+        raise ForecastError(f"{file}: {fault}", file=file)
+    duration = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()) / airspeed
+    left = (facts.last_time - facts.departure).total_seconds()
+    if duration > left:
+        raise ForecastError.at(
+            file,
+            "time",
+            f"a flight of {duration / 60.0:.0f} minutes from {facts.departure:%Y-%m-%d %H:%M} UTC",
+            f"the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
+        )
 
 
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:

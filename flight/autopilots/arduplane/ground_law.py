@@ -205,7 +205,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
     else:
         find_on_path(work.estimated, pieces, work.memory)
         _tick_landing(work, arduplane, waypoints[memory.leg + 1])
-    fill_tick(work)
+    fill_tick(work, block)
     return end_status(work, ground)
 
 

@@ -359,7 +359,7 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:
         work.commands,
         work.timing.dt,
     )
-    return end_tick(work)
+    return end_tick(work, block)
 
 
 @compiled

@@ -56,7 +56,7 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
     memory.speed_command = path.waypoint[memory.leg].airspeed
     memory.is_finished = False
     update_phase(work.true, ground, settings.on_last_leg)
-    fill_tick(work)
+    fill_tick(work, block)
     return end_status(work, ground)
 
 

@@ -87,7 +87,7 @@ def planfly_tick(block: Floats, heights: Heights) -> int:
         work.commands,
         work.timing.dt,
     )
-    return end_tick(work)
+    return end_tick(work, block)
 
 
 @compiled

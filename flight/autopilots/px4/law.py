@@ -109,7 +109,7 @@ def px4_tick(block: Floats, heights: Heights) -> int:
         work.commands,
         work.timing.dt,
     )
-    return end_tick(work)
+    return end_tick(work, block)
 
 
 @compiled

@@ -90,7 +90,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
         memory.is_in_rtl = previous.loiter_radius != 0.0 and previous.stop == last.stop
         if memory.is_finished:
             memory.cross_track = cross_track
-    return end_tick(work)
+    return end_tick(work, block)
 
 
 @inner

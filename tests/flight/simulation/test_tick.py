@@ -387,7 +387,7 @@ def test_outputs_are_scaled_each_by_its_own_factor_above_and_below_zero(name: st
 def test_the_wind_blows_where_it_goes_and_the_next_row_shows_it() -> None:
     space = make_workspace()
     # 5 m/s at 400 m and 0.02 m/s more a metre: 7 m/s at 500 m, to the map course with cosine 0.6 and sine 0.8.
-    space.record.wind = (5.0, 0.6, 0.8, 0.02, 400.0, 0.0)
+    space.record.wind = (5.0, 0.6, 0.8, 0.02, 400.0, 0.0, 0.0)
     for _ in range(2):
         read(space)
         assert planfly_tick(space.block, level_ground()) == 0
@@ -399,7 +399,7 @@ def test_the_wind_blows_where_it_goes_and_the_next_row_shows_it() -> None:
 def test_where_true_north_is_the_maps_east_all_is_turned() -> None:
     space = make_workspace()
     space.record.north_map = north_at(math.pi / 2).record
-    space.record.wind = (7.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    space.record.wind = (7.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(2):
         read(space, velocity_east=3.0, yaw=0.1)
         assert planfly_tick(space.block, level_ground()) == 0

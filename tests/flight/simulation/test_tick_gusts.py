@@ -17,7 +17,7 @@ def two_ticks(**readings: float) -> Workspace:
     along; filters at one across give (root 3 + 1 - root 3) / root 2; at three downwards, three times that.
     """
     space = make_workspace()
-    space.record.wind = (5.0, 0.6, 0.8, 0.0, 0.0, 10.0)
+    space.record.wind = (5.0, 0.6, 0.8, 0.0, 0.0, 10.0, 0.0)
     filters = space.record.gusts
     filters.along = 2.0
     filters.across_first = filters.across_second = 1.0

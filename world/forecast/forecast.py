@@ -1,0 +1,193 @@
+"""Forecast of the wind, as its file states it, and the wind of a mission made from it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from world.arrays import Floats
+from world.forecast.wind_field import WindField
+
+# Age at the departure after which a forecast is called old.
+OLD_AGE = timedelta(hours=12)
+# Longest time after the departure for which the wind is kept, s.
+LONGEST_FLIGHT_S = 24 * 3600.0
+# Distance below the lowest level within which the lowest level's wind applies, m.
+MAX_DEPTH_BELOW_LEVELS_M = 100.0
+# Distance around a forecast of a single place within which it applies, m: half a cell of a global model.
+PLACE_RADIUS_M = 15_000.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Forecast:
+    """Wind at the nodes of a forecast's grid around a mission.
+
+    source: name of the file.
+    issued: time of issue of the forecast; None if the file does not state it.
+    times: (t,) time of each step, s since 1970 in UTC, ascending.
+    latitudes, longitudes: (y,), (x,) deg, ascending.
+    altitudes: (t, y, x, k) m AMSL, ascending along the last axis.
+    velocities: (m, t, y, x, k, 2) m/s, east and north, of each member of an ensemble; m is 1 for a single forecast.
+    grid_km: distance between nodes; 0 for a single place.
+    ground: source of the ground above which heights are stated; "" if the levels state altitudes.
+    """
+
+    source: str
+    issued: datetime | None
+    times: Floats
+    latitudes: Floats
+    longitudes: Floats
+    altitudes: Floats
+    velocities: Floats
+    grid_km: float
+    ground: str = ""
+
+    @property
+    def members(self) -> int:
+        """Number of members of the ensemble; 1 for a single forecast."""
+        return len(self.velocities)
+
+    @property
+    def first_time(self) -> datetime:
+        """First time of the forecast."""
+        return datetime.fromtimestamp(float(self.times[0]), UTC)
+
+    @property
+    def last_time(self) -> datetime:
+        """Last time of the forecast."""
+        return datetime.fromtimestamp(float(self.times[-1]), UTC)
+
+    @property
+    def is_single_place(self) -> bool:
+        """Return True if the forecast is for one place."""
+        return len(self.latitudes) == len(self.longitudes) == 1
+
+    def field_from(self, departure: datetime, member: int = 0) -> WindField:
+        """Return the wind of one member with times in seconds after the departure."""
+        field = WindField(
+            self.times - departure.timestamp(),
+            self.latitudes,
+            self.longitudes,
+            self.altitudes,
+            self.velocities[member],
+        )
+        return field.between(0.0, LONGEST_FLIGHT_S)
+
+    def facts(self, departure: datetime) -> "ForecastFacts":
+        """Return what the first lines of an answer say of the forecast."""
+        return ForecastFacts(
+            source=self.source,
+            issued=self.issued,
+            departure=departure,
+            last_time=self.last_time,
+            grid_km=self.grid_km,
+            levels=self.altitudes.shape[-1],
+            lowest_amsl=float(self.altitudes[..., 0].max()),
+            highest_amsl=float(self.altitudes[..., -1].min()),
+            box=(
+                float(self.latitudes[0]),
+                float(self.longitudes[0]),
+                float(self.latitudes[-1]),
+                float(self.longitudes[-1]),
+            ),
+            ground=self.ground,
+            members=self.members,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ForecastFacts:
+    """Source and extent of the forecast that a wind was made from.
+
+    source, issued, grid_km, ground, members: see `Forecast`.
+    departure: time of take-off.
+    last_time: last time of the forecast.
+    levels: number of levels.
+    lowest_amsl, highest_amsl: altitudes between which the forecast has levels everywhere, m.
+    box: south, west, north, east, deg, of the nodes around the mission.
+    """
+
+    source: str
+    issued: datetime | None
+    departure: datetime
+    last_time: datetime
+    grid_km: float
+    levels: int
+    lowest_amsl: float
+    highest_amsl: float
+    box: tuple[float, float, float, float]
+    ground: str = ""
+    members: int = 1
+
+    @property
+    def age(self) -> timedelta | None:
+        """Age of the forecast at the departure; None if its time of issue is not stated."""
+        return None if self.issued is None else self.departure - self.issued
+
+    @property
+    def is_old(self) -> bool:
+        """Return True if the forecast is older than `OLD_AGE` at the departure."""
+        return self.age is not None and self.age > OLD_AGE
+
+    def describe(self) -> str:
+        """Return the forecast's source, time of issue, age, grid and levels as a clause.
+
+        >>> noon = datetime(2026, 5, 1, 12, tzinfo=UTC)
+        >>> ForecastFacts("a.nc", noon, noon, noon, 2.2, 3, 10.0, 900.0, (0.0, 0.0, 1.0, 1.0)).describe()
+        'forecast a.nc, issued 2026-05-01 12:00 UTC (0 h before take-off), grid 2.2 km, 3 levels to 900 m AMSL'
+        """
+        issue = "time of issue not stated"
+        if self.issued is not None and self.age is not None:
+            hours = self.age.total_seconds() / 3600.0
+            issue = f"issued {self.issued:%Y-%m-%d %H:%M} UTC ({hours:.3g} h before take-off"
+            issue += ": old)" if self.is_old else ")"
+        grid = f"grid {self.grid_km:.2g} km" if self.grid_km else "for one place"
+        levels = f"{self.levels} level{'s' * (self.levels != 1)} to {self.highest_amsl:.0f} m AMSL"
+        member_text = f", {self.members} members" if self.members > 1 else ""
+        return f"forecast {self.source}, {issue}, {grid}, {levels}{member_text}"
+
+    def altitude_fault(self, altitudes: Sequence[float]) -> str:
+        """Return why altitudes (m AMSL) of a mission are outside the levels; "" if they are inside."""
+        if max(altitudes) > self.highest_amsl:
+            return (
+                f"the mission flies up to {max(altitudes):.0f} m AMSL, and the forecast's highest level is at "
+                f"{self.highest_amsl:.0f} m"
+            )
+        if min(altitudes) < self.lowest_amsl - MAX_DEPTH_BELOW_LEVELS_M:
+            return (
+                f"the mission flies down to {min(altitudes):.0f} m AMSL, and the forecast's lowest level is at "
+                f"{self.lowest_amsl:.0f} m: a level at most {MAX_DEPTH_BELOW_LEVELS_M:.0f} m above it is needed"
+            )
+        return ""
+
+    def place_fault(self, latitudes: Floats, longitudes: Floats) -> str:
+        """Return why places (deg) of a mission are outside the forecast's box; "" if they are inside."""
+        south, west, north, east = self.box
+        near = west + (longitudes - west + 180.0) % 360.0 - 180.0
+        if not self.grid_km:
+            dy = (latitudes - south) * 111_000.0
+            dx = (near - west) * 111_000.0 * math.cos(math.radians(south))
+            distance = float(np.hypot(dx, dy).max())
+            if distance <= PLACE_RADIUS_M:
+                return ""
+            return (
+                f"the mission is up to {distance / 1000.0:.0f} km from the forecast's only place, "
+                f"{south:.3f}, {west:.3f}; at most {PLACE_RADIUS_M / 1000.0:.0f} km are allowed"
+            )
+        # A box that crosses no turn has its nodes in ascending order.
+        tolerance = 1e-6
+        is_outside = (
+            (latitudes < south - tolerance)
+            | (latitudes > north + tolerance)
+            | (near < west - tolerance)
+            | (near > east + tolerance)
+        )
+        if not is_outside.any():
+            return ""
+        k = int(np.argmax(is_outside))
+        return (
+            f"the mission is at {latitudes[k]:.3f}, {longitudes[k]:.3f}, outside the forecast's box "
+            f"{south:.3f} to {north:.3f}, {west:.3f} to {east:.3f}"
+        )

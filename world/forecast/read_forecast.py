@@ -1,0 +1,461 @@
+"""Read a forecast of the wind: NetCDF, GRIB, or the JSON of Open-Meteo.
+
+NetCDF and GRIB are read by xarray.  Variables are recognised by their CF standard names, and by the names that weather
+services use for them.  Winds on pressure levels need the geopotential height of these levels; winds at heights above
+ground are placed above the model's ground if the file has it, and otherwise above the ground at the mission's start.
+"""
+
+import functools
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from world.arrays import Floats
+from world.errors import ForecastError
+from world.extras import require_extra
+from world.files import missing_text
+from world.forecast.forecast import Forecast
+from world.forecast.levels import LevelGroup, LevelKind, merge_levels
+from world.forecast.open_meteo import read_open_meteo
+from world.forecast.regrid import regrid, regular_axes, rotate_to_north
+from world.forecast.units import GRAVITY_STANDARD, HEIGHT_UNITS, PRESSURE_UNITS, SPEED_UNITS, unit_factor
+
+# Largest number of nodes around a mission, over all times, levels and members.
+MAX_NODES = 20_000_000
+# Fastest wind that a forecast may state, m/s: faster winds are an error of units.
+_MAX_WIND_MPS = 150.0
+
+_U_NAME = re.compile(r"^(u|u(\d+)m?|(\d+)u|ugrd.*|uwnd|u_component_of_wind.*|u-component.*|wind_u)$", re.IGNORECASE)
+_V_NAME = re.compile(r"^(v|v(\d+)m?|(\d+)v|vgrd.*|vwnd|v_component_of_wind.*|v-component.*|wind_v)$", re.IGNORECASE)
+_EAST_NAMES = ("eastward_wind", "x_wind")
+_NORTH_NAMES = ("northward_wind", "y_wind")
+_MEMBER_DIMS = ("number", "member", "realization", "ensemble", "ens", "ensemble_member")
+_HEIGHT_NAMES = {"gh", "z", "hgt", "geopotential", "geopotential_height", "height_above_sea_level"}
+_GROUND_NAMES = {"orog", "orography", "zsfc", "surface_altitude", "hsurf", "topography", "surface_geopotential"}
+
+
+class Box(NamedTuple):
+    """Area around a mission, deg; the west is below the east, and may be below -180."""
+
+    south: float
+    west: float
+    north: float
+    east: float
+
+
+def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
+    """Read the part of a forecast that determines the wind in a box.
+
+    ground_amsl: ground at the mission's start, m AMSL, for heights above ground in a file without the model's ground.
+
+    Raises ForecastError, in one line, for a file that is missing, damaged, or lacks what is needed, and
+    MissingExtraError if xarray or cfgrib is not installed.
+    """
+    try:
+        status = path.stat()
+    except OSError:
+        raise ForecastError(f"{path}: {missing_text(path)}", file=str(path)) from None
+    return _read_cached(path, (status.st_mtime_ns, status.st_size), box, ground_amsl)
+
+
+@functools.lru_cache(maxsize=4)
+def _read_cached(path: Path, version: tuple[int, int], box: Box, ground_amsl: float) -> Forecast:
+    """Read a forecast; the version of the file is part of the cache's key."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(64)
+    except OSError as error:
+        raise ForecastError(f"{path}: cannot be read: {error.strerror}", file=str(path)) from error
+    if start.lstrip()[:1] in (b"{", b"["):
+        return read_open_meteo(path, ground_amsl)
+    return _ForecastReader(path, box, ground_amsl).read(_open_datasets(path, start))
+
+
+def _open_datasets(path: Path, start: bytes) -> list[Any]:
+    """Open a file as xarray datasets, one for each kind of level.
+
+    start: first bytes of the file.
+    """
+    if start.startswith(b"GRIB"):
+        require_extra("grib")
+    elif start.startswith((b"\x89HDF", b"CDF")):
+        require_extra("forecast")
+    else:
+        allowed = "expected NetCDF, GRIB, or the JSON of Open-Meteo"
+        raise ForecastError(f"{path}: not a forecast: {allowed}", file=str(path), allowed=allowed)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            if start.startswith(b"GRIB"):
+                import cfgrib
+
+                return list(cfgrib.open_datasets(str(path), backend_kwargs={"indexpath": "", "errors": "raise"}))
+            import xarray
+
+            engine = "h5netcdf" if start.startswith(b"\x89HDF") else "scipy"
+            return [xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False)]
+    # Each library raises errors of its own for damaged files.
+    except Exception as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> ForecastError:
+    """Return the error for a file that a library cannot read, with the first line of the library's reason."""
+    reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
+    return ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
+
+
+class _ForecastReader:
+    """Reader of one file.
+
+    path: the file.
+    box: area around the mission.
+    ground_amsl: ground at the mission's start, m AMSL.
+    """
+
+    def __init__(self, path: Path, box: Box, ground_amsl: float) -> None:
+        self.path, self.box, self.ground_amsl = path, box, ground_amsl
+        self.times = self.latitudes = self.longitudes = np.empty(0)
+        self.ground: Floats | None = None
+
+    def fail(self, field: str, allowed: str) -> ForecastError:
+        """Return the error for a variable of the file, with what is allowed."""
+        return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
+
+    def read(self, datasets: Sequence[Any]) -> Forecast:
+        """Return the forecast in datasets of xarray."""
+        decoded = [self._decode_times(dataset) for dataset in datasets]
+        pairs = [pair for dataset in decoded for pair in self._wind_pairs(dataset)]
+        if not pairs:
+            raise self.fail("wind", "missing: no pair of an eastward and a northward wind was found")
+        self._set_axes([pair[0] for pair in pairs])
+        for dataset in decoded:
+            for name, array in dataset.data_vars.items():
+                is_ground = _names_of(name, array) & _GROUND_NAMES
+                if self.ground is None and is_ground and self._level_of(array, name) is None:
+                    heights, factor = self._values(array.mean([d for d in array.dims if d in ("time", "step")])), 1.0
+                    if unit_factor(array.attrs.get("units"), HEIGHT_UNITS) is None:
+                        factor = 1.0 / GRAVITY_STANDARD
+                    self.ground = heights[0, 0, ..., 0] * factor
+        groups = [self._group(decoded, *pair) for pair in pairs]
+        ground_source = ""
+        if any(group.kind == "height" for group in groups):
+            ground_source = "of the forecast's model" if self.ground is not None else "at the mission's start"
+        altitudes, velocities = merge_levels(groups, self.ground, self.ground_amsl)
+        degrees = np.diff(self.latitudes)
+        return Forecast(
+            source=self.path.name,
+            issued=self._find_issue(datasets, decoded),
+            times=self.times,
+            latitudes=self.latitudes,
+            longitudes=self.longitudes,
+            altitudes=altitudes,
+            velocities=velocities,
+            grid_km=float(degrees.mean()) * 111.2,
+            ground=ground_source,
+        )
+
+    # ------------------------------------------------------------------
+    # Times.
+
+    def _decode_times(self, dataset: Any) -> Any:
+        """Return a dataset with its times as datetime64."""
+        import xarray
+
+        for name, variable in dataset.variables.items():
+            calendar = variable.attrs.get("calendar")
+            if calendar not in (None, "standard", "gregorian", "proleptic_gregorian"):
+                raise self.fail(str(name), f"calendar {calendar!r}: allowed standard, gregorian, proleptic_gregorian")
+        try:
+            return xarray.decode_cf(dataset, decode_timedelta=False)
+        except (ValueError, TypeError, OverflowError) as error:
+            raise _damaged(self.path, error) from error
+
+    def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
+        """Return the dimension of a variable's times (None for a single time), and the times in s since 1970."""
+        for name in ("valid_time", "time", *array.coords):
+            coordinate = array.coords.get(name)
+            if coordinate is None or not np.issubdtype(coordinate.dtype, np.datetime64):
+                continue
+            if coordinate.ndim > 1:
+                raise self.fail(str(name), "several times of issue in one file: allowed one")
+            if name != "valid_time" and coordinate.ndim == 0 and "step" in array.dims:
+                continue
+            seconds = (coordinate.values.reshape(-1) - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+            if not np.isfinite(seconds).all() or (np.diff(seconds) <= 0.0).any():
+                raise self.fail(str(name), "the times are not in ascending order")
+            return (str(coordinate.dims[0]) if coordinate.ndim else None), seconds.astype(np.float64)
+        raise self.fail("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
+
+    def _find_issue(self, raw: Sequence[Any], decoded: Sequence[Any]) -> datetime | None:
+        """Return the time of issue that a file states, or None."""
+        for dataset in decoded:
+            for name, variable in dataset.variables.items():
+                is_issue = variable.attrs.get("standard_name") == "forecast_reference_time"
+                is_grib_time = name == "time" and "valid_time" in dataset.variables
+                if (is_issue or is_grib_time) and np.issubdtype(variable.dtype, np.datetime64) and variable.size:
+                    seconds = (variable.values.reshape(-1)[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s")
+                    if np.isfinite(seconds):
+                        return datetime.fromtimestamp(float(seconds), UTC)
+        return None
+
+    # ------------------------------------------------------------------
+    # Axes.
+
+    def _set_axes(self, arrays: Sequence[Any]) -> None:
+        """Set times, latitudes and longitudes from the first variable; the other variables must have the same axes.
+
+        Times that not all variables have are left out.
+        """
+        times = [self._valid_times(array)[1] for array in arrays]
+        common = functools.reduce(np.intersect1d, times)
+        if not len(common):
+            raise self.fail("time", "the levels have no time in common")
+        self.times = common
+        axes = [self._axes(array) for array in arrays]
+        self.latitudes, self.longitudes = axes[0][0], axes[0][1]
+        for array, (latitudes, longitudes) in zip(arrays, axes, strict=True):
+            if latitudes.shape != self.latitudes.shape or longitudes.shape != self.longitudes.shape:
+                raise self.fail(str(array.name), "its grid differs from the grid of the other winds")
+
+    def _horizontal(self, array: Any) -> tuple[Any, Any]:
+        """Return the coordinates of latitude and longitude of a variable."""
+        found = []
+        for standard_name, names in (("latitude", ("lat", "latitude")), ("longitude", ("lon", "longitude"))):
+            for name, coordinate in array.coords.items():
+                if coordinate.attrs.get("standard_name") == standard_name or str(name).lower() in names:
+                    found.append(coordinate)
+                    break
+            else:
+                raise self.fail(standard_name, f"missing for {array.name}")
+        return found[0], found[1]
+
+    def _axes(self, array: Any) -> tuple[Floats, Floats]:
+        """Return the ascending latitudes and longitudes of the nodes around the box, deg."""
+        latitude, longitude = self._horizontal(array)
+        if latitude.ndim == 2:
+            return self._regular_axes(latitude.values, longitude.values)
+        rows, columns = self._node_indices(latitude, longitude)
+        center = 0.5 * (self.box.west + self.box.east)
+        near = center + (longitude.values.reshape(-1) - center + 180.0) % 360.0 - 180.0
+        return latitude.values.reshape(-1)[rows].astype(np.float64), near[columns].astype(np.float64)
+
+    def _regular_axes(self, latitudes: Floats, longitudes: Floats) -> tuple[Floats, Floats]:
+        """Return the axes of the regular grid to which a grid with two-dimensional coordinates is interpolated."""
+        axes = regular_axes(latitudes, longitudes, self.box)
+        if axes is None:
+            raise self.fail("latitude, longitude", "the mission is outside the forecast's grid")
+        return axes
+
+    def _node_indices(self, latitude: Any, longitude: Any) -> tuple[Any, Any]:
+        """Return the indices of the nodes around the box, in ascending order of latitude and of longitude."""
+        center = 0.5 * (self.box.west + self.box.east)
+        near = center + (longitude.values.reshape(-1).astype(np.float64) - center + 180.0) % 360.0 - 180.0
+        indices = []
+        for name, values, low, high in (
+            ("latitude", latitude.values.reshape(-1).astype(np.float64), self.box.south, self.box.north),
+            ("longitude", near, self.box.west, self.box.east),
+        ):
+            if len(values) < 2:
+                raise self.fail(name, "one node: allowed at least two nodes around the mission")
+            if not np.isfinite(values).all() or (name == "latitude" and np.abs(values).max() > 90.0):
+                raise self.fail(name, "not numbers of degrees")
+            steps = np.diff(values)
+            if name == "latitude" and not ((steps > 0.0).all() or (steps < 0.0).all()):
+                raise self.fail(name, "neither ascending nor descending")
+            order = np.argsort(values, kind="stable")
+            ordered = values[order]
+            if (np.diff(ordered) <= 0.0).any():
+                raise self.fail(name, "two nodes at the same place")
+            first = max(0, int(np.searchsorted(ordered, low, side="right")) - 1)
+            last = min(len(ordered), int(np.searchsorted(ordered, high, side="left")) + 1)
+            first, last = min(first, len(ordered) - 2), max(last, 2)
+            indices.append(order[first : max(last, first + 2)])
+        return indices[0], indices[1]
+
+    # ------------------------------------------------------------------
+    # Winds.
+
+    def _wind_pairs(self, dataset: Any) -> Iterator[tuple[Any, Any]]:
+        """Yield the pairs of an eastward and a northward wind of a dataset."""
+        east = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _U_NAME, _EAST_NAMES)}
+        north = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _V_NAME, _NORTH_NAMES)}
+        for name, array in east.items():
+            partners = [other for other, found in north.items() if _partner_key(other, "v") == _partner_key(name, "u")]
+            if not partners and len(east) == len(north) == 1:
+                partners = list(north)
+            if not partners:
+                raise self.fail(name, "its northward wind is missing")
+            partner = north.pop(partners[0])
+            if set(partner.dims) != set(array.dims):
+                raise self.fail(str(partner.name), f"its dimensions differ from those of {name}")
+            yield array, partner
+        if north:
+            raise self.fail(next(iter(north)), "its eastward wind is missing")
+
+    def _level_of(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
+        """Return the kind of a variable's levels, their dimension (None for one level), and their values.
+
+        The values are hPa, m above ground or m AMSL.  Return None for a variable without levels.
+        """
+        for coordinate_name, coordinate in array.coords.items():
+            kind = self._level_kind(str(coordinate_name), coordinate)
+            if kind is None or coordinate.ndim > 1:
+                continue
+            units = PRESSURE_UNITS if kind == "pressure" else HEIGHT_UNITS
+            factor = unit_factor(coordinate.attrs.get("units"), units)
+            if factor is None:
+                stated = coordinate.attrs.get("units")
+                raise self.fail(str(coordinate_name), f"units {stated!r}: allowed {', '.join(sorted(units))}")
+            values = coordinate.values.reshape(-1).astype(np.float64) * factor
+            return kind, (str(coordinate.dims[0]) if coordinate.ndim else None), values
+        if digits := re.search(r"\d+", str(name)):
+            return "height", None, np.array([float(digits.group())])
+        return None
+
+    @staticmethod
+    def _level_kind(name: str, coordinate: Any) -> LevelKind | None:
+        """Return the kind of level that a coordinate states, or None for another coordinate."""
+        standard_name, lower = str(coordinate.attrs.get("standard_name", "")), name.lower()
+        units = coordinate.attrs.get("units")
+        if standard_name == "air_pressure" or lower.startswith(("isobaric", "plev", "pressure")):
+            return "pressure"
+        if lower in ("level", "lev") and unit_factor(units, PRESSURE_UNITS) is not None:
+            return "pressure"
+        if standard_name in ("altitude", "height_above_mean_sea_level", "height_above_geopotential_datum"):
+            return "altitude"
+        if lower in ("altitude", "alt", "heightabovesea", "height_above_sea", "amsl"):
+            return "altitude"
+        if standard_name == "height" or lower.startswith(("heightaboveground", "height")):
+            return "height"
+        return None
+
+    def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
+        """Return the wind of one pair of variables, with the altitudes or heights of its levels."""
+        level = self._level_of(east, east.name)
+        if level is None:
+            raise self.fail(str(east.name), "its level is not stated: pressure, height above ground or altitude")
+        kind, dim, values = level
+        components = []
+        for array in (east, north):
+            factor = unit_factor(array.attrs.get("units"), SPEED_UNITS)
+            if factor is None:
+                stated = array.attrs.get("units")
+                raise self.fail(str(array.name), f"units {stated!r}: allowed {', '.join(sorted(SPEED_UNITS))}")
+            components.append(self._values(array, dim) * factor)
+        velocities = np.stack(components, axis=-1)
+        if self._is_grid_relative(east):
+            latitude, longitude = self._horizontal(east)
+            rotate_to_north(velocities, latitude.values, longitude.values, self.latitudes, self.longitudes)
+        shape = velocities.shape[1:-1]
+        altitudes = self._geopotential(datasets, east, dim) if kind == "pressure" else np.broadcast_to(values, shape)
+        is_missing = ~np.isfinite(velocities).all(axis=(0, -1)) | ~np.isfinite(altitudes)
+        is_used = ~is_missing.all(axis=(0, 1, 2))
+        if not is_used.any():
+            raise self.fail(str(east.name), "no value around the mission")
+        if is_missing[..., is_used].any():
+            t, *_, k = (int(index) for index in np.argwhere(is_missing & is_used)[0])
+            time = datetime.fromtimestamp(float(self.times[t]), UTC)
+            unit = {"pressure": "hPa", "height": "m above ground", "altitude": "m"}[kind]
+            raise self.fail(
+                f"{east.name}, {north.name}",
+                f"values are missing around the mission, the first at {values[k]:g} {unit}, {time:%Y-%m-%d %H:%M} UTC",
+            )
+        if np.abs(velocities[..., is_used, :]).max() > _MAX_WIND_MPS:
+            largest = float(np.abs(velocities[..., is_used, :]).max())
+            raise self.fail(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {_MAX_WIND_MPS:g} m/s")
+        return LevelGroup(kind, np.ascontiguousarray(altitudes[..., is_used]), velocities[..., is_used, :])
+
+    @staticmethod
+    def _is_grid_relative(array: Any) -> bool:
+        """Return True if the components of a wind follow the axes of the grid instead of east and north."""
+        attributes = array.attrs
+        return attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1
+
+    def _geopotential(self, datasets: Sequence[Any], wind: Any, dim: str | None) -> Floats:
+        """Return the altitudes of a wind's pressure levels from the geopotential height, (t, y, x, k) m AMSL."""
+        level_kind = self._level_of(wind, wind.name)
+        for dataset in datasets:
+            for name, array in dataset.data_vars.items():
+                if not _names_of(name, array) & _HEIGHT_NAMES:
+                    continue
+                level = self._level_of(array, name)
+                if level is None or level_kind is None or level[0] != "pressure":
+                    continue
+                if not np.array_equal(level[2], level_kind[2]):
+                    raise self.fail(str(name), f"its pressure levels differ from those of {wind.name}")
+                units = array.attrs.get("units")
+                factor = unit_factor(units, HEIGHT_UNITS)
+                if factor is None and str(units).replace(" ", "") in ("m2s-2", "m**2s**-2", "m^2/s^2", "m2/s2"):
+                    factor = 1.0 / GRAVITY_STANDARD
+                if factor is None:
+                    raise self.fail(str(name), f"units {units!r}: allowed m, gpm, m2 s-2")
+                return self._values(array, level[1]).mean(axis=0) * factor
+        raise self.fail(
+            str(wind.name), "the geopotential height of its pressure levels is missing (gh, HGT, z): add it to the file"
+        )
+
+    def _values(self, array: Any, level_dim: str | None = None) -> Floats:
+        """Return the values of a variable around the box at the common times, (m, t, y, x, k)."""
+        latitude, longitude = self._horizontal(array)
+        time_dim = None
+        if any(np.issubdtype(c.dtype, np.datetime64) for c in array.coords.values()):
+            time_dim, times = self._valid_times(array)
+            if time_dim is not None:
+                array = array.isel({time_dim: np.flatnonzero(np.isin(times, self.times))})
+        member_dim = next((str(dim) for dim in array.dims if str(dim) in _MEMBER_DIMS), None)
+        space = [str(dim) for dim in latitude.dims] + [str(dim) for dim in longitude.dims if dim not in latitude.dims]
+        used = {time_dim, member_dim, level_dim, *space}
+        extra = [str(dim) for dim in array.dims if dim not in used]
+        if any(array.sizes[dim] > 1 for dim in extra):
+            raise self.fail(
+                str(array.name), f"dimension {extra[0]!r} is not known: allowed time, level, member and place"
+            )
+        array = array.isel(dict.fromkeys(extra, 0))
+        for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
+            array = array.expand_dims(name) if dim is None else array.rename({dim: name})
+        if latitude.ndim == 1:
+            rows, columns = self._node_indices(latitude, longitude)
+            array = array.isel({space[0]: rows, space[1]: columns})
+        array = array.transpose("_member", "_time", *space, "_level")
+        if array.size > MAX_NODES:
+            raise self.fail(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
+        try:
+            values = array.values.astype(np.float64)
+        except Exception as error:
+            raise _damaged(self.path, error) from error
+        if latitude.ndim == 2:
+            values = regrid(values, latitude.values, longitude.values, self.latitudes, self.longitudes)
+        return values
+
+
+# ----------------------------------------------------------------------
+# Names of variables.
+
+
+def _names_of(name: Any, array: Any) -> set[str]:
+    """Return the names that identify a variable, in lower case."""
+    stated = (name, array.attrs.get("standard_name"), array.attrs.get("GRIB_shortName"))
+    return {str(text).lower() for text in stated if text is not None}
+
+
+def _is_component(name: Any, array: Any, pattern: re.Pattern[str], standard_names: tuple[str, ...]) -> bool:
+    """Return True if a variable is a component of the wind."""
+    return array.attrs.get("standard_name") in standard_names or pattern.match(str(name)) is not None
+
+
+def _partner_key(name: str, letter: str) -> str:
+    """Return the name of a component without the part that names its axis.
+
+    >>> _partner_key("u10", "u") == _partner_key("v10", "v")
+    True
+    """
+    lower = name.lower()
+    for words in (("eastward", "northward"), ("x_wind", "y_wind")):
+        lower = lower.replace(words[0], "").replace(words[1], "")
+    return re.sub(rf"(^|(?<=[_\d])){letter}", "", lower, count=1)

@@ -1,0 +1,295 @@
+"""Wind that varies in time, height and place, interpolated between the nodes of a forecast's grid.
+
+The interpolation is linear in time, latitude and longitude on every level, of the level's altitude and of the wind
+alike, and then linear in altitude between the two levels around the aircraft.  Beyond the first and the last node of an
+axis, the value at that node applies.
+"""
+
+import bisect
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from world.arrays import Floats
+from world.kernels import compiled, inner
+
+# Index of each count at the start of a packed field.
+_TIME_COUNT = 0
+_ROW_COUNT = 1
+_COLUMN_COUNT = 2
+_LEVEL_COUNT = 3
+# Number of these counts.
+_HEADER_SIZE = 4
+# Index of each number of a node.
+_ALTITUDE = 0
+_EAST = 1
+_NORTH = 2
+# Numbers of a node in a packed field: altitude, east, north.
+_NODE_SIZE = 3
+# Largest number of numbers in a packed field of one flight: 160 MB.
+MAX_FIELD_NUMBERS = 20_000_000
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WindField:
+    """Wind at the nodes of a grid.
+
+    times: (t,) s, ascending.
+    latitudes: (y,) deg, ascending.
+    longitudes: (x,) deg, ascending.
+    altitudes: (t, y, x, k) m AMSL of each level, ascending along the last axis.
+    velocities: (t, y, x, k, 2) m/s, east and north, direction of air motion.
+    """
+
+    times: Floats
+    latitudes: Floats
+    longitudes: Floats
+    altitudes: Floats
+    velocities: Floats
+
+    def __eq__(self, other: object) -> bool:
+        """Return True for a field of the same numbers."""
+        return isinstance(other, WindField) and np.array_equal(self.packed(), other.packed())
+
+    def __hash__(self) -> int:
+        """Return the hash of the numbers."""
+        return hash(self.packed().tobytes())
+
+    def packed(self) -> Floats:
+        """Return the field as one array of numbers, for `interpolate_field`.
+
+        The four counts (t, y, x, k) are followed by the times, the latitudes and the longitudes, and by altitude, east
+        and north of each node.
+        """
+        nodes = np.concatenate([self.altitudes[..., np.newaxis], self.velocities], axis=-1)
+        axes = (self.times, self.latitudes, self.longitudes)
+        return np.concatenate([np.array(self.altitudes.shape, dtype=np.float64), *axes, nodes.ravel()])
+
+    @classmethod
+    def unpacked(cls, numbers: Floats, count: int) -> "WindField":
+        """Return the field whose packed form is given.
+
+        count: expected number of numbers.
+
+        Raises ValueError for another number of numbers, and for numbers that are not a field.
+        """
+        if numbers.size != count or count < _HEADER_SIZE or not np.isfinite(numbers).all():
+            raise ValueError("not a wind field")
+        shape = tuple(int(value) for value in numbers[:_HEADER_SIZE])
+        axes_end = _HEADER_SIZE + sum(shape[:3])
+        if min(shape) < 1 or axes_end + _NODE_SIZE * math.prod(shape) != count:
+            raise ValueError("not a wind field")
+        first, second, third = np.split(numbers[_HEADER_SIZE:axes_end], np.cumsum(shape[:2]))
+        nodes = numbers[axes_end:].reshape(*shape, _NODE_SIZE)
+        return cls(first, second, third, nodes[..., 0].copy(), nodes[..., 1:].copy())
+
+    def velocities_at(self, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats) -> Floats:
+        """Return the wind at n points, m/s, (n, 2) east and north.
+
+        seconds: (n,) s.
+        latitudes, longitudes: (n,) deg.
+        altitudes: (n,) m AMSL.
+        """
+        center = 0.5 * (self.longitudes[0] + self.longitudes[-1])
+        near_longitudes = center + (np.asarray(longitudes) - center + 180.0) % 360.0 - 180.0
+        return _interpolate_points(
+            self.packed(),
+            np.ascontiguousarray(seconds, dtype=np.float64),
+            np.ascontiguousarray(latitudes, dtype=np.float64),
+            np.ascontiguousarray(near_longitudes, dtype=np.float64),
+            np.ascontiguousarray(altitudes, dtype=np.float64),
+        )
+
+    def between(self, start: float, end: float) -> "WindField":
+        """Return the part of the field that determines the wind from `start` to `end` (s)."""
+        times: Sequence[float] = self.times.tolist()
+        first = max(0, bisect.bisect_right(times, start) - 1)
+        last = min(len(times), bisect.bisect_left(times, end) + 1)
+        rows = slice(first, max(last, first + 1))
+        return WindField(self.times[rows], self.latitudes, self.longitudes, self.altitudes[rows], self.velocities[rows])
+
+
+@inner
+def _bracket(field: Floats, start: int, count: int, value: float) -> tuple[int, float]:
+    """Return the index of the node at or below a value on an axis, and the value's fraction of the way to the next.
+
+    The axis is ``field[start : start + count]``.  Beyond the ends of the axis, the value at the end applies.
+    """
+    low, high = 0, count - 1
+    if high == 0 or value <= field[start]:
+        return 0, 0.0
+    if value >= field[start + high]:
+        return high - 1, 1.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if field[start + middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low, (value - field[start + low]) / (field[start + high] - field[start + low])
+
+
+@inner
+def _level_number(
+    field: Floats, corner: int, steps: tuple[int, int, int], fractions: tuple[float, float, float], number: int
+) -> float:
+    """Return one number of a level, interpolated between its eight nodes.
+
+    corner: index of the level's node at the lower corner of the cell.
+    steps: distances of the next node in time, latitude and longitude, in numbers; 0 on an axis of one node.
+    fractions: of the way to the next node.
+    number: `_ALTITUDE`, `_EAST` or `_NORTH`.
+    """
+    total = 0.0
+    for time in range(2):
+        time_weight = fractions[0] if time else 1.0 - fractions[0]
+        for row in range(2):
+            row_weight = time_weight * (fractions[1] if row else 1.0 - fractions[1])
+            for column in range(2):
+                weight = row_weight * (fractions[2] if column else 1.0 - fractions[2])
+                if weight > 0.0:
+                    node = corner + time * steps[0] + row * steps[1] + column * steps[2]
+                    total += weight * field[node + number]
+    return total
+
+
+@inner
+def interpolate_field(
+    field: Floats, seconds: float, latitude: float, longitude: float, altitude: float
+) -> tuple[float, float]:
+    """Return the wind at a point of a packed field, m/s, east and north.
+
+    field: `WindField.packed`.
+    seconds: s on the field's axis of time.
+    latitude, longitude: deg; the longitude within half a turn of the field.
+    altitude: m AMSL.
+    """
+    times, rows = int(field[_TIME_COUNT]), int(field[_ROW_COUNT])
+    columns, levels = int(field[_COLUMN_COUNT]), int(field[_LEVEL_COUNT])
+    rows_begin = _HEADER_SIZE + times
+    columns_begin = rows_begin + rows
+    nodes_begin = columns_begin + columns
+    time, time_fraction = _bracket(field, _HEADER_SIZE, times, seconds)
+    row, row_fraction = _bracket(field, rows_begin, rows, latitude)
+    column, column_fraction = _bracket(field, columns_begin, columns, longitude)
+    column_step = levels * _NODE_SIZE
+    row_step = columns * column_step
+    time_step = rows * row_step
+    corner = nodes_begin + time * time_step + row * row_step + column * column_step
+    steps = (
+        time_step if times > 1 else 0,
+        row_step if rows > 1 else 0,
+        column_step if columns > 1 else 0,
+    )
+    fractions = (time_fraction, row_fraction, column_fraction)
+    low = _level_number(field, corner, steps, fractions, _ALTITUDE)
+    level = 0
+    fraction = 0.0
+    if levels > 1 and altitude > low:
+        high = low
+        while level < levels - 1:
+            high = _level_number(field, corner + (level + 1) * _NODE_SIZE, steps, fractions, _ALTITUDE)
+            if high >= altitude:
+                break
+            low = high
+            level += 1
+        fraction = (altitude - low) / (high - low) if level < levels - 1 else 0.0
+    below = corner + level * _NODE_SIZE
+    east = _level_number(field, below, steps, fractions, _EAST)
+    north = _level_number(field, below, steps, fractions, _NORTH)
+    if fraction > 0.0:
+        east += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _EAST) - east)
+        north += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _NORTH) - north)
+    return east, north
+
+
+@compiled
+def _interpolate_points(
+    field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
+) -> Floats:
+    velocities = np.empty((seconds.size, 2))
+    for k in range(seconds.size):
+        east, north = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])
+        velocities[k, 0], velocities[k, 1] = east, north
+    return velocities
+
+
+# ----------------------------------------------------------------------
+# The mean profile of a field: what the planner and the limits of the verdict are computed with.
+
+# Heights above the reference altitude to which the mean profile is fitted, m.
+_PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
+# Levels above this height over the reference altitude are left out, except the lowest of them, m.
+_MAX_HEIGHT_M = 4000.0
+# Largest gradient of a mean profile, 1/s: the range of a scenario's [wind] gradient.
+_MAX_GRADIENT = 0.05
+# A field that differs from its mean profile by less than this everywhere is the mean profile, m/s.
+UNIFORM_TOLERANCE_MPS = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class MeanProfile:
+    """Wind of one direction whose speed is linear in altitude.
+
+    speed: m/s at the reference altitude.
+    from_course: direction that the wind blows from, rad, 0..2 pi.
+    gradient: 1/s.
+    """
+
+    speed: float
+    from_course: float
+    gradient: float
+
+    def velocities_at(self, heights: Floats) -> Floats:
+        """Return the wind at heights above the reference altitude (m), m/s, east and north on a new last axis."""
+        speeds = self.speed + self.gradient * heights
+        return np.stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)], axis=-1)
+
+
+def without_high_levels(field: WindField, reference_amsl: float) -> WindField:
+    """Return a field without its levels above every flight that begins at the reference altitude (m AMSL)."""
+    lowest = field.altitudes.min(axis=(0, 1, 2))
+    count = min(len(lowest), int((lowest <= reference_amsl + _MAX_HEIGHT_M).sum()) + 1)
+    return WindField(
+        field.times,
+        field.latitudes,
+        field.longitudes,
+        np.ascontiguousarray(field.altitudes[..., :count]),
+        np.ascontiguousarray(field.velocities[..., :count, :]),
+    )
+
+
+def fit_mean_profile(
+    field: WindField, seconds: float, latitude: float, longitude: float, reference_amsl: float
+) -> MeanProfile:
+    """Return the mean profile of a field at a time (s) and place (deg), around the reference altitude (m AMSL).
+
+    Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.  The gradient is limited so that the speed is at least
+    0 at all nodes.
+    """
+    altitudes = reference_amsl + _PROFILE_HEIGHTS_M
+    ones = np.ones(altitudes.size)
+    samples = field.velocities_at(seconds * ones, latitude * ones, longitude * ones, altitudes)
+    # Least-squares line of each component over height: its value at the reference altitude, and its slope.
+    slopes = _PROFILE_HEIGHTS_M - _PROFILE_HEIGHTS_M.mean()
+    slope = slopes @ samples / (slopes @ slopes)
+    east, north = samples.mean(axis=0) - _PROFILE_HEIGHTS_M.mean() * slope
+    speed = round(math.hypot(east, north), 5)
+    if speed == 0.0:
+        return MeanProfile(0.0, 0.0, 0.0)
+    from_course = math.radians(round(math.degrees(math.atan2(-east, -north)) % 360.0, 5) % 360.0)
+    gradient = -(slope[0] * math.sin(from_course) + slope[1] * math.cos(from_course))
+    heights = field.altitudes - reference_amsl
+    lowest, highest = min(-1.0, float(heights.min())), max(1.0, float(heights.max()))
+    gradient = min(_MAX_GRADIENT, max(-_MAX_GRADIENT, gradient), speed / -lowest)
+    return MeanProfile(speed, from_course, round(max(gradient, -speed / highest), 9))
+
+
+def subtract_profile(field: WindField, profile: MeanProfile, reference_amsl: float) -> WindField | None:
+    """Return the deviation of a field from its mean profile; None if the field is the mean profile."""
+    deviations = field.velocities - profile.velocities_at(field.altitudes - reference_amsl)
+    if float(np.abs(deviations).max()) < UNIFORM_TOLERANCE_MPS:
+        return None
+    return WindField(field.times, field.latitudes, field.longitudes, field.altitudes, deviations)
