@@ -25,6 +25,7 @@ link                                 the radio link to the ground station along 
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
 battery                              the smallest battery with which a mission and its returns keep the reserve
+window                               the times of take-off at which a mission is flyable in a weather forecast
 compare_campaigns                    whether flights of one campaign are more likely to be flyable than another's
 ground_risk                          the volumes and the ground risk class of a mission by SORA 2.5
 serve                                a MAVLink vehicle for ground stations
@@ -75,6 +76,7 @@ if TYPE_CHECKING:
     from planfly.api.drafting import new_scenario as new_scenario
     from planfly.api.exporting import ExportedFiles as ExportedFiles
     from planfly.api.exporting import export as export
+    from planfly.api.finding_windows import window as window
     from planfly.api.flying import FlownMission as FlownMission
     from planfly.api.flying import Judged as Judged
     from planfly.api.flying import check as check
@@ -127,6 +129,7 @@ if TYPE_CHECKING:
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_battery import BatteryResult as BatteryResult
     from planfly.campaigns.find_ground_risk import GroundRiskResult as GroundRiskResult
+    from planfly.campaigns.find_window import WindowResult as WindowResult
     from planfly.campaigns.find_winds import WindsResult as WindsResult
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
     from planfly.planning.paper import PaperTables as PaperTables
@@ -140,6 +143,7 @@ if TYPE_CHECKING:
     from planner.search.plan_front import FrontPlan as FrontPlan
     from world.errors import ArgumentError as ArgumentError
     from world.errors import FlightError as FlightError
+    from world.errors import ForecastError as ForecastError
     from world.errors import LogError as LogError
     from world.errors import MissingExtraError as MissingExtraError
     from world.errors import MissionError as MissionError
@@ -188,6 +192,7 @@ _HOMES = {
             "ExportedFiles",
             "export",
         ),
+        "planfly.api.finding_windows": ("window",),
         "planfly.api.flying": (
             "FlownMission",
             "Judged",
@@ -260,6 +265,7 @@ _HOMES = {
         "planfly.campaigns.compare_campaigns": ("CampaignComparison",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_battery": ("BatteryResult",),
+        "planfly.campaigns.find_window": ("WindowResult",),
         "planfly.campaigns.find_ground_risk": ("GroundRiskResult",),
         "planfly.campaigns.find_winds": ("WindsResult",),
         "planfly.campaigns.dispersions": ("SpreadError",),
@@ -278,6 +284,7 @@ _HOMES = {
         "world.errors": (
             "ArgumentError",
             "FlightError",
+            "ForecastError",
             "LogError",
             "MissingExtraError",
             "MissionError",

@@ -80,6 +80,7 @@ RANGES: Mapping[str, Range] = {
     "probability": _PROBABILITY_RANGE,
     "sample_flights": Range(20, 100_000, "expected a whole number from 20 to 100,000", integer=True),
     "max_speed": Range(1.0, 300.0, "expected a speed from 1 to 300 m/s"),
+    "window_flights": Range(10, 10_000, "expected a whole number from 10 to 10,000", integer=True),
     "reserve": Range(0.0, 0.9, "expected a fraction of the battery from 0 to 0.9"),
     "specific_energy": Range(20.0, 2000.0, "expected an energy per battery mass from 20 to 2,000 Wh/kg"),
     "flights": Range(1, 10_000_000, "expected a whole number from 1 to 10,000,000", integer=True),

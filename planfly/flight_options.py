@@ -183,6 +183,21 @@ class SampleOptions(MissionOptions, total=False):
     scheduler: str | None
 
 
+class WindowOptions(MissionOptions, total=False):
+    """Options of the flights of a search for a departure window.
+
+    spread: a TOML file of the quantities that vary; None takes planfly's default.
+    flights: number of flights of each departure.
+    workers: number of processes on this machine; None for one per core.
+    scheduler: address of a running dask scheduler.
+    """
+
+    spread: str | Path | None
+    flights: Annotated[int, 40]
+    workers: int | None
+    scheduler: str | None
+
+
 class BatteryOptions(SampleOptions, total=False):
     """Options of the flights of a search for a battery.
 

@@ -40,9 +40,7 @@ from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
 from world.files import write_atomically
 from world.scenario import Scenario
-from world.scenario_tables import WindTable
 from world.terrain import Terrain
-from world.wind import Wind
 
 # Distance beyond the ends of a strip over which its survey holds, m: the flare and the last of the final.
 _SURVEYED_DISTANCE_M = 200.0
@@ -321,8 +319,17 @@ def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: Gi
     gradient = min(MAX_WIND_GRADIENT, max(-MAX_WIND_GRADIENT, old_wind.gradient + values["wind_gradient"]))
     level = TURBULENCE_LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
     turbulence = TURBULENCE_LEVELS[min(len(TURBULENCE_LEVELS) - 1, max(0, level))]
-    wind_table = WindTable(speed_mps=speed, from_deg=from_deg, gradient=gradient, turbulence=turbulence)
-    wind = Wind(speed, math.radians(from_deg), gradient, turbulence, None, old_wind.reference_amsl)
+    changes = {"speed_mps": speed, "from_deg": from_deg, "gradient": gradient, "turbulence": turbulence, "seed": None}
+    wind_table = scenario.spec.wind.model_copy(update=changes)
+    # In a forecast, the drawn difference applies at all its nodes alike.
+    wind = replace(
+        old_wind,
+        speed=speed,
+        from_course=math.radians(from_deg),
+        gradient=gradient,
+        turbulence=turbulence,
+        seed=None,
+    )
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": wind_table}), wind=wind)
 
 

@@ -78,6 +78,7 @@ COMMANDS = (
     Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
     Command("winds", _MANY_FLIGHTS, "WindsDocument", "campaigns"),
     Command("battery", _MANY_FLIGHTS, "battery_answers.BatteryAnswer"),
+    Command("window", _MANY_FLIGHTS, "window_answers.WindowAnswer"),
     Command("ground-risk", _MANY_FLIGHTS, "ground_risk_answers.GroundRiskAnswer", "ground_risk", "ground_risk"),
     Command("paper", _MANY_FLIGHTS, "PaperAnswer"),
     Command("aircraft", _AIRCRAFT, "AircraftAnswer"),

@@ -63,6 +63,8 @@ RETURN_FILES = (
 LINK_FILES = ("link.png", "link-map.png")
 # Files of `planfly.ground_risk`.
 GROUND_RISK_FILES = ("ground-risk.kml", "ground-risk.geojson", "ground-risk.png", "ground-risk.md")
+# File of `planfly.window`.
+WINDOW_FILES = ("window.png",)
 # Maximum number of parts of a flight that are flown again.
 MAX_REFLOWN_PARTS = 9
 # Files of each part that is flown again, numbered from the second part on.

@@ -1,0 +1,137 @@
+"""Find the times of take-off at which a mission is flyable in a weather forecast."""
+
+import re
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Unpack
+
+from planfly.api.campaigns import make_workers, open_sample
+from planfly.arguments import check_arguments
+from planfly.campaigns.find_window import (
+    DEFAULT_PROBABILITY,
+    MAX_DEPARTURES,
+    WindowGoal,
+    WindowResult,
+    departure_times,
+    find_window,
+    first_departure,
+    last_departure,
+)
+from planfly.flight_options import WindowOptions, takes_options
+from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import WINDOW_FILES, check_output_folder, clean_folder
+from planner.plan import Plan
+from world.errors import ArgumentError
+from world.extras import requires_extra
+from world.files import write_atomically
+
+_STEP = re.compile(r"(\d+(?:\.\d+)?)\s*(min|h)")
+_MIN_STEP = timedelta(minutes=1)
+_MAX_STEP = timedelta(hours=24)
+
+
+@requires_extra("campaigns")
+@with_warm_up(*PLANNING_AND_FLYING)
+@takes_options
+def window(
+    target: Plan | str | Path,
+    *,
+    earliest: str | None = None,
+    latest: str | None = None,
+    every: str = "1h",
+    probability: float = DEFAULT_PROBABILITY,
+    out: str | Path | None = None,
+    overwrite: bool = True,
+    **options: Unpack[WindowOptions],
+) -> WindowResult:
+    """Find the times of take-off at which a mission is flyable in a weather forecast.
+
+    At each time, a campaign of flights is flown, which vary as in `planfly.campaign`.
+
+    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    forecast: file of the forecast; None for the forecast of the scenario.
+    at: asked time of take-off, in ISO 8601 with its offset from UTC; None asks about any.
+    earliest, latest: first and last time of take-off; None for the asked time, and 24 hours later or the end of the
+    forecast.
+    every: time between two departures, such as "30min" or "1h".
+    probability: probability of a flyable flight at which a departure is open.
+    out: folder for the chart, ``window.png``; None writes none.  overwrite: True replaces it.
+    flights: number of flights of each departure.
+    spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
+    A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
+    Raises a `planfly.PlanflyError` for bad input, which is also a ValueError for a number out of its range.
+
+    >>> window("paper-07", earliest="2026-05-01T06:00Z", every="now")
+    Traceback (most recent call last):
+    ...
+    world.errors.ArgumentError: every now: expected a time such as 30min or 1h, from 1min to 24h
+    """
+    check_arguments(probability=probability, window_flights=options["flights"])
+    step = _parse_step(every)
+    asked = None if options["at"] is None else _parse_time("at", options["at"])
+    first, last = (
+        None if text is None else _parse_time(name, text) for name, text in (("earliest", earliest), ("latest", latest))
+    )
+    if out is not None:
+        check_output_folder(Path(out), overwrite)
+    workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
+    start = first or asked
+    if start is None:
+        allowed = "missing: the first time of take-off, or the asked one by at, is needed"
+        raise ArgumentError.of_argument("earliest", None, allowed, shown="")
+    base = open_sample(target, {**options, "at": start.isoformat()})
+    facts = base.scenario.wind.forecast
+    if facts is None:
+        raise ArgumentError.of_argument(
+            "forecast", None, "missing: a window needs a forecast, by this option or in [wind]", shown=""
+        )
+    first = first_departure(base.scenario)
+    end = last or last_departure(first, facts.last_time)
+    if end < first:
+        raise ArgumentError.of_argument("latest", latest, f"expected a time after {first.isoformat()}")
+    if (end - first) / step > MAX_DEPARTURES:
+        raise ArgumentError.of_argument("every", every, f"expected at most {MAX_DEPARTURES} departures")
+    goal = WindowGoal(departure_times(first, end, step, asked), asked, probability, options["flights"])
+    with stage("flying", f"flying {len(goal.departures)} departures") as advance:
+        result = find_window(base, goal, workers_used, advance)
+    return result if out is None else _with_chart(result, Path(out), overwrite=overwrite)
+
+
+def _with_chart(result: WindowResult, folder: Path, *, overwrite: bool) -> WindowResult:
+    """Write the chart of a result into a folder, and return the result with the file."""
+    # Imported here: only pictures need matplotlib.
+    from logs.views.drawing import png_bytes
+    from planfly.campaigns.window_chart import draw_window
+
+    with stage("drawing", "drawing the departures"):
+        picture = png_bytes(draw_window(result))
+    clean_folder(folder, WINDOW_FILES, overwrite=overwrite)
+    for name in WINDOW_FILES:
+        write_atomically(folder / name, picture)
+    return replace(result, files=tuple(folder / name for name in WINDOW_FILES))
+
+
+def _parse_step(every: str) -> timedelta:
+    """Return the time between two departures.  Raises ArgumentError for another text."""
+    match = _STEP.fullmatch(every.strip())
+    if match is not None:
+        number = float(match.group(1))
+        step = timedelta(minutes=number) if match.group(2) == "min" else timedelta(hours=number)
+        if _MIN_STEP <= step <= _MAX_STEP:
+            return step
+    raise ArgumentError.of_argument("every", every, "expected a time such as 30min or 1h, from 1min to 24h")
+
+
+def _parse_time(name: str, text: str) -> datetime:
+    """Return a time of take-off in UTC.  Raises ArgumentError for another text, and for a time without an offset."""
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        time = None
+    if time is None or time.tzinfo is None:
+        allowed = "expected a time in ISO 8601 with its offset from UTC, as in 2026-05-01T10:00+02:00"
+        raise ArgumentError.of_argument(name, text, allowed)
+    return time.astimezone(UTC)

@@ -1,0 +1,253 @@
+"""Find the departures at which a mission is flyable in a weather forecast, by many flights for each of them."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind
+from planfly.campaigns.failure_counts import RuleFailures, count_failures, deciding_rule
+from planfly.campaigns.flight_requests import FlightRequest
+from planfly.campaigns.flight_row import FlightRow, fly_one
+from planfly.campaigns.statistics.decision import Interval, clopper_pearson
+from planfly.campaigns.worker_pool import Workers, worker_pool
+from planfly.runtime.stages import Advance
+from world.errors import ForecastError
+from world.forecast.scenario_wind import departure_of, forecast_wind
+from world.scenario import Scenario, forecast_of_scenario, with_flight_time
+
+# Largest number of departures in one search.
+MAX_DEPARTURES = 400
+# Default probability of a flyable flight at which a departure is open.
+DEFAULT_PROBABILITY = 0.9
+# Time after the first departure at which a search ends by default.
+DEFAULT_SPAN = timedelta(hours=24)
+
+
+@dataclass(frozen=True, slots=True)
+class WindowGoal:
+    """Question of a search for a departure window.
+
+    departures: times of take-off, ascending.
+    asked: time of take-off about which the user asks; None for any.
+    probability: probability of a flyable flight at which a departure is open.
+    flights: number of flights of each departure.
+    """
+
+    departures: tuple[datetime, ...]
+    asked: datetime | None
+    probability: float
+    flights: int
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Flights of one time of take-off.
+
+    time: time of take-off.
+    scenario: scenario at this time; None if the forecast does not cover the flight.
+    rows: the flights, in the order of their draws.
+    not_judged: why the departure was not flown; "" if it was.
+    """
+
+    time: datetime
+    scenario: Scenario | None
+    rows: tuple[FlightRow, ...] = ()
+    not_judged: str = ""
+
+    @property
+    def flyable(self) -> int:
+        """Number of flyable flights."""
+        return sum(row.outcome == "flyable" for row in self.rows)
+
+    @property
+    def share(self) -> float:
+        """Fraction of flyable flights; NaN if the departure was not flown."""
+        return self.flyable / len(self.rows) if self.rows else math.nan
+
+    @cached_property
+    def interval(self) -> Interval:
+        """Interval of the probability of a flyable flight, of Clopper and Pearson with 95 % confidence."""
+        return clopper_pearson(self.flyable, len(self.rows))
+
+    @cached_property
+    def failures(self) -> tuple[RuleFailures, ...]:
+        """Failed flights by rule and place."""
+        return count_failures(row.failed for row in self.rows)
+
+    @property
+    def rule(self) -> str:
+        """Rule that fails most flights; "" without failures."""
+        return deciding_rule(self.failures)
+
+    @property
+    def energy_left(self) -> float:
+        """Lowest energy left at the end of a flight, Wh; NaN if it is not known."""
+        energies = [row.energy_left for row in self.rows if row.energy_left is not None]
+        return float(np.min(energies)) if energies else math.nan
+
+    @property
+    def wind(self) -> tuple[float, float]:
+        """Mean wind at the start: m/s, and the direction it blows from, deg; NaN if the departure was not flown."""
+        if self.scenario is None:
+            return math.nan, math.nan
+        wind = self.scenario.wind
+        return wind.speed, math.degrees(wind.from_course) % 360.0
+
+
+@dataclass(frozen=True, repr=False)
+class WindowResult:
+    """Result of `planfly.window`.
+
+    departures: the departures, in the order of time.
+    files: written files.
+    """
+
+    goal: WindowGoal
+    base: CampaignBase
+    departures: tuple[Departure, ...]
+    files: tuple[Path, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<WindowResult {self.base.name}: {sum(map(bool, map(self.is_open, self.departures)))} departures open>"
+
+    def is_open(self, departure: Departure) -> bool | None:
+        """Return True if a departure's fraction of flyable flights reaches the probability; None if not flown."""
+        return None if not departure.rows else departure.share >= self.goal.probability
+
+    @property
+    def windows(self) -> tuple[tuple[datetime, datetime], ...]:
+        """First and last departure of each run of open departures."""
+        found: list[tuple[datetime, datetime]] = []
+        was_open = False
+        for departure in self.departures:
+            opens = bool(self.is_open(departure))
+            if opens and was_open:
+                found[-1] = found[-1][0], departure.time
+            elif opens:
+                found.append((departure.time, departure.time))
+            was_open = opens
+        return tuple(found)
+
+    @property
+    def asked(self) -> Departure | None:
+        """Departure about which the user asks; None for any."""
+        return next((departure for departure in self.departures if departure.time == self.goal.asked), None)
+
+    @property
+    def is_go(self) -> bool | None:
+        """True if the asked departure is open, or any departure if none is asked; None if that is not known."""
+        asked = self.asked
+        if asked is not None:
+            return self.is_open(asked)
+        opens = [self.is_open(departure) for departure in self.departures]
+        return True if any(opens) else None if None in opens else False
+
+    @property
+    def best(self) -> Departure | None:
+        """Departure with the largest fraction of flyable flights, the earliest of several; None if none was flown."""
+        flown = [departure for departure in self.departures if departure.rows]
+        return max(flown, key=lambda departure: departure.share, default=None)
+
+
+def departure_times(
+    first: datetime, last: datetime, step: timedelta, asked: datetime | None = None
+) -> tuple[datetime, ...]:
+    """Return the departures from the first to the last, with the asked departure among them.
+
+    >>> day = datetime(2026, 5, 1, tzinfo=UTC)
+    >>> [time.hour for time in departure_times(day, day + timedelta(hours=5), timedelta(hours=2))]
+    [0, 2, 4]
+    """
+    count = max(0, math.floor((last - first) / step)) + 1
+    times = {first + k * step for k in range(count)}
+    return tuple(sorted(times | ({asked} if asked is not None else set())))
+
+
+def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance: Advance) -> WindowResult:
+    """Fly a campaign for each departure; the draws of flight k are the same at every departure.
+
+    With the members of an ensemble, flight k flies in member k modulo their number.
+    """
+    departures = [_open_departure(base, time) for time in goal.departures]
+    scenarios = [_member_scenarios(departure.scenario) for departure in departures if departure.scenario is not None]
+    total = len(scenarios) * goal.flights
+    indices: Iterator[int] = iter(range(total))
+
+    def next_request() -> FlightRequest | None:
+        index = next(indices, None)
+        return None if index is None else FlightRequest(index)
+
+    rows: dict[int, FlightRow] = {}
+    if scenarios:
+        fly = partial(fly_departure, scenarios=tuple(scenarios), flights=goal.flights)
+        with worker_pool(workers, base, fly) as pool:
+            for count, finished in enumerate(pool.fly(next_request), 1):
+                advance(count, total, f"{count} of {total} flights")
+                rows[finished.request.index] = finished.row
+    flown = iter(range(len(scenarios)))
+    results = []
+    for departure in departures:
+        if departure.scenario is None:
+            results.append(departure)
+            continue
+        start = next(flown) * goal.flights
+        results.append(replace(departure, rows=tuple(rows[start + k] for k in range(goal.flights))))
+    return WindowResult(goal, base, tuple(results))
+
+
+def fly_departure(
+    base: CampaignBase,
+    index: int,
+    wind: GivenWind | None = None,
+    *,
+    scenarios: Sequence[Sequence[Scenario]],
+    flights: int,
+) -> FlightRow:
+    """Fly one flight of one departure.
+
+    index: number of the departure times `flights`, plus number of the flight.
+    wind: None.
+    scenarios: for each departure, its scenario in each member of the forecast.
+    flights: number of flights of each departure.
+    """
+    departure, flight = divmod(index, flights)
+    members = scenarios[departure]
+    return fly_one(replace(base, scenario=members[flight % len(members)]), flight, wind)
+
+
+def _open_departure(base: CampaignBase, time: datetime) -> Departure:
+    """Return a departure without flights, with its scenario if the forecast covers the flight."""
+    try:
+        scenario = with_flight_time(base.scenario, time.isoformat())
+        replace(base, scenario=scenario).nominal_setup()
+    except ForecastError as error:
+        return Departure(time, None, not_judged=str(error))
+    return Departure(time, scenario)
+
+
+def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
+    """Return a scenario in each member of its forecast."""
+    forecast = forecast_of_scenario(scenario)
+    if forecast.members == 1:
+        return (scenario,)
+    ends = (scenario.start, scenario.destination)
+    found = []
+    for member in range(forecast.members):
+        wind, table = forecast_wind(scenario.spec.wind, forecast, str(scenario.spec.at), scenario.origin, ends, member)
+        found.append(replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind))
+    return tuple(found)
+
+
+def first_departure(scenario: Scenario) -> datetime:
+    """Return the time of flight of a scenario."""
+    return departure_of(str(scenario.spec.at))
+
+
+def last_departure(first: datetime, last_time: datetime) -> datetime:
+    """Return the default end of a search: `DEFAULT_SPAN` after the first departure, or the end of the forecast."""
+    return min(first + DEFAULT_SPAN, last_time.astimezone(UTC))

@@ -1,0 +1,102 @@
+"""Draw the chart of a departure window: the probability of a flyable flight, the wind and the energy by departure."""
+
+import itertools
+import math
+
+import matplotlib.dates as mdates
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from logs import theme
+from logs.verdict.rule_words import RULE_WORDS
+from logs.views.drawing import clean_style, new_figure
+from planfly.campaigns.find_window import Departure, WindowResult
+
+_OPEN_COLOUR = theme.colour("good")
+_CLOSED_COLOUR = theme.colour("bad")
+_UNKNOWN_COLOUR = theme.colour("quiet")
+_GRID_COLOUR = theme.colour("grid")
+_INK_COLOUR = theme.colour("ink")
+_WIND_COLOUR = theme.colour("second")
+# Largest number of departures at which each has a label of its own.
+_MAX_LABELS = 26
+
+
+def draw_window(result: WindowResult) -> Figure:
+    """Draw the departures of a window: probability with its interval and deciding rule, mean wind, and least energy."""
+    with clean_style():
+        figure = new_figure(6.4)
+        probability = figure.add_axes((0.08, 0.54, 0.89, 0.37))
+        wind = figure.add_axes((0.08, 0.30, 0.89, 0.17), sharex=probability)
+        energy = figure.add_axes((0.08, 0.09, 0.89, 0.15), sharex=probability)
+        departures = result.departures
+        times = [_number(departure) for departure in departures]
+        width = 0.8 * min((after - before for before, after in itertools.pairwise(times)), default=1.0 / 24.0)
+        _draw_probability(probability, result, times, width)
+        wind.plot(times, [departure.wind[0] for departure in departures], color=_WIND_COLOUR, marker="o", markersize=3)
+        for time, departure in zip(times, departures, strict=True):
+            speed, from_deg = departure.wind
+            if not math.isnan(speed):
+                # An arrow that points where the wind blows to.
+                wind.annotate(
+                    "↓",
+                    (time, speed),
+                    rotation=-from_deg,
+                    ha="center",
+                    va="bottom",
+                    xytext=(0, 3),
+                    textcoords="offset points",
+                    fontsize=9,
+                    color=_INK_COLOUR,
+                )
+        wind.set_ylim(bottom=0.0)
+        wind.margins(y=0.35)
+        wind.set_ylabel("wind at start (m/s)")
+        energy.bar(times, [departure.energy_left for departure in departures], width, color=_GRID_COLOUR)
+        energy.set_ylabel("least energy (Wh)")
+        energy.set_xlabel("take-off (UTC)")
+        for axes in (probability, wind, energy):
+            axes.grid(axis="y", color=_GRID_COLOUR, linewidth=0.6)
+            axes.set_axisbelow(True)
+            for spine in ("top", "right"):
+                axes.spines[spine].set_visible(False)
+            axes.tick_params(labelbottom=axes is energy)
+        locator = mdates.AutoDateLocator(minticks=3, maxticks=12)
+        energy.xaxis.set_major_locator(locator)
+        energy.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator))
+    return figure
+
+
+def _number(departure: Departure) -> float:
+    """Return the time of a departure as matplotlib's number of days."""
+    return float(mdates.date2num(departure.time))
+
+
+def _draw_probability(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
+    """Draw the fraction of flyable flights of each departure, with its interval and the deciding rule.
+
+    times: (d,) matplotlib's numbers of the departures.
+    width: of a bar, days.
+    """
+    colours = {True: _OPEN_COLOUR, False: _CLOSED_COLOUR, None: _UNKNOWN_COLOUR}
+    for time, departure in zip(times, result.departures, strict=True):
+        colour = colours[result.is_open(departure)]
+        if not departure.rows:
+            axes.text(time, 0.02, "not judged", rotation=90, ha="center", va="bottom", color=colour, fontsize=7)
+            continue
+        axes.bar(time, departure.share, width, color=colour, alpha=0.75)
+        low, high = departure.interval
+        axes.plot([time, time], [low, high], color=_INK_COLOUR, linewidth=1.0)
+        if departure.rule and len(times) <= _MAX_LABELS:
+            title = RULE_WORDS[departure.rule].title.lower()
+            axes.text(time, 1.06, title, rotation=45, ha="left", va="bottom", color=_INK_COLOUR, fontsize=7)
+    axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
+    if result.goal.asked is not None:
+        axes.axvline(float(mdates.date2num(result.goal.asked)), color=_WIND_COLOUR, linewidth=1.4)
+    axes.set_ylim(0.0, 1.05)
+    axes.set_ylabel("flyable flights")
+    axes.set_title(
+        f"{result.base.name}: {result.goal.flights} flights at each take-off; green: at least"
+        f" {result.goal.probability:.0%} flyable; line: 95 % interval; above: the rule that fails most",
+        pad=46 if any(departure.rule for departure in result.departures) else 8,
+    )
