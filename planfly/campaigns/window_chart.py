@@ -96,7 +96,8 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
     axes.set_ylim(0.0, 1.05)
     axes.set_ylabel("flyable flights")
     axes.set_title(
-        f"{result.base.name}: {result.goal.flights} flights at each take-off; green: at least"
-        f" {result.goal.probability:.0%} flyable; line: 95 % interval; above: the rule that fails most",
+        f"{result.base.name}: {result.goal.flights} flights at each take-off, green with at least"
+        f" {result.goal.probability:.0%} flyable\n(thin line: 95 % interval; text: the rule that fails most)",
+        fontsize=9.5,
         pad=46 if any(departure.rule for departure in result.departures) else 8,
     )

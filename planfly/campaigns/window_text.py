@@ -36,7 +36,7 @@ def _window_text(first: datetime, last: datetime) -> str:
 def _best_text(result: WindowResult) -> str:
     """Return a clause that names the best departure if none is open; "" otherwise."""
     best = result.best
-    if result.windows or best is None:
+    if result.windows or best is None or not best.flyable:
         return ""
     return f"; the best is {best.time:{TIME_FORMAT}} UTC with {best.flyable} of {len(best.rows)}"
 
