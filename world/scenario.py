@@ -29,6 +29,7 @@ from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean
 from world.forecast.forecast import Forecast
 from world.forecast.scenario_wind import forecast_wind, scenario_forecast
+from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
 from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
@@ -155,6 +156,25 @@ class Scenario:
             np.array([seconds]), latitude, longitude, np.array([position[2]], dtype=np.float64)
         )[0]
         return east + float(deviation[0]), north + float(deviation[1])
+
+    def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
+        """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).
+
+        Without a forecast, it is the scenario's wind.
+        """
+        if self.wind.field is None:
+            return self.wind
+        up = float(position[2])
+        winds = np.array([self.wind_velocity((*position[:2], up + height), seconds) for height in PROFILE_HEIGHTS_M])
+        profile = fit_profile_line(winds)
+        return replace(
+            self.wind,
+            speed=profile.speed,
+            from_course=profile.from_course,
+            gradient=profile.gradient,
+            reference_amsl=up,
+            field=None,
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:

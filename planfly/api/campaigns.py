@@ -42,7 +42,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_line, stage
 from planner.plan import Plan
 from world.argument_types import checks_types
-from world.errors import PlanflyError
+from world.errors import ArgumentError, PlanflyError
 from world.extras import require_extra, requires_extra
 from world.wording import count_text
 
@@ -327,6 +327,9 @@ def winds(
         folder = directory.folder
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
         base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
+        if base.scenario.wind.forecast is not None:
+            allowed = "not in this search, which replaces the wind: planfly window finds departures in a forecast"
+            raise ArgumentError.of_argument("forecast", options["forecast"], allowed, shown="")
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:

@@ -8,7 +8,7 @@ axis, the value at that node applies.
 import bisect
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -220,7 +220,7 @@ def _interpolate_points(
 # The mean profile of a field: what the planner and the limits of the verdict are computed with.
 
 # Heights above the reference altitude to which the mean profile is fitted, m.
-_PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
+PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
 # Levels above this height over the reference altitude are left out, except the lowest of them, m.
 _MAX_HEIGHT_M = 4000.0
 # Largest gradient of a mean profile, 1/s: the range of a scenario's [wind] gradient.
@@ -261,30 +261,37 @@ def without_high_levels(field: WindField, reference_amsl: float) -> WindField:
     )
 
 
-def fit_mean_profile(
-    field: WindField, seconds: float, latitude: float, longitude: float, reference_amsl: float
-) -> MeanProfile:
-    """Return the mean profile of a field at a time (s) and place (deg), around the reference altitude (m AMSL).
+def fit_profile_line(samples: Floats) -> MeanProfile:
+    """Return the mean profile through winds at `PROFILE_HEIGHTS_M`, (h, 2) m/s, east and north.
 
-    Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.  The gradient is limited so that the speed is at least
-    0 at all nodes.
+    Each component is a least-squares line over height. Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.
     """
-    altitudes = reference_amsl + _PROFILE_HEIGHTS_M
-    ones = np.ones(altitudes.size)
-    samples = field.velocities_at(seconds * ones, latitude * ones, longitude * ones, altitudes)
-    # Least-squares line of each component over height: its value at the reference altitude, and its slope.
-    slopes = _PROFILE_HEIGHTS_M - _PROFILE_HEIGHTS_M.mean()
-    slope = slopes @ samples / (slopes @ slopes)
-    east, north = samples.mean(axis=0) - _PROFILE_HEIGHTS_M.mean() * slope
+    offsets = PROFILE_HEIGHTS_M - PROFILE_HEIGHTS_M.mean()
+    slope = offsets @ samples / (offsets @ offsets)
+    east, north = samples.mean(axis=0) - PROFILE_HEIGHTS_M.mean() * slope
     speed = round(math.hypot(east, north), 5)
     if speed == 0.0:
         return MeanProfile(0.0, 0.0, 0.0)
     from_course = math.radians(round(math.degrees(math.atan2(-east, -north)) % 360.0, 5) % 360.0)
     gradient = -(slope[0] * math.sin(from_course) + slope[1] * math.cos(from_course))
+    return MeanProfile(speed, from_course, round(min(_MAX_GRADIENT, max(-_MAX_GRADIENT, float(gradient))), 9))
+
+
+def fit_mean_profile(
+    field: WindField, seconds: float, latitude: float, longitude: float, reference_amsl: float
+) -> MeanProfile:
+    """Return the mean profile of a field at a time (s) and place (deg), around the reference altitude (m AMSL).
+
+    The gradient is limited so that the speed is at least 0 at all nodes: the flight adds the deviation of the field
+    from the profile, and the speed of a profile is never below 0.
+    """
+    altitudes = reference_amsl + PROFILE_HEIGHTS_M
+    ones = np.ones(altitudes.size)
+    profile = fit_profile_line(field.velocities_at(seconds * ones, latitude * ones, longitude * ones, altitudes))
     heights = field.altitudes - reference_amsl
     lowest, highest = min(-1.0, float(heights.min())), max(1.0, float(heights.max()))
-    gradient = min(_MAX_GRADIENT, max(-_MAX_GRADIENT, gradient), speed / -lowest)
-    return MeanProfile(speed, from_course, round(max(gradient, -speed / highest), 9))
+    gradient = max(min(profile.gradient, profile.speed / -lowest), -profile.speed / highest)
+    return replace(profile, gradient=round(gradient, 9))
 
 
 def subtract_profile(field: WindField, profile: MeanProfile, reference_amsl: float) -> WindField | None:

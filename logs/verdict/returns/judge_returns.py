@@ -555,17 +555,31 @@ def simulate_returns(
     # A landing is not simulated: a return whose landing sequence begins with the landing ends at its loiter.
     landings = [target.landing if target.landing and not target.landing.is_landing else None for target in targets]
     store_paths = store_paths or bool(world.airspace.zones)
-    result = fly_returns(
-        starts.rows,
-        circles,
-        world.parameters,
-        world.aircraft,
-        world.environment,
-        landings=landings,
-        store_positions=store_paths,
-        abort_limits=abort_limits,
-    )
-    return result.results, result.tracks
+    if world.scenario.wind.field is None or not len(starts):
+        batches = [(slice(None), world.aircraft)]
+    else:
+        # In a forecast, each return flies in the wind of the time and place at which it starts.
+        places = np.column_stack([starts.rows[name] for name in ("east", "north", "up")])
+        batches = [
+            (slice(k, k + 1), world.aircraft.in_wind(world.scenario.local_wind(places[k].tolist(), float(time))))
+            for k, time in enumerate(starts.time)
+        ]
+    flown = [
+        fly_returns(
+            starts.rows[batch],
+            circles[batch],
+            world.parameters,
+            aircraft,
+            world.environment,
+            landings=landings[batch],
+            store_positions=store_paths,
+            abort_limits=None if abort_limits is None else (abort_limits[0][batch], abort_limits[1][batch]),
+        )
+        for batch, aircraft in batches
+    ]
+    if len(flown) == 1:
+        return flown[0].results, flown[0].tracks
+    return np.concatenate([part.results for part in flown]), tuple(path for part in flown for path in part.tracks)
 
 
 def simulate_judged_returns(
