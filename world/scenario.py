@@ -28,7 +28,7 @@ from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean
 from world.forecast.forecast import Forecast
-from world.forecast.scenario_wind import forecast_wind, scenario_forecast
+from world.forecast.scenario_wind import ForecastSite, forecast_wind, scenario_forecast
 from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
@@ -166,7 +166,7 @@ class Scenario:
             return self.wind
         up = float(position[2])
         winds = np.array([self.wind_velocity((*position[:2], up + height), seconds) for height in PROFILE_HEIGHTS_M])
-        profile = fit_profile_line(winds)
+        profile = fit_profile_line(PROFILE_HEIGHTS_M, winds)
         return replace(
             self.wind,
             speed=profile.speed,
@@ -645,9 +645,17 @@ def _with_forecast_wind(scenario: Scenario) -> Scenario:
     """
     if scenario.spec.wind.forecast is None or scenario.spec.at is None:
         return scenario
-    ends = (scenario.start, scenario.destination)
-    forecast = forecast_of_scenario(scenario)
-    wind, table = forecast_wind(scenario.spec.wind, forecast, scenario.spec.at, scenario.origin, ends)
+    return in_forecast_member(scenario, forecast_of_scenario(scenario), 0)
+
+
+def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
+    """Return a scenario in the wind of a member of its forecast, from the scenario's time of flight on.
+
+    Raises ForecastError if the forecast does not cover the start and the destination at this time.
+    """
+    max_ground = -math.inf if scenario.terrain is None else float(np.nanmax(scenario.terrain.heights))
+    site = ForecastSite(scenario.origin, (scenario.start, scenario.destination), max_ground)
+    wind, table = forecast_wind(scenario.spec.wind, forecast, str(scenario.spec.at), site, member)
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
 
 

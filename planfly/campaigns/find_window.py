@@ -17,8 +17,8 @@ from planfly.campaigns.statistics.decision import Interval, clopper_pearson
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from planfly.runtime.stages import Advance
 from world.errors import ForecastError
-from world.forecast.scenario_wind import departure_of, forecast_wind
-from world.scenario import Scenario, forecast_of_scenario, with_flight_time
+from world.forecast.scenario_wind import departure_of
+from world.scenario import Scenario, forecast_of_scenario, in_forecast_member, with_flight_time
 
 # Largest number of departures in one search.
 MAX_DEPARTURES = 400
@@ -235,12 +235,7 @@ def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
     forecast = forecast_of_scenario(scenario)
     if forecast.members == 1:
         return (scenario,)
-    ends = (scenario.start, scenario.destination)
-    found = []
-    for member in range(forecast.members):
-        wind, table = forecast_wind(scenario.spec.wind, forecast, str(scenario.spec.at), scenario.origin, ends, member)
-        found.append(replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind))
-    return tuple(found)
+    return tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
 
 
 def first_departure(scenario: Scenario) -> datetime:

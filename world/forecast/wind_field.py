@@ -219,8 +219,10 @@ def _interpolate_points(
 # ----------------------------------------------------------------------
 # The mean profile of a field: what the planner and the limits of the verdict are computed with.
 
-# Heights above the reference altitude to which the mean profile is fitted, m.
+# Heights above the start of a return to which the mean profile around it is fitted, m.
 PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
+# Number of altitudes of a mission to which its mean profile is fitted.
+_PROFILE_POINTS = 9
 # Levels above this height over the reference altitude are left out, except the lowest of them, m.
 _MAX_HEIGHT_M = 4000.0
 # Largest gradient of a mean profile, 1/s: the range of a scenario's [wind] gradient.
@@ -261,14 +263,17 @@ def without_high_levels(field: WindField, reference_amsl: float) -> WindField:
     )
 
 
-def fit_profile_line(samples: Floats) -> MeanProfile:
-    """Return the mean profile through winds at `PROFILE_HEIGHTS_M`, (h, 2) m/s, east and north.
+def fit_profile_line(heights: Floats, samples: Floats) -> MeanProfile:
+    """Return the mean profile through winds at heights above the reference altitude.
+
+    heights: (h,) m.
+    samples: (h, 2) m/s, east and north.
 
     Each component is a least-squares line over height. Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.
     """
-    offsets = PROFILE_HEIGHTS_M - PROFILE_HEIGHTS_M.mean()
+    offsets = heights - heights.mean()
     slope = offsets @ samples / (offsets @ offsets)
-    east, north = samples.mean(axis=0) - PROFILE_HEIGHTS_M.mean() * slope
+    east, north = samples.mean(axis=0) - heights.mean() * slope
     speed = round(math.hypot(east, north), 5)
     if speed == 0.0:
         return MeanProfile(0.0, 0.0, 0.0)
@@ -278,16 +283,25 @@ def fit_profile_line(samples: Floats) -> MeanProfile:
 
 
 def fit_mean_profile(
-    field: WindField, seconds: float, latitude: float, longitude: float, reference_amsl: float
+    field: WindField,
+    seconds: float,
+    latitude: float,
+    longitude: float,
+    reference_amsl: float,
+    altitudes: tuple[float, float],
 ) -> MeanProfile:
-    """Return the mean profile of a field at a time (s) and place (deg), around the reference altitude (m AMSL).
+    """Return the mean profile of a field at a time (s) and place (deg).
+
+    reference_amsl: altitude of the profile's speed, m AMSL.
+    altitudes: lowest and highest altitude of the mission, between which the profile is fitted, m AMSL.
 
     The gradient is limited so that the speed is at least 0 at all nodes: the flight adds the deviation of the field
     from the profile, and the speed of a profile is never below 0.
     """
-    altitudes = reference_amsl + PROFILE_HEIGHTS_M
-    ones = np.ones(altitudes.size)
-    profile = fit_profile_line(field.velocities_at(seconds * ones, latitude * ones, longitude * ones, altitudes))
+    points = np.linspace(*altitudes, _PROFILE_POINTS)
+    ones = np.ones(points.size)
+    samples = field.velocities_at(seconds * ones, latitude * ones, longitude * ones, points)
+    profile = fit_profile_line(points - reference_amsl, samples)
     heights = field.altitudes - reference_amsl
     lowest, highest = min(-1.0, float(heights.min())), max(1.0, float(heights.max()))
     gradient = max(min(profile.gradient, profile.speed / -lowest), -profile.speed / highest)
