@@ -95,8 +95,8 @@ class Departure:
         """Mean wind at the start: m/s, and the direction it blows from, deg; NaN if the departure was not flown."""
         if self.scenario is None:
             return math.nan, math.nan
-        wind = self.scenario.wind
-        return wind.speed, math.degrees(wind.from_course) % 360.0
+        east, north = self.scenario.wind_velocity(self.scenario.start.tolist())
+        return math.hypot(east, north), math.degrees(math.atan2(-east, -north)) % 360.0
 
 
 @dataclass(frozen=True, repr=False)
