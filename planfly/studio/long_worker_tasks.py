@@ -29,6 +29,8 @@ _MAX_RETURNS = 240
 _MAX_LISTED_RANGES = 6
 # Number of flights in a campaign.
 FLIGHT_COUNT = 24
+# Number of flights for the ground risk, each with its returns and falls.
+_RISK_FLIGHTS = 12
 # Number of flights of each take-off in a forecast.
 _WINDOW_FLIGHTS = 10
 # Time between two take-offs.
@@ -135,7 +137,7 @@ def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance)
     from planfly.campaigns.find_ground_risk import GroundRiskGoal, find_ground_risk
     from planfly.campaigns.ground_risk_text import answer_line, risk_lines
 
-    result = find_ground_risk(_campaign_base(*payload), GroundRiskGoal(flights=FLIGHT_COUNT), _WORKERS, advance)
+    result = find_ground_risk(_campaign_base(*payload), GroundRiskGoal(flights=_RISK_FLIGHTS), _WORKERS, advance)
     return _answer(True if result.is_judged else None, answer_line(result), risk_lines(result))
 
 
