@@ -93,15 +93,18 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
         axes.plot([time, time], [low, high], color=_INK_COLOUR, linewidth=1.0)
         if departure.rule and len(times) <= _MAX_LABELS:
             title = RULE_WORDS[departure.rule].title.lower()
-            axes.text(time, 1.06, title, rotation=45, ha="left", va="bottom", color=_INK_COLOUR, fontsize=7)
+            axes.text(time, 0.03, f"{title}  ", rotation=90, ha="right", va="bottom", color=_INK_COLOUR, fontsize=7.5)
     axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
     if result.goal.asked is not None:
-        axes.axvline(_number_of(result.goal.asked), color=_WIND_COLOUR, linewidth=1.4)
-    axes.set_ylim(0.0, 1.05)
+        place = (_number_of(result.goal.asked), 1.03)
+        axes.annotate("asked", place, color=_WIND_COLOUR, ha="center", va="bottom", fontsize=8, fontweight="bold")
+    axes.set_ylim(0.0, 1.15)
+    axes.set_yticks([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     axes.set_ylabel("flyable flights")
     axes.set_title(
         f"{result.base.name}: {result.goal.flights} flights at each take-off, green with at least"
-        f" {result.goal.probability:.0%} flyable\n(thin line: 95 % interval; text: the rule that fails most)",
+        f" {result.goal.probability:.0%} flyable\n"
+        "(thin line: 95 % interval; text at a bar: the rule that fails most flights)",
         fontsize=9.5,
-        pad=46 if any(departure.rule for departure in result.departures) else 8,
+        pad=8,
     )

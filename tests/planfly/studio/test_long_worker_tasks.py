@@ -30,7 +30,7 @@ def few_flights(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(long_worker_tasks, "FLIGHT_COUNT", 3)
     monkeypatch.setattr(long_worker_tasks, "_WINDOW_FLIGHTS", 2)
     monkeypatch.setattr(long_worker_tasks, "_WINDOW_SPAN", timedelta(hours=1))
-    assert long_worker_tasks._WORKERS == Workers(count=1)
+    assert Workers(count=1) == long_worker_tasks._WORKERS
 
 
 def opened(folder: Path, **options: Any) -> tuple[EditContext, Mission]:
