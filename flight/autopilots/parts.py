@@ -221,8 +221,8 @@ FailsafeAction = Literal[
 class LinkLossReaction(NamedTuple):
     """One reaction of an autopilot to the loss of a radio link in a mission.
 
-    action: what the autopilot does instead of its mission.
-    delay: time for which the link has then been lost, s.
+    action: what the autopilot does instead of its mission, or "on".
+    delay: time for which the link has then been lost, s; inf for "on".
     parameter, value: the parameter that decides the reaction, and its value.
     """
 
@@ -242,7 +242,8 @@ class ReturnBehaviour:
 
     rules: rules of the RTL's target, altitude, turn and loiter.
     parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
-    after_link_loss: returns the reactions to the loss of a radio link, in order of time; () if the mission continues.
+    after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
+        is the reaction "on" alone, or () for an autopilot without parameters.
     """
 
     rules: ReturnRules = DEFAULT_RETURN_RULES

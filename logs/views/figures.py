@@ -149,7 +149,7 @@ def _link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Callable[
 def _link_caption(subject: Subject) -> str:
     """Return the caption of the map of the radio link: the finding, and an explanation of the areas."""
     findings = [finding for finding in subject.verdict.findings if finding.rule == "link"]
-    heading = "".join(_as_sentence(f"{finding.where}: {finding.reason}") for finding in findings)
+    heading = "".join(_as_sentence(finding.reason) for finding in findings)
     height_text = "" if subject.link is None else f" at {subject.link.coverage.height.text}"
     return f"{heading}Areas: the link of an aircraft{height_text}, the median of this flight."
 

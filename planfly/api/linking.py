@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.returns.judge_returns import Returns
 from logs.verdict.returns.returns_text import range_text
-from logs.verdict.rules.link_rule import duration_text, judge_link
+from logs.verdict.rules.link_rule import duration_text, judge_link, period_text
+from logs.verdict.wording import place_text
 from planfly.api.flying import FlownMission, judge
 from planfly.arguments import check_arguments
 from planfly.flight_options import LinkOptions, select_log_and_mission_options, takes_options
@@ -69,6 +70,7 @@ class LinkResult:
     finding: the verdict's finding on the link.
     along: the link once a second along the flight; None if it cannot be computed.
     antenna: position of the station's antenna, (3,) m; None without `along`.
+    where: leg with the least margin; "" if no margin is known.
     returns: the autopilot's returns from the outages, as `planfly.returns` judges them; None without such a return.
     files: files written; empty if no folder was named.
     """
@@ -77,6 +79,7 @@ class LinkResult:
     finding: Finding
     along: LinkAlongPath | None = None
     antenna: Floats | None = None
+    where: str = ""
     returns: Returns | None = None
     files: tuple[Path, ...] = ()
 
@@ -99,8 +102,8 @@ class LinkResult:
         """One line for each outage of the link, in order of time."""
         outages = () if self.along is None else self.along.outages
         return tuple(
-            f"{outage.start:.0f} to {outage.end:.0f} s: {duration_text(outage.duration)} below the fade margin, by up"
-            f" to {-worst.margin:.1f} dB at {worst.lat_deg:.6f}, {worst.lon_deg:.6f}"
+            f"{period_text(outage)}: {duration_text(outage.duration)} below the fade margin, by up to"
+            f" {-worst.margin:.1f} dB at {worst.lat_deg:.6f}, {worst.lon_deg:.6f}"
             for outage, worst in zip(outages, self.worst_points, strict=True)
         )
 
@@ -157,11 +160,26 @@ def link(
         missing = next((name for name in _NEEDED if given[name] is None), None)
         if missing is not None:
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
-    lat, lon = (None, None) if station is None else station
+    lat, lon = (None, None) if station is None else _station_numbers(station)
     entries = {_ENTRIES[name]: value for name, value in given.items()}
     setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon))
     result = _judge_link(setup, judged.track)
     return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
+
+
+def _station_numbers(station: Any) -> tuple[float, float]:
+    """Return latitude and longitude of the argument `station`, degrees.
+
+    Raises ArgumentError if they are not two numbers; a scenario's table checks their range.
+    """
+    try:
+        if isinstance(station, str | bytes):
+            raise TypeError
+        lat, lon = (float(part) for part in station)
+    except (TypeError, ValueError):
+        allowed = "expected latitude and longitude, degrees"
+        raise ArgumentError.of_argument("station", station, allowed) from None
+    return lat, lon
 
 
 def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
@@ -205,4 +223,5 @@ def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
                 else (requirements, align_track(requirements, track))
             )
         judged = judge_link(requirements, aligned, link_of_scenario, fly_again=fly_return)
-    return LinkResult(setup, judged.finding, judged.along, judged.antenna, judged.returns)
+    where = "" if judged.leg is None else place_text(judged.leg)
+    return LinkResult(setup, judged.finding, judged.along, judged.antenna, where, judged.returns)

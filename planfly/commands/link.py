@@ -80,8 +80,7 @@ def link(args: argparse.Namespace) -> int:
     result = call_api(planfly.link, args)
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
-    reason = f"{result.finding.where}: {result.finding.reason}"
-    print(f"link      {colour_text(reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
+    print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
     for text in (*flown_lines(judging_conditions(result.setup)), *result.outage_lines, *result.return_lines):
         print(f"  {text}")
     for path in result.files:
@@ -114,7 +113,7 @@ def _json_answer(source: str, result: "LinkResult", code: int) -> object:
         ok=result.finding.ok,
         conditions=judging_conditions(result.setup),
         facts={fact.what: fact.value for fact in result.finding.facts},
-        where=result.finding.where,
+        where=result.where,
         outages=entries,
         returns=None if result.returns is None else headline(result.returns),
         files=[str(path) for path in result.files],

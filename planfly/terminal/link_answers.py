@@ -28,7 +28,7 @@ class LinkAnswer:
     what: str
     headline: str
     where: str
-    """Leg with the least margin."""
+    """Leg with the least margin; empty if no margin is known."""
     ok: bool | None
     """False if the link is lost for longer than accepted; null if it is not known."""
     conditions: Conditions

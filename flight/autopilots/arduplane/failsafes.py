@@ -4,6 +4,7 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
 """
 
+import math
 from typing import NamedTuple
 
 from flight.autopilots.arduplane.parameters import OTHER_BATTERY_MONITORS, ArduPilotParameters
@@ -126,7 +127,7 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
     >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(made, "control")]
     [('circle', 1.5), ('return', 21.5)]
     >>> link_loss_reactions(made, "telemetry")
-    ()
+    (LinkLossReaction(action='on', delay=inf, parameter='FS_GCS_ENABL', value=0),)
     """
     long_delay = parameters["FS_LONG_TIMEOUT"]
     if use == "telemetry":
@@ -137,11 +138,13 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
             long_delay += short_delay
         causes = _remote_control_causes(parameters)
         delays = [short_delay, long_delay][-len(causes) :]
-    return tuple(
+    reactions = [
         LinkLossReaction(cause.action, delay, cause.parameter, cause.value)
         for cause, delay in zip(causes, delays, strict=True)
         if cause.action != "on"
-    )
+    ]
+    last = causes[-1]
+    return tuple(reactions) or (LinkLossReaction("on", math.inf, last.parameter, last.value),)
 
 
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:

@@ -4,6 +4,8 @@ Read from PX4's sources, not triggered: `Failsafe::checkStateAndMode`, `Failsafe
 `FailsafeBase::getSelectedAction`; and from the parameter reference.
 """
 
+import math
+
 from flight.autopilots.parts import FailsafeAction, LinkLossReaction
 from flight.autopilots.px4.parameters import Px4Parameters
 from world.scenario_tables import LinkUse
@@ -39,12 +41,13 @@ def link_loss_reactions(parameters: Px4Parameters, use: LinkUse) -> tuple[LinkLo
     else:
         name, exceptions, delay = "NAV_RCL_ACT", "COM_RCL_EXCEPT", parameters["COM_RC_LOSS_T"]
     value = int(parameters[name])
-    is_ignored = bool(int(parameters[exceptions]) & _MISSION_BIT) or (
-        use == "control" and parameters["COM_RC_IN_MODE"] == _NO_REMOTE_CONTROL
-    )
     action = _ACTIONS.get(value)
-    if action is None or is_ignored:
-        return ()
+    if use == "control" and parameters["COM_RC_IN_MODE"] == _NO_REMOTE_CONTROL:
+        return (LinkLossReaction("on", math.inf, "COM_RC_IN_MODE", _NO_REMOTE_CONTROL),)
+    if action is not None and int(parameters[exceptions]) & _MISSION_BIT:
+        return (LinkLossReaction("on", math.inf, exceptions, parameters[exceptions]),)
+    if action is None:
+        return (LinkLossReaction("on", math.inf, name, value),)
     hold_time = parameters["COM_FAIL_ACT_T"]
     if action in _IMMEDIATE_ACTIONS or hold_time <= _MIN_HOLD_TIME_S:
         return (LinkLossReaction(action, delay, name, value),)

@@ -6,7 +6,7 @@ autopilot needs to notice the loss and leave the mission.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from logs.verdict.returns.judge_returns import FlyAgain, Returns, judge_returns,
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import ACTION_TEXTS, headline
 from logs.verdict.rule import LogNeeds, Rule
+from logs.verdict.wording import place_text_within
 from world.arrays import Floats
 from world.errors import MissionError
 from world.radio import RadioLink
@@ -41,6 +42,7 @@ class JudgedLink:
 
     along: the link along the judged path; None if it cannot be computed.
     antenna: position of the station's antenna, m, (3,); None if `along` is None.
+    leg: leg with the smallest margin; None if no margin is known.
     returns: returns with which the autopilot reacts to the outages; None if it does not return, or without an outage
         that it notices.
     """
@@ -48,6 +50,7 @@ class JudgedLink:
     finding: Finding
     along: LinkAlongPath | None = None
     antenna: Floats | None = None
+    leg: Place | None = None
     returns: Returns | None = None
 
 
@@ -91,18 +94,21 @@ def judge_link(
             )
             return JudgedLink(unflown_finding)
         judged = link_along_path(link, terrain, antenna, track.time, track.position)
-    reactions = setup.autopilot.returns.after_link_loss(link.use)
+    all_reactions = setup.autopilot.returns.after_link_loss(link.use)
+    reactions = [reaction for reaction in all_reactions if reaction.action != "on"]
     outages = _outages_until(judged.outages, _end_of_reactions(requirements, aligned if not geometric else None))
-    is_noticed = bool(reactions) and any(outage.duration > reactions[0].delay for outage in outages)
+    is_noticed = any(outage.duration > reaction.delay for outage in outages for reaction in reactions)
     returns, reaction_text = None, ""
     if is_noticed:
         returns = _judge_reaction_returns(whole_requirements, track, outages, reactions, fly_again)
         reaction_text = _reaction_text(setup.autopilot.title, reactions, returns)
     elif judged.outages and not reactions:
-        reaction_text = f"; {setup.autopilot.title} continues its mission without the link"
-    place = FLIGHT if judged.worst < 0 else _worst_place(requirements, aligned if not geometric else None, judged)
-    finding = _link_finding(link, (planned, judged), outages, reactions, reaction_text, place, geometric=geometric)
-    return JudgedLink(finding, judged, antenna, returns)
+        setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
+        reaction_text = f"; without the link {setup.autopilot.title} continues its mission{setting_text}"
+    leg = None if judged.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged)
+    text = _link_text(judged, leg)
+    finding = _link_finding(link, (planned, judged), outages, reactions, (text, reaction_text), geometric=geometric)
+    return JudgedLink(finding, judged, antenna, leg, returns)
 
 
 def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> str:
@@ -190,17 +196,17 @@ def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: f
     for outage in outages:
         if outage.duration > delay:
             is_lost |= (starts.time > outage.start + delay - interval) & (starts.time < outage.end + interval)
-    return starts.subset(np.flatnonzero(is_lost))
+    return replace(starts.subset(np.flatnonzero(is_lost)), grounded_count=0)
 
 
 # ----------------------------------------------------------------------
 # The finding.
 
 
-def _link_text(along: LinkAlongPath) -> str:
-    """Describe the smallest margin of the link, its place, and the outages."""
+def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
+    """Describe the smallest margin of the link, its place, and the outages.  leg: leg of the smallest margin."""
     k = along.worst
-    if k < 0:
+    if leg is None:
         return "the terrain below the radio path is unknown"
     points, (east, north) = along.points, along.positions[k, :2].tolist()
     sight_text = "in line of sight" if points.is_visible[k] else "behind the terrain"
@@ -208,7 +214,7 @@ def _link_text(along: LinkAlongPath) -> str:
         sight_text += f", {points.diffraction_loss[k]:.1f} dB lost by diffraction"
     text = (
         f"{abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the fade margin"
-        f" at {along.time[k]:.0f} s, east {east:.0f} m, north {north:.0f} m,"
+        f" on {place_text_within(leg)} at {along.time[k]:.0f} s, east {east:.0f} m, north {north:.0f} m,"
         f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
     )
     if along.outages:
@@ -227,6 +233,16 @@ def duration_text(duration: float) -> str:
     return f"{duration:.1f} s" if duration < _SHORT_OUTAGE_S else f"{duration:.0f} s"
 
 
+def period_text(outage: Outage) -> str:
+    """Return the start and the end of an outage as text.
+
+    >>> period_text(Outage(12.34, 12.91)), period_text(Outage(12.34, 99.9))
+    ('12.3 to 12.9 s', '12 to 100 s')
+    """
+    digits = 1 if outage.duration < _SHORT_OUTAGE_S else 0
+    return f"{outage.start:.{digits}f} to {outage.end:.{digits}f} s"
+
+
 def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: Returns | None) -> str:
     """Describe the autopilot's reactions to the loss of the link, and the outcome of its returns.
 
@@ -243,7 +259,7 @@ def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: R
     return f"{text}: not judged, because the mission has no home" if has_return else text
 
 
-def _worst_place(requirements: RouteRequirements, aligned: AlignedTrack | None, along: LinkAlongPath) -> Place:
+def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, along: LinkAlongPath) -> Place:
     """Return the leg on which the link has its smallest margin.  aligned: None for the planned path."""
     time, phases = float(along.time[along.worst]), requirements.ground_phases
     if aligned is None:
@@ -261,8 +277,7 @@ def _link_finding(
     paths: tuple[LinkAlongPath, LinkAlongPath],
     noticeable_outages: Sequence[Outage],
     reactions: Sequence[LinkLossReaction],
-    reaction_text: str,
-    place: Place,
+    texts: tuple[str, str],
     *,
     geometric: bool,
 ) -> Finding:
@@ -270,6 +285,7 @@ def _link_finding(
 
     paths: link along the planned path and along the judged path; both are the planned path before a flight.
     noticeable_outages: parts of the outages in which the autopilot reacts.
+    texts: texts on the link, and on the reactions to its loss.
     """
     planned, judged = paths
     limits = [(link.max_outage, judged.longest_outage, "scenario")]
@@ -280,7 +296,7 @@ def _link_finding(
     ok: bool | None = duration <= limit and not (link.max_outage == 0.0 and judged.outages)
     if ok and not judged.is_known:
         ok = None
-    text, points, facts = _link_text(judged), judged.points, []
+    (text, reaction_text), points, facts = texts, judged.points, []
     if judged.worst >= 0:
         facts = [
             Fact("smallest margin left after the fade margin", float(points.margin[judged.worst]), "dB"),
@@ -290,7 +306,7 @@ def _link_finding(
         ]
     return make_finding(
         "link",
-        place,
+        FLIGHT,
         ok=ok,
         reason=text + reaction_text,
         faults=[] if ok else [message(text, reaction_text)],

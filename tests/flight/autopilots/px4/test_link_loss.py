@@ -1,5 +1,7 @@
 """What PX4 does in a mission when a radio link is lost, as its failsafe code and its parameter reference have it."""
 
+import math
+
 import pytest
 
 from flight.autopilots.px4.link_loss import link_loss_reactions
@@ -8,7 +10,9 @@ from world.scenario_tables import LinkUse
 
 
 def reactions(use: LinkUse, **values: float) -> list[tuple[str, float, str, float]]:
-    return [tuple(reaction) for reaction in link_loss_reactions(Px4Parameters.defaults().changed(**values), use)]
+    """Return what it does instead of its mission."""
+    found = link_loss_reactions(Px4Parameters.defaults().changed(**values), use)
+    return [] if found[0].action == "on" else [tuple(reaction) for reaction in found]
 
 
 @pytest.mark.parametrize(
@@ -48,3 +52,12 @@ def test_a_mission_may_be_an_exception(bits: float, is_ignored: bool) -> None:
 def test_without_a_remote_control_none_is_lost() -> None:
     assert reactions("control", COM_RC_IN_MODE=4.0) == []
     assert reactions("telemetry", COM_RC_IN_MODE=4.0, NAV_DLL_ACT=1.0) != []
+
+
+def test_where_the_mission_continues_the_deciding_parameter_is_named() -> None:
+    (found,) = link_loss_reactions(Px4Parameters.defaults(), "telemetry")
+    assert tuple(found) == ("on", math.inf, "NAV_DLL_ACT", 0)
+    changed = Px4Parameters.defaults().changed(NAV_DLL_ACT=2.0, COM_DLL_EXCEPT=3.0)
+    assert link_loss_reactions(changed, "telemetry")[0][2:] == ("COM_DLL_EXCEPT", 3.0)
+    # Without an action the exception does not matter.
+    assert link_loss_reactions(changed.changed(NAV_DLL_ACT=0.0), "telemetry")[0].parameter == "NAV_DLL_ACT"

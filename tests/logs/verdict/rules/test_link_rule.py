@@ -11,6 +11,7 @@ import pytest
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Command, Frame, Home, MissionItem
@@ -18,11 +19,12 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import flown_starts
 from logs.verdict.returns.returns_text import headline
 from logs.verdict.rules.link_rule import JudgedLink, judge_link
-from tests.logs.verdict.judging import judge, leg, of
+from tests.logs.verdict.judging import judge, of
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
 from tests.synthetic import edited, fly_path, make_scenario, make_setup
 from world.frames import GeoOrigin
@@ -75,9 +77,12 @@ def test_the_place_is_the_leg_and_the_position_of_the_least_margin() -> None:
     """The station stands at the end: the start, on leg 0, is the furthest."""
     setup = linked(make_setup(WAY), north_m=6000.0)
     for item in (of(judge_geometry(setup), "link"), of(judge(setup, fly_path(setup)), "link")):
-        assert item.place == leg(0)
-        assert "3.5 dB below the fade margin at 0 s, east 0 m, north 0 m, 6.0 km from the station" in item.reason
-    assert of(judge_geometry(linked(make_setup(WAY))), "link").place == leg(1)
+        assert item.place == FLIGHT
+        assert (
+            "3.5 dB below the fade margin on leg 0, to item 1, at 0 s, east 0 m, north 0 m, 6.0 km from the station"
+            in item.reason
+        )
+    assert "on leg 1, to item 2, at 240 s" in of(judge_geometry(linked(make_setup(WAY))), "link").reason
 
 
 def test_within_range_the_link_is_ok() -> None:
@@ -231,20 +236,22 @@ def test_a_loss_that_ends_the_mission_is_not_accepted(
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "use"),
+    ("autopilot", "use", "setting"),
     [
-        (ArduPlane(ArduPilotParameters.defaults()), "telemetry"),
-        (arduplane("THR_FAILSAFE 0\nFS_LONG_ACTN 1\n"), "control"),
-        (Px4(Px4Parameters.defaults()), "telemetry"),
-        (Px4(Px4Parameters.defaults().changed(NAV_DLL_ACT=2, COM_DLL_EXCEPT=1)), "telemetry"),
-        (Px4(Px4Parameters.defaults().changed(COM_RC_IN_MODE=4)), "control"),
+        (ArduPlane(ArduPilotParameters.defaults()), "telemetry", " (FS_GCS_ENABL 0)"),
+        (arduplane("FS_GCS_ENABL 1\n"), "telemetry", " (FS_LONG_ACTN 0)"),
+        (arduplane("THR_FAILSAFE 0\nFS_LONG_ACTN 1\n"), "control", " (THR_FAILSAFE 0)"),
+        (Px4(Px4Parameters.defaults()), "telemetry", " (NAV_DLL_ACT 0)"),
+        (Px4(Px4Parameters.defaults().changed(NAV_DLL_ACT=2, COM_DLL_EXCEPT=1)), "telemetry", " (COM_DLL_EXCEPT 1)"),
+        (Px4(Px4Parameters.defaults().changed(COM_RC_IN_MODE=4)), "control", " (COM_RC_IN_MODE 4)"),
+        (PlanflyGuidance(), "telemetry", ""),
     ],
 )
-def test_an_autopilot_that_goes_on_is_said_to(autopilot: Autopilot, use: str) -> None:
+def test_an_autopilot_that_goes_on_is_said_to(autopilot: Autopilot, use: str, setting: str) -> None:
     setup = with_home(linked(make_setup(WAY), max_outage_s=600.0, use=use), autopilot)
     item = of(judge_geometry(setup), "link")
     assert (item.ok, item.limit, item.limit_source) == (True, 600.0, "scenario")
-    assert item.reason.endswith("; " + f"{autopilot.title} continues its mission without the link")
+    assert item.reason.endswith(f"; without the link {autopilot.title} continues its mission{setting}")
 
 
 def test_an_outage_that_the_autopilot_does_not_notice_has_no_reaction() -> None:
@@ -333,7 +340,10 @@ def test_ground_with_a_hole_leaves_a_kept_link_open() -> None:
 def test_the_take_off_and_the_landing_are_part_of_the_link() -> None:
     """From a station whose link reaches 60 m, the link is kept only near it: on the rail, or on the strip."""
     flown = flown_circuit()
-    for place, leg_of_worst in ((flown.track.position[0], -1), (flown.track.position[-1], 0)):
+    approach = flown.setup.ground_phases.approach
+    assert approach is not None
+    # From the start the link is worst low before the landing point, from the end at the far corner of the circuit.
+    for place, worst_leg in ((flown.track.position[0], approach.leg), (flown.track.position[-1], 1)):
         # 60 m at 1 GHz take 68.0 dB.
         setup = linked(
             flown.setup, east_m=float(place[0]), north_m=float(place[1]), antenna_m=3.0, sensitivity_dbm=-58.0
@@ -343,4 +353,4 @@ def test_the_take_off_and_the_landing_are_part_of_the_link() -> None:
         distances = np.linalg.norm(flown.track.position - place - [0.0, 0.0, 3.0], axis=1)
         assert facts["greatest distance from the station"] == pytest.approx(float(distances.max()), abs=30.0)
         assert item.flown == pytest.approx(float(flown.track.time[-1]), abs=20.0)
-        assert item.place.kind == "leg", leg_of_worst
+        assert f" dB below the fade margin on leg {worst_leg}, to item " in item.reason
