@@ -319,6 +319,24 @@ def test_in_a_landing_sequence_arduplane_ignores_the_loss(autopilot: Autopilot, 
     assert (flown.finding.ok, flown.finding.limit) == (ok, 600.0 if ok else 10.0)
 
 
+@pytest.mark.parametrize(
+    ("landing", "ok"), [(3, True), (9, False)], ids=["on the leg to the landing", "on a leg before the landing"]
+)
+def test_without_a_landing_sequence_only_the_leg_to_the_landing_is_exempt(landing: int, ok: bool) -> None:
+    """The link is lost on the leg to item 3, which is the landing, or one of several waypoints before it."""
+    setup = with_home(linked(make_setup(WAY), max_outage_s=600.0), arduplane("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n"))
+    items = (
+        item_at(1, Command.NAV_WAYPOINT),
+        item_at(2, Command.NAV_WAYPOINT, 3000.0),
+        *([] if landing == 3 else [item_at(3, Command.NAV_WAYPOINT, 6000.0)]),
+        item_at(landing, Command.NAV_LAND, 6000.0),
+    )
+    route = setup.route.with_fields(item=[1, 2, 3])
+    setup = replace(setup, mission=replace(setup.mission, items=items), route=route)
+    assert of(judge_geometry(setup), "link").ok is ok
+    assert judge_link_flown(setup).finding.ok is ok
+
+
 def test_on_a_return_to_launch_a_loss_changes_nothing() -> None:
     setup = with_home(linked(make_setup(WAY), max_outage_s=600.0), arduplane("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n"))
     assert judge_link_flown(setup).finding.ok is False
