@@ -22,7 +22,7 @@ from flight.mission.ground_ways import GroundPhases
 from flight.mission.return_path import DEFAULT_RETURN_RULES, ReturnRules
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records
-from world.scenario_tables import Navigation
+from world.scenario_tables import LinkUse, Navigation
 from world.wind import Turbulence
 
 # ----------------------------------------------------------------------
@@ -196,16 +196,59 @@ def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
     return {}
 
 
+# Reaction of an autopilot to a failure.  "return": RTL; "land": the mission's landing sequence; "land here": a landing
+# where the aircraft is; "autoland": mode AUTOLAND, or RTL without that mode; "on": continue the mission; "landed":
+# none, because the aircraft is on the ground; "never": none, because nothing can trigger the cause; the other reactions
+# do not lead home.
+FailsafeAction = Literal[
+    "return",
+    "land",
+    "land here",
+    "autoland",
+    "on",
+    "circle",
+    "glide",
+    "parachute",
+    "terminate",
+    "disarm",
+    "level",
+    "guided",
+    "landed",
+    "never",
+]
+
+
+class LinkLossReaction(NamedTuple):
+    """One reaction of an autopilot to the loss of a radio link in a mission.
+
+    action: what the autopilot does instead of its mission, or "on".
+    delay: time for which the link has then been lost, s; inf for "on".
+    parameter, value: the parameter that decides the reaction, and its value.
+    """
+
+    action: FailsafeAction
+    delay: float
+    parameter: str
+    value: float
+
+
+def _continue_mission(use: LinkUse) -> tuple[LinkLossReaction, ...]:
+    return ()
+
+
 @dataclass(frozen=True)
 class ReturnBehaviour:
     """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
 
     rules: rules of the RTL's target, altitude, turn and loiter.
     parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
+    after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
+        is the reaction "on" alone, or () for an autopilot without parameters.
     """
 
     rules: ReturnRules = DEFAULT_RETURN_RULES
     parameters_of: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
+    after_link_loss: Callable[[LinkUse], tuple[LinkLossReaction, ...]] = _continue_mission
 
 
 # ----------------------------------------------------------------------

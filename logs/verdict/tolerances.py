@@ -357,11 +357,6 @@ SPHERE_STAY_TOLERANCE_S = 1e-6
 # which changes the exposure by less than 0.1 %.
 SPHERE_FAR_DIAGONALS = 30.0
 
-# The link rule
-
-# s.  ArduPlane acts on a link that is lost for this long: the default of FS_LONG_TIMEOUT, which planfly does not read.
-LINK_LOSS_REACTION_S = 5.0
-
 # PX4's checks: constants of its `FeasibilityChecker` in addition to `flight.autopilots.parts.FeasibilityLimits`
 
 # rad.  A landing approach may be steeper than FW_LND_ANG by this; a literal in the checker.

@@ -19,6 +19,7 @@ from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
 from logs.views.failures import failures
 from logs.views.glides import glide_chart
+from logs.views.link import DrawnLink, draw_scenario_link, link_chart, link_map
 from logs.views.map import MapChart, flight_map, map_json
 from logs.views.moments import waypoint_names
 from logs.views.profile import profile_chart
@@ -42,12 +43,14 @@ class Subject:
     setup: setup with the mission's fence among the zones.
     track: track of at least one row; None for a plan that was not flown.
     returns: judged returns; None if none were judged.
+    link: the scenario's radio link; None without a link, or if it cannot be computed.
     """
 
     setup: FlightSetup
     track: Track | None
     verdict: Verdict
     returns: DrawnReturns | None = None
+    link: DrawnLink | None = None
 
     @property
     def contents_text(self) -> str:
@@ -136,6 +139,19 @@ def _returns_view(name: str) -> Callable[[Subject], View | None]:
         return RETURN_FIGURES[name](subject.setup, subject.returns, subject.track)
 
     return view
+
+
+def _link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Callable[[Subject], View | None]:
+    """Make a function that builds a view of the radio link, and returns None without a link."""
+    return lambda subject: None if subject.link is None else make_view(subject.setup, subject.link)
+
+
+def _link_caption(subject: Subject) -> str:
+    """Return the caption of the map of the radio link: the finding, and an explanation of the areas."""
+    findings = [finding for finding in subject.verdict.findings if finding.rule == "link"]
+    heading = "".join(_as_sentence(finding.reason) for finding in findings)
+    height_text = "" if subject.link is None else f" at {subject.link.coverage.height.text}"
+    return f"{heading}Areas: the link of an aircraft{height_text}, the median of this flight."
 
 
 def _fixed_caption(text: str) -> Callable[[Subject], str]:
@@ -278,6 +294,29 @@ FIGURES = (
         ),
     ),
     FigureEntry(
+        "link-map",
+        "Radio link",
+        _link_view(link_map),
+        alternative=_fixed_caption(
+            "Map, north up: the path coloured by the margin of the radio link, the station, and the areas in which the "
+            "link is weak or lost at the height of the flight."
+        ),
+        caption=_link_caption,
+    ),
+    FigureEntry(
+        "link",
+        "Radio link over time",
+        _link_view(link_chart),
+        alternative=_fixed_caption(
+            "Plots over time: margin of the radio link, diffraction loss, Fresnel clearance, and distance of the "
+            "station."
+        ),
+        caption=_fixed_caption(
+            "Margin: what is left above the fade margin. Fresnel clearance: height of the line of sight above the "
+            "ground, in radii of the first Fresnel zone; below 0 the terrain hides the aircraft."
+        ),
+    ),
+    FigureEntry(
         "time",
         "Over time",
         _flight_view(time_chart),
@@ -341,7 +380,9 @@ def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
     """Return the subject of the figures; a track without rows is omitted."""
-    return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
+    track = track if track is not None and len(track) else None
+    setup = with_fence_zones(setup)
+    return Subject(setup, track, verdict, returns, draw_scenario_link(setup, track))
 
 
 def figure_views(subject: Subject) -> dict[str, View]:

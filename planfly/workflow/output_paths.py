@@ -31,7 +31,7 @@ RUN_FILES = (
 # Names of the figures of a report, as in `logs.views.figures.FIGURES`.
 REPORT_FIGURES = (
     *("map", "profile", "scene", "turns", "returns", "worst-returns", "return-heights", "glide", "survey"),
-    *("time", "exposure", "controls", "energy", "envelope"),
+    *("link-map", "link", "time", "exposure", "controls", "energy", "envelope"),
 )
 # Files of a report, including all figures as PNG and SVG.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in REPORT_FIGURES for kind in ("png", "svg")))
@@ -60,7 +60,7 @@ RETURN_FILES = (
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
 # Files of `planfly.link`.
-LINK_FILES = ("link.png", "link-map.png")
+LINK_FILES = ("link.png", "link-map.png", "link-coverage.tif")
 # Files of `planfly.ground_risk`.
 GROUND_RISK_FILES = ("ground-risk.kml", "ground-risk.geojson", "ground-risk.png", "ground-risk.md")
 # File of `planfly.window`.

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, Self
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
-from flight.autopilots.arduplane.failsafes import battery_failsafes
+from flight.autopilots.arduplane.failsafes import battery_failsafes, link_loss_reactions
 from flight.autopilots.arduplane.ground_law import (
     ARDUPLANE_GROUND,
     IN_AIR,
@@ -275,7 +275,7 @@ class ArduPlane(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour in an RTL from the parameters."""
-        return ReturnBehaviour(self._return_rules, self._rtl_parameters)
+        return ReturnBehaviour(self._return_rules, self._rtl_parameters, partial(link_loss_reactions, self.parameters))
 
     def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
         """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX that a scenario's RTL settings require.

@@ -28,6 +28,7 @@ from flight.autopilots.parts import (
 )
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE_M
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
+from flight.autopilots.px4.link_loss import link_loss_reactions
 from flight.autopilots.px4.open_settings import describe_open_settings
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
@@ -367,7 +368,7 @@ class Px4(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
-        return ReturnBehaviour(self._return_rules, _rtl_parameters)
+        return ReturnBehaviour(self._return_rules, _rtl_parameters, partial(link_loss_reactions, self.parameters))
 
     @property
     def _return_rules(self) -> ReturnRules:

@@ -175,6 +175,13 @@ _WHEN_STATED = {
     "BAT_EMERGEN_THR": 0.05,
     "BAT1_CAPACITY": -1.0,
     "CBRK_FLIGHTTERM": 121212.0,
+    # Loss of a radio link (`flight.autopilots.px4.link_loss`).
+    **dict.fromkeys(("COM_DLL_EXCEPT", "COM_RCL_EXCEPT", "NAV_DLL_ACT"), 0.0),
+    "COM_DL_LOSS_T": 10.0,
+    "COM_FAIL_ACT_T": 5.0,
+    "COM_RC_IN_MODE": 3.0,
+    "COM_RC_LOSS_T": 0.5,
+    "NAV_RCL_ACT": 2.0,
     "COM_FLTT_LOW_ACT": 0.0,
     "COM_ARM_AUTH_REQ": 0.0,
     "COM_LOW_BAT_ACT": 0.0,

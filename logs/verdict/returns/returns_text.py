@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from flight.autopilots.arduplane.failsafes import Cause
+from flight.autopilots.parts import FailsafeAction
 from flight.mission.return_path import ReturnPoint
 from logs.verdict.returns.judge_returns import (
     KINDS,
@@ -56,15 +57,18 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "low": "a return comes lower than required",
     "safe": "a return is safe",
 }
-_ACTION_TEXTS = {
+# Texts for the reactions of an autopilot to a failure.
+ACTION_TEXTS: dict[FailsafeAction, str] = {
     "return": "returns",
     "land": "lands by its landing sequence",
+    "land here": "lands where it is",
     "autoland": "lands in mode AUTOLAND if it can, and otherwise returns",
     "on": "continues its mission",
     "circle": "circles where it is",
     "glide": "glides straight ahead without its motor, which is not a return",
     "parachute": "releases its parachute",
     "terminate": "ends its flight there",
+    "disarm": "stops its motor there",
     "level": "flies straight and level, which is not a return",
     "guided": "circles at the fence's return point",
     "landed": "has landed",
@@ -219,7 +223,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
         other_causes: dict[str, list[str]] = {}
         for cause in causes:
             if not cause.is_return and (cause.action in ("land", "autoland")) == is_landing:
-                other_causes.setdefault(_ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
+                other_causes.setdefault(ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
         text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
         lines += [f"{heading}: {'; '.join(text)}"] if text else []
     return lines
