@@ -87,8 +87,8 @@ def judge_link(
     planned = link_along_path(link, terrain, antenna, path.times, path.points)
     track, judged = None, planned
     if not geometric:
-        track = phases.track if phases is not None else None if aligned is None else aligned.track
-        if aligned is None or track is None:
+        track = None if aligned is None else aligned.track if phases is None else phases.track
+        if track is None:
             unflown_finding = make_finding(
                 "link", FLIGHT, ok=None, reason="nothing was flown", planned=planned.longest_outage, unit="s"
             )

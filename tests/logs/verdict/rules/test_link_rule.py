@@ -23,7 +23,7 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import flown_starts
 from logs.verdict.returns.returns_text import headline
-from logs.verdict.rules.link_rule import JudgedLink, judge_link
+from logs.verdict.rules.link_rule import JudgedLink, duration_text, judge_link
 from tests.logs.verdict.judging import judge, of
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
 from tests.synthetic import edited, fly_path, make_scenario, make_setup
@@ -317,6 +317,38 @@ def test_in_a_landing_sequence_arduplane_ignores_the_loss(autopilot: Autopilot, 
     assert of(judge_geometry(setup), "link").ok is ok
     flown = judge_link_flown(setup)
     assert (flown.finding.ok, flown.finding.limit) == (ok, 600.0 if ok else 10.0)
+
+
+@pytest.mark.parametrize(
+    ("accepted", "timeout", "limit", "source"),
+    [(75.0, 18.0, 75.0, "scenario"), (78.0, 5.0, 5.0, "autopilot"), (600.0, 25.0, 25.0, "autopilot")],
+)
+def test_an_outage_that_ends_in_a_landing_sequence_counts_up_to_there(
+    accepted: float, timeout: float, limit: float, source: str
+) -> None:
+    """The link is lost from 3995 m on, for 79 s at 25.36 m/s, and noticed up to 4500 m, for 19.9 s.
+
+    The limit that is exceeded by more is stated, or the one that is nearer.
+    """
+    autopilot = arduplane(f"FS_GCS_ENABL 1\nFS_LONG_ACTN 3\nFS_LONG_TIMEOUT {timeout}\n")
+    way = [[0, 0, 300], [0, 4500, 300], [0, 6000, 300]]
+    setup = with_home(linked(make_setup(way), max_outage_s=accepted), autopilot)
+    items = (
+        item_at(1, Command.NAV_WAYPOINT),
+        item_at(2, Command.NAV_WAYPOINT, 4500.0),
+        item_at(3, Command.DO_LAND_START),
+        item_at(4, Command.NAV_WAYPOINT, 6000.0),
+    )
+    route = setup.route.with_fields(item=[1, 2, 4])
+    setup = replace(setup, mission=replace(setup.mission, items=items), route=route)
+    item = of(judge_geometry(setup), "link")
+    assert (item.limit, item.limit_source) == (limit, source)
+    assert item.ok is (accepted == 600.0)
+
+
+@pytest.mark.parametrize(("duration", "text"), [(0.04, "0.0 s"), (9.94, "9.9 s"), (10.0, "10 s"), (14.4, "14 s")])
+def test_a_short_outage_is_stated_to_a_tenth_of_a_second(duration: float, text: str) -> None:
+    assert duration_text(duration) == text
 
 
 @pytest.mark.parametrize(
