@@ -208,11 +208,7 @@ def summary_lines(
     lines += [*condition_lines(conditions), autopilot_line(conditions, is_flown=level == "flown")]
     lines += _parameter_lines(setup, is_flown=level == "flown")
     lines += _ignored_settings_lines(setup)
-    reasons: dict[str, str] = {}
-    for finding in findings:
-        if finding.ok is None and RULE_WORDS[finding.rule].explains_unjudged:
-            reasons.setdefault(finding.rule, finding.reason)
-    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
+    lines += _unjudged_lines(findings)
     if reason := unjudged_return_text(setup):
         lines.append(f"Not judged: {RULE_WORDS['return'].title} ({reason})")
     # These are limits of PX4 and not of the aircraft, so they decide nothing for another autopilot.
@@ -244,6 +240,22 @@ def summary_lines(
         agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
         lines.append(f"{_LEVEL_TITLES[answer.name]}: {answer.headline}{agreement}")
     return tuple(lines)
+
+
+def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
+    """Return a line for each rule with unjudged findings that the summary explains: the places and the first reason."""
+    lines = []
+    for rule in RULE_WORDS.values():
+        rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
+        unjudged = [finding for finding in rule_findings if finding.ok is None]
+        if not unjudged:
+            continue
+        places = [place_text(finding.place) for finding in unjudged if finding.place.kind in ("leg", "waypoint")]
+        rest = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
+        is_part = len(places) == len(unjudged) < len(rule_findings)
+        place = f" on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{rest}" if is_part else ""
+        lines.append(f"Not judged: {rule.title}{place} ({unjudged[0].reason})")
+    return lines
 
 
 def _airframe_or_autopilot_lines(

@@ -29,6 +29,10 @@ from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.geometry import tangent_length
 
+# Part of a lap by which a whole loiter may be shorter than drawn, because the aircraft joins and leaves its circle on
+# other courses.
+_LAPS_TOLERANCE = 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class LoiterCircle:
@@ -203,15 +207,14 @@ def _loiter_finding(
         faults.append(_failed_corner_message(requirements, circle, failed_corners[0]))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
-    if radii.size:
-        facts.append(f"flown at {radii.min():.1f} to {radii.max():.1f} m from the center")
-        max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
-        if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
-            faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
+    max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+    if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
+        faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
     ok: bool | None = not (faults or failed_corners)
-    if ok and any(finding.ok is None for finding in corner_findings):
+    facts += _flown_facts(requirements, aligned, circle, radii)
+    if ok and any(finding.ok is None for finding in corner_findings) and not _is_whole(requirements, aligned, circle):
         ok = None
-        is_complete = aligned is not None and bool(aligned.passed[-1])
+        is_complete = aligned is not None and bool(aligned.passed[circle.last])
         facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
     if ok and hazards_text:
         ok = None
@@ -268,6 +271,42 @@ def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
         return np.zeros(0)
     offsets = aligned.track.position[first : last + 1, :2] - circle.center
     return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
+
+
+def _flown_facts(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, radii: Floats
+) -> list[str]:
+    """Return texts on how a loiter was flown: its number of laps, if known, and its radii (m, (n,))."""
+    laps = _flown_laps(requirements, aligned, circle)
+    laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
+    return [f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center"] if radii.size else []
+
+
+def _flown_laps(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> float:
+    """Return the number of laps that an aircraft flew around a loiter's center between the stops before and after it.
+
+    The result is NaN without a flight, if the flight did not reach the loiter's last corner, and for an autopilot that
+    follows the corners as they are drawn.
+    """
+    follows_corners = not requirements.setup.autopilot.loiters.steers_to_center
+    if aligned is None or follows_corners or not aligned.passed[circle.last]:
+        return math.nan
+    rows = slice(int(aligned.rows[circle.first - 1]), int(aligned.rows[min(circle.last + 1, requirements.legs)]) + 1)
+    east, north = (aligned.track.position[rows, :2] - circle.center).T
+    is_on_circle = np.hypot(east, north) <= circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+    steps = np.diff(np.unwrap(np.arctan2(east, north)))[is_on_circle[1:] & is_on_circle[:-1]]
+    return abs(float(steps.sum())) / (2.0 * math.pi)
+
+
+def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> bool:
+    """Return True if all laps of a loiter are known to be flown.
+
+    A loiter that ends at an altitude needs no number of laps.
+    """
+    seq = int(requirements.setup.route.items[circle.first])
+    loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    is_to_altitude, laps = loiter is not None and loiter.to_altitude, _flown_laps(requirements, aligned, circle)
+    return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - _LAPS_TOLERANCE)
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
