@@ -109,8 +109,8 @@ class SurveyResult:
     def no_remedy_lines(self) -> tuple[str, ...]:
         """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
         texts = [
-            "nothing was found that would help: no turn-around, order, course, parameter or airspeed alone, and no"
-            " longer turn-arounds combined with a parameter or a lower airspeed"
+            "nothing was found that would help: no turn-around, gates, order, course, parameter or airspeed alone, and"
+            " no longer turn-arounds combined with a parameter or a lower airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
@@ -143,9 +143,9 @@ def survey(
     what: the path of a .waypoints or .plan, which is flown; or a result of `planfly.fly`, or a flight log or its path.
     camera: sensor size across and along the track, and focal length, mm; optionally also the required overlaps along
     and across lines, percent; None takes the values of a .plan.
-    suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, an
-    interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight; each is tested
-    by a flight before it is suggested.
+    suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, gates
+    (for PX4), an interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight;
+    each is tested by a flight before it is suggested.
     out: folder for a picture of the lines, and for the remedies as a .plan (for a .plan) or a .waypoints, and a .param;
     None writes no files.
     overwrite: True replaces results in the folder.

@@ -244,6 +244,17 @@ def test_overlap_as_drawn_is_what_was_asked_for() -> None:
     assert overlaps(judge(with_camera(1, 2), fly_path(with_camera(1, 2)))) == {}
 
 
+@pytest.mark.parametrize("up", [-99.999, -100.0, -130.0])
+def test_photos_from_the_ground_or_below_it_overlap_by_nothing(up: float) -> None:
+    """As on a line that ends in a crash: 0 %, not minus any number; the drawn line is as low as that here."""
+    setup = photographed()
+    low = np.array(lines()) + np.array([0.0, 0.0, 100.0 + up])
+    setup = replace(setup, route=setup.route.with_fields(position=low))
+    found = overlaps(judge(setup, fly_path(setup, radius=FITS)))
+    assert [found[check].flown for check in ("front overlap", "side overlap")] == [0.0, 0.0]
+    assert " 0 m above ground), 75 % required" in found["front overlap"].reason
+
+
 @pytest.mark.parametrize(("aside", "ok"), [(49.0, True), (51.0, False)])
 def test_lines_apart_overlap_less(aside: float, ok: bool) -> None:
     """The first line so far to the left, 250 m from the second: 500 m of photo beside leave 50 % there.
