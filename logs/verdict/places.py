@@ -21,7 +21,7 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 #   "duration" of the flight.
 # - Changes by a factor: "battery" or "tank".
 # - Knowledge about the aircraft instead of changes of the plan: duration of a flight at "full throttle" or with "no
-#   throttle" that measures its ability, and a "stated climb" that the user should state.
+#   throttle" that measures its ability, and a "stated climb" or a "stated bank" that the user should state.
 Quantity = Literal[
     "length",
     "rise",
@@ -41,6 +41,7 @@ Quantity = Literal[
     "full throttle",
     "no throttle",
     "stated climb",
+    "stated bank",
 ]
 
 

@@ -87,18 +87,29 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     )
 
 
+# Subjects of a sentence on an insufficiently known aircraft, with the places that are counted, by rule.
+_PLACED_SUBJECTS = {
+    "slope": ("slope", "on", "leg"),
+    "speed": ("airspeed", "on", "leg"),
+    "turn": ("turn", "at", "waypoint"),
+    "loiter": ("loiter", "at", "waypoint"),
+}
+
+
 def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
     """Describe the findings on an insufficiently known aircraft; return "" if there are none."""
     slopes = [finding for finding in open_findings if finding.rule == "slope"]
     if len(slopes) < len(open_findings):
-        speed_count = sum(finding.rule == "speed" for finding in open_findings)
+        counts = {rule: sum(finding.rule == rule for finding in open_findings) for rule in _PLACED_SUBJECTS}
         subjects = [
-            f"{name}{'s' if count > 1 or name == 'slope' else ''} on {count} leg{'s' if count > 1 else ''}"
-            for name, count in (("slope", len(slopes)), ("airspeed", speed_count))
+            f"{noun}{'s' if count > 1 or rule == 'slope' else ''} {place_preposition} {count_text(count, place)}"
+            for (rule, count), (noun, place_preposition, place) in zip(
+                counts.items(), _PLACED_SUBJECTS.values(), strict=True
+            )
             if count
         ]
-        subjects += ["energy"] if len(slopes) + speed_count < len(open_findings) else []
-        is_singular = len(subjects) == 1 and (subjects == ["energy"] or speed_count == 1)
+        subjects += ["energy"] if sum(counts.values()) < len(open_findings) else []
+        is_singular = len(subjects) == 1 and not slopes and max(counts.values()) <= 1
         verb = "is" if is_singular else "are"
         subject_text = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
         return f"{subject_text} {verb} too close to the limit to judge with what is known of the aircraft"

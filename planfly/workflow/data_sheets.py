@@ -290,6 +290,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         battery_guessed="energy" in sized.guessed,
         max_speed_sd=top_speed_sd,
         climb_guessed="climb" in sized.guessed,
+        bank_guessed="bank" in sized.guessed,
     )
     return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
 

@@ -11,13 +11,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import stated_loiter
-from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, finding_reason, make_finding, message, worst_first_key
+from logs.verdict.findings import (
+    UNKNOWN_AIRCRAFT,
+    UNKNOWN_PATH,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+    worst_first_key,
+)
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
+from logs.verdict.suggestions import suggest_stating_bank
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
     LOITER_RADIUS_TOLERANCE_M,
@@ -188,7 +198,9 @@ def _loiter_finding(
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
-    facts = [f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
+    open_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
+    faults = [] if open_texts else faults
+    facts = [*open_texts, f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
     hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
@@ -201,10 +213,7 @@ def _loiter_finding(
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
             facts.append(f"{parameter_name}, held with {math.degrees(bank):.0f}° of bank")
-    if aligned is not None and failed_corners:
-        faults.append(_unheld_corners_message(circle, failed_corners))
-    elif failed_corners and not faults:
-        faults.append(_failed_corner_message(requirements, circle, failed_corners[0]))
+    faults += _corner_faults(requirements, aligned, circle, failed_corners, has_faults=bool(faults))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
     max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
@@ -212,13 +221,15 @@ def _loiter_finding(
         faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
     ok: bool | None = not (faults or failed_corners)
     facts += _flown_facts(requirements, aligned, circle, radii)
-    if ok and any(finding.ok is None for finding in corner_findings) and not _is_whole(requirements, aligned, circle):
+    has_unjudged = any(finding.ok is None and finding.check != UNKNOWN_AIRCRAFT for finding in corner_findings)
+    if ok and has_unjudged and not _is_whole(requirements, aligned, circle):
         ok = None
         is_complete = aligned is not None and bool(aligned.passed[circle.last])
         facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
-    if ok and hazards_text:
+    check = UNKNOWN_AIRCRAFT if open_texts else UNKNOWN_PATH if hazards_text else ""
+    if ok and check:
         ok = None
-        facts.append(hazards_text)
+        facts += [hazards_text] if hazards_text else []
     return make_finding(
         "loiter",
         requirements.waypoint(circle.first),
@@ -234,16 +245,40 @@ def _loiter_finding(
         margin=circle.radius - min_radius,
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
-        check=UNKNOWN_PATH if ok is None and hazards_text else "",
+        check=check if ok is None else "",
     )
 
 
-def _min_radius(requirements: RouteRequirements, circle: LoiterCircle) -> float:
+def _may_pass(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
+    """Return True if a loiter that is too small may be held, because the aircraft's bank limit is a guess."""
+    return circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M
+
+
+def _corner_faults(
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    circle: LoiterCircle,
+    failed_corners: list[Finding],
+    *,
+    has_faults: bool,
+) -> list[Message]:
+    """Return a message on failed corners; without a flight, only if the loiter has no fault of its own."""
+    if not failed_corners or (aligned is None and has_faults):
+        return []
+    if aligned is not None:
+        return [_unheld_corners_message(circle, failed_corners)]
+    return [_failed_corner_message(requirements, circle, failed_corners[0])]
+
+
+def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
     """Return the radius of a loiter at the bank limit, for the courses of its arcs, m.
 
     A loiter without end meets every course, also if the route follows it for a part of a lap only.
+
+    possible: True for the largest bank limit that the aircraft may have.
     """
-    min_radius = float(requirements.min_radius[circle.first : circle.last + 1].max())
+    radii = requirements.possible_min_radius if possible else requirements.min_radius
+    min_radius = float(radii[circle.first : circle.last + 1].max())
     setup = requirements.setup
     item = next((item for item in setup.mission.items if item.seq == setup.route.items[circle.first]), None)
     loiter = None if item is None else stated_loiter(item)
@@ -253,10 +288,14 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle) -> float:
         float(requirements.points[circle.first, 2]),
         float(requirements.route.leg_airspeeds[circle.first - 1]),
     )
+    bank_ratio = math.tan(requirements.limits.max_bank) / math.tan(requirements.possible_bank) if possible else 1.0
     # Two half laps cover all courses.
     return max(
         min_radius,
-        *(setup.limits.turn_radius(course, course + math.pi, altitude, airspeed) for course in (0.0, math.pi)),
+        *(
+            bank_ratio * setup.limits.turn_radius(course, course + math.pi, altitude, airspeed)
+            for course in (0.0, math.pi)
+        ),
     )
 
 
@@ -406,10 +445,12 @@ RULE = Rule(
         "LOITER_RADIUS_TOLERANCE_M",
         "WAYPOINT_PASS_MARGIN_M",
         "BANK_TOLERANCE_RAD",
+        "POSSIBLE_BANK_RAD",
         "LOITER_SWING_RADII",
         "LOITER_WIDENING_FRACTION",
     ),
     judge=end_loiter_findings,
     merge=merge_loiter_findings,
+    suggest=suggest_stating_bank,
     log=LogNeeds(needs_aircraft=True),
 )

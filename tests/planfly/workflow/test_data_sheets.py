@@ -141,6 +141,13 @@ def test_a_battery_that_nobody_stated_is_a_guess(tmp_path: Path, energy: float) 
     assert load_envelope(made).battery_guessed is (energy == 0.0)
 
 
+@pytest.mark.parametrize("bank_deg", [0.0, 40.0])
+def test_a_bank_limit_that_nobody_stated_is_a_guess(tmp_path: Path, bank_deg: float) -> None:
+    made = make_data_sheet_folder(tmp_path / "foam", replace(FOAM, bank=math.radians(bank_deg)))
+    assert load_envelope(made).bank_guessed is (bank_deg == 0.0)
+    assert math.degrees(made.max_bank) == pytest.approx(bank_deg or 35.0)
+
+
 def test_parameters_are_data(tmp_path: Path) -> None:
     file = tmp_path / "mine.parm"
     # TRIM_THROTTLE 45 is ArduPlane's own value and says nothing.
