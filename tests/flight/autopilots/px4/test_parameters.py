@@ -52,7 +52,7 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
     file.write_text(QGC, encoding="utf-8")
     made = Px4Parameters.load(aerosonde, file, "1.16")
     assert made.by_origin("file") == {"FW_R_LIM": 30.0, "NAV_ACC_RAD": 25.0}
-    assert (made.unused, made.source, made.version) == (("BAT1_N_CELLS",), str(file), "1.16")
+    assert (made.unused, made.source, made.version) == (("BAT1_N_CELLS", "FW_T_F_ALT_ERR"), str(file), "1.16")
     assert made.by_origin("default")["NPFG_PERIOD"] == 10.0
     # What the aircraft's folder states for ArduPlane: 25 m/s, 77 and 55 % of throttle, 5.6 and 3.3 m/s.
     assert made.by_origin("aircraft") == {
