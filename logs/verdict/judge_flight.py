@@ -25,7 +25,7 @@ from logs.verdict.judge_geometry import (
 )
 from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Place, ReferenceFlights
+from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.summary import headline, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
@@ -136,9 +136,9 @@ def _level_answers(
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
     """Return the airframe's answer, by the reference flight, with its disagreements with the flight."""
-    failed = {(rule, _numbered_place(place)) for rule, place in airframe.failed}
+    failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
     airframe_findings = [
-        replace(finding, ok=(finding.rule, _numbered_place(finding.place)) not in failed) for finding in flight_findings
+        replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed) for finding in flight_findings
     ]
     disagreements = _disagreements("airframe", airframe_findings, flight_findings)
     # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
@@ -171,12 +171,7 @@ def _worst_outcomes(findings: Sequence[Finding]) -> dict[tuple[object, ...], Fin
         if finding.ok is None:
             continue
         is_overlap = finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
-        key = finding.rule, finding.check if is_overlap else _numbered_place(finding.place)
+        key = finding.rule, finding.check if is_overlap else numbered_place(finding.place)
         if key not in outcomes or worst_first_key(finding) < worst_first_key(outcomes[key]):
             outcomes[key] = finding
     return outcomes
-
-
-def _numbered_place(place: Place) -> Place:
-    """Return a place with its number in the texts as its index: all corners of a loiter are then one place."""
-    return place if place.number is None else replace(place, index=place.number)

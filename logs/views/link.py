@@ -83,7 +83,7 @@ def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapCh
         scenario,
         "the radio link along the flight",
         layers,
-        [label, *end_labels(scenario, route)],
+        [label, *end_labels(scenario, route, setup.route.stops.tolist())],
         map_extent(scenario, route, [along.positions, antenna[None, :]]),
         route=route,
         winds=(NamedWind(scenario.wind),),

@@ -781,6 +781,19 @@ def _climb_lines(stated: StatedParameters) -> list[str]:
     return [f"{climb_text}; the table has the climb at full throttle."]
 
 
+def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str]:
+    """Return lines of ``README.md`` on the performance of the model and the speeds of its guidance."""
+    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
+    return [
+        f"The model weighs {aircraft.mass * GRAVITY:.1f} N, flies level at {aircraft.airspeed:g} m/s with"
+        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
+        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
+        f" {performance.slowest.airspeed:.1f} m/s.",
+        f"Guidance flies at {aircraft.airspeed_min:g} to {aircraft.airspeed_max:g} m/s:"
+        f" up to {100.0 * MAX_SPEED:.0f} % of the fastest level flight.",
+    ]
+
+
 def _readme_text(
     aircraft: Aircraft,
     sized: SizedAircraft,
@@ -795,7 +808,6 @@ def _readme_text(
     """
     sheet, name = sized.sheet, aircraft.name
     propulsion = "burns fuel; its mass stays the same" if sheet.burns_fuel else "is electric"
-    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
     lines = [
         f"# {name}",
         "",
@@ -813,12 +825,7 @@ def _readme_text(
     lines += [
         *parameter_lines,
         "",
-        f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"
-        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
-        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
-        f" {performance.slowest.airspeed:.1f} m/s.",
-        f"Guidance flies at {aircraft.airspeed_min:g} to {aircraft.airspeed_max:g} m/s:"
-        f" up to {100.0 * MAX_SPEED:.0f} % of the fastest level flight.",
+        *_performance_lines(aircraft, performance),
         *throttle_lines,
         "",
         "## Uncertainties",
