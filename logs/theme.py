@@ -122,7 +122,7 @@ LOOKS = {
     "reach-nothing": _WRONG,
     "reach-unknown": _NOT_KNOWN,
     "left-home": Look(_GREEN, "#2fc79a", width=_SPARE),
-    "left-site": Look(_BLUE, "#7cc0f5", width=_SPARE, dash=(8.0, 2.0)),
+    "left-site": Look(_BLUE, "#7cc0f5", width=2.4 * _SPARE),
     "left-flat": Look(_ORANGE, "#ffb938", width=_SPARE, dash=(4.0, 1.5)),
     "glide-near": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.58),
     "glide-middle": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.4),

@@ -223,8 +223,9 @@ def corridor_line(setup: FlightSetup) -> str:
     if closest_legs is None or closest_legs[0] >= half_width:
         return line
     spacing, leg = closest_legs
+    first, second = setup.route.leg_numbers[leg], setup.route.leg_numbers[leg + 2]
     return (
-        f"{line}; the corridor is wider than the {spacing:.0f} m between legs {leg} and {leg + 2}, so a flight within"
+        f"{line}; the corridor is wider than the {spacing:.0f} m between legs {first} and {second}, so a flight within"
         " the corridor may not have followed the lines"
     )
 

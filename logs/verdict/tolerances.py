@@ -39,6 +39,9 @@ LOITER_WIDENING_FRACTION = 0.25
 LOITER_SWING_RADII = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5
+# rad.  A bank limit that is only guessed may be up to this, the steepest that a data sheet or a scenario may state, or
+# up to the limit of autopilot or scenario if that is lower: what passes with it is undecided.
+POSSIBLE_BANK_RAD = math.radians(60.0)
 # rad.  A turn sharper than this has no useful tangent length; the tangent length of a U-turn is infinite.  Between legs
 # that are too short, guidance omits the arc of a turn beyond its own smaller limit, SHARPEST_FLY_BY in
 # flight/mission/route.py, which the turn rule imports from there.

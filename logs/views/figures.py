@@ -115,10 +115,10 @@ def _flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Ca
 
 # Builders of the figures on returns, by name.
 RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], View | None]] = {
-    "returns": lambda setup, drawn, _: returns_map(setup, drawn),
+    "returns": returns_map,
     "worst-returns": lambda setup, drawn, _: worst_returns_chart(setup, drawn),
     "return-heights": return_heights_chart,
-    "glide": lambda setup, drawn, _: glide_chart(setup, drawn),
+    "glide": glide_chart,
 }
 
 

@@ -150,7 +150,7 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
         scenario,
         f"the radio link along the path, and at {drawn.coverage.height.text}",
         layers,
-        [label, *end_labels(scenario, route)],
+        [label, *end_labels(scenario, route, setup.route.stops.tolist())],
         drawn.extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

@@ -342,7 +342,7 @@ def _draw_files(setup: FlightSetup, track: Track, returns: DrawnReturns) -> dict
     from logs.views.figures import draw_pictures, return_views
 
     tracks = [track_line(setup, track)] if len(track) else []
-    lines = [plan_line(setup), *tracks, *return_lines(setup, returns)]
+    lines = [plan_line(setup), *tracks, *return_lines(setup, returns, track if tracks else None)]
     zones = [*map_zones(setup), *glide_shapes(setup, returns)]
     text = kml_text(f"{setup.scenario.name} returns", lines, zones)
     pictures = draw_pictures(return_views(setup, returns, track if tracks else None))

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.wording import place_text
 from planfly.campaigns.find_battery import MIN_MASS_FACTOR, BatteryResult
@@ -44,18 +46,23 @@ def battery_lines(result: BatteryResult) -> list[str]:
     """Return the lines below the answer: the aircraft's battery, what decides, and how it was found."""
     if not result.completed:
         return []
+
+    def leg_name(number: int) -> str:
+        """Return the name of the legs with a number."""
+        return place_text(requirements.leg(int(np.searchsorted(requirements.setup.route.leg_numbers, number))))
+
     lines = [_own_battery_line(result), *_mass_lines(result)]
     requirements, total = route_requirements(result.base.nominal_setup()), len(result.completed)
     for decision in result.decisions[:_MAX_LISTED]:
         part = "the end of the mission"
         if decision.leg >= 0:
-            leg_text = place_text(requirements.leg(decision.leg))
+            leg_text = leg_name(decision.leg)
             part = f"the return that starts at {decision.time:.0f} s ({leg_text})"
         lines.append(f"decided by {part}: in {decision.flights} of {total} flights")
     energies = result.leg_energies
     if float(energies.sum()) > 0.0:
         largest = sorted(range(len(energies)), key=lambda leg: -float(energies[leg]))[:_MAX_LISTED]
-        parts = [f"{energies[leg]:.1f} Wh ({place_text(requirements.leg(leg))})" for leg in largest]
+        parts = [f"{energies[leg]:.1f} Wh ({leg_name(leg)})" for leg in largest]
         lines.append(f"the mission uses {float(energies.sum()):.1f} Wh (median); most of it: {', '.join(parts)}")
     lost = sum(row.lost_returns > 0 for row in result.completed)
     if result.base.mission.home is None:

@@ -74,8 +74,8 @@ class EnergyRow(FlightRow):
     mission_energy: energy used at the end of the mission, Wh.
     return_energy: highest energy used at the end of a return, Wh; NaN if no return's energy is known.
     return_time: start of this return, s.
-    return_leg: leg on which this return starts, from 0.
-    leg_energies: energy used on each leg, Wh.
+    return_leg: number of the leg on which this return starts, as in messages.
+    leg_energies: energy used on each leg by its number, Wh: all legs around a loiter are one.
     battery_factor: drawn factor on the battery's capacity.
     lost_returns: number of returns that do not arrive, whose energy is unknown.
     """
@@ -125,7 +125,9 @@ def fly_for_energy(
         row,
         mission_energy=float(energy.max()),
         duration=float(track.time[-1]),
-        leg_energies=tuple(np.bincount(track.leg[1:], weights=np.diff(energy)).tolist()),
+        leg_energies=tuple(
+            np.bincount(varied.setup.route.leg_numbers_of(track.leg[1:]), weights=np.diff(energy)).tolist()
+        ),
     )
     return _with_returns(row, varied, track, interval)
 
@@ -148,7 +150,8 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     if not arriving:
         return row
     worst = max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
-    leg = int(track.leg[min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))])
+    worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))
+    leg = int(varied.setup.route.leg_numbers_of(track.leg[worst_row : worst_row + 1])[0])
     needed = worst.energy_used + ratio * worst.energy
     return replace(row, return_energy=needed, return_time=worst.time, return_leg=leg)
 
@@ -164,7 +167,7 @@ class BatteryDecision(NamedTuple):
     """Part of the flight that needs the most energy, and the number of flights in which it does.
 
     flights: number of flights.
-    leg: leg on which the deciding return starts, from 0; -1 for the end of the mission.
+    leg: number of the leg on which the deciding return starts, as in messages; -1 for the end of the mission.
     time: median start of these returns, s; NaN for the end of the mission.
     """
 

@@ -373,7 +373,7 @@ _ANSWER_STYLES: dict[WindsAnswer, str] = {
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
     """Return the boundary, its interval and the flights of each wind direction, for the go/no-go chart."""
-    directions = []
+    directions, reasons = [], unsettled_reasons(winds)
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
         for direction, speed, flyable in winds.flights:
@@ -382,7 +382,13 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
         marks = tuple((speed, len(outcomes), sum(outcomes)) for speed, outcomes in sorted(counts.items()))
         directions.append(
             ChartDirection(
-                winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.is_beyond_search, marks
+                winds.from_deg(number),
+                boundary.estimate,
+                boundary.low,
+                boundary.high,
+                boundary.is_beyond_search,
+                marks,
+                is_judged=not reasons[number],
             )
         )
     return directions

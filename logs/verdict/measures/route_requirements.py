@@ -27,7 +27,7 @@ from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.places import Place
-from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, SPEED_TOLERANCE_MPS, U_TURN_RAD
+from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, POSSIBLE_BANK_RAD, SPEED_TOLERANCE_MPS, U_TURN_RAD
 from world.airspace.inclusions import unite_inclusions
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
@@ -323,6 +323,8 @@ class RouteRequirements:
     climb, dive: (w - 1,) rad over the ground, the minimum along the leg; inf if the envelope is omitted.
     certain_climb, certain_dive: (w - 1,) the certain part of these limits if the aircraft model is uncertain.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
+    possible_bank: largest bank limit that the aircraft may have, rad; the setup's bank limit unless it is a guess.
+    possible_turn_limit, possible_min_radius: (w,) as `turn_limit` and `min_radius`, with this bank limit.
     envelope: True if the aircraft's limits apply; otherwise only the ability shown by the flight applies.
     airspace: the zones of scenario and mission.
     surveys: surveys of a user's mission, if the scenario judges surveys by their lines.
@@ -352,6 +354,9 @@ class RouteRequirements:
     dive: Floats
     certain_climb: Floats
     certain_dive: Floats
+    possible_bank: float
+    possible_turn_limit: Floats
+    possible_min_radius: Floats
     ground_speed: Floats
     path: PlannedPath
     envelope: bool
@@ -434,6 +439,10 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     certain_climb, certain_dive = climb, dive
     if certain_limits.envelope is not limits.envelope:
         certain_climb, certain_dive, _ = _leg_limits(route, performance_tables(route, certain_limits), points, courses)
+    possible_turns, possible_bank = turns, _possible_bank(setup)
+    if possible_bank > limits.max_bank:
+        possible_limits = replace(limits, max_bank=possible_bank)
+        possible_turns = turn_requirements(route, performance_tables(route, possible_limits))
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
     return RouteRequirements(
@@ -456,12 +465,24 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         dive=dive,
         certain_climb=certain_climb,
         certain_dive=certain_dive,
+        possible_bank=possible_bank,
+        possible_turn_limit=possible_turns.limit if envelope else np.full(len(points), math.inf),
+        possible_min_radius=possible_turns.min_radius,
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,
         airspace=judged_airspace(setup),
         surveys=judged_surveys(setup),
     )
+
+
+def _possible_bank(setup: FlightSetup) -> float:
+    """Return the largest bank limit that may apply in a flight, rad: the setup's unless the aircraft's is a guess."""
+    envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
+    if not envelope.bank_guessed or setup.max_bank < envelope.max_bank:
+        return setup.max_bank
+    other_limit = math.inf if stated_bank is None else math.radians(stated_bank)
+    return min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
 
 
 # The setups whose surveys were searched last, with these surveys: several parts of one verdict need them.
@@ -614,9 +635,21 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 
     The dive limit applies to a descending leg, the climb limit to every other leg.
     """
-    is_rising = requirements.slopes[leg] >= 0.0
-    scenario_limit = requirements.limits.max_climb if is_rising else requirements.limits.max_dive
-    aircraft_limit = float((requirements.climb if is_rising else requirements.dive)[leg])
+    return _tighter_slope_limit(requirements, leg, is_climb=bool(requirements.slopes[leg] >= 0.0))
+
+
+def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
+    """Return the tighter limits on climb and dive along a leg's course, rad, positive."""
+    return (
+        _tighter_slope_limit(requirements, leg, is_climb=True)[0],
+        _tighter_slope_limit(requirements, leg, is_climb=False)[0],
+    )
+
+
+def _tighter_slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
+    """Return the tighter limit of scenario and aircraft on a climb or a dive, rad, positive, and its source."""
+    scenario_limit = requirements.limits.max_climb if is_climb else requirements.limits.max_dive
+    aircraft_limit = float((requirements.climb if is_climb else requirements.dive)[leg])
     if scenario_limit is not None and scenario_limit <= aircraft_limit:
         return scenario_limit, "scenario"
     return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
