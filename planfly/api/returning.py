@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 class RemedyTrial:
     """A remedy, and the outcome of the returns after the remedy.
 
-    The returns are flown by the simulated ArduPlane, those closest to a limit also in JSBSim.
+    The returns are flown by the simulated autopilot, those closest to a limit also in JSBSim.
     """
 
     remedy: Remedy
@@ -139,7 +139,7 @@ class ReturnsResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        notes = ["by the simulated ArduPlane flying a point-mass model, in the mean wind"]
+        notes = [f"by the simulated {self.returns.autopilot} flying a point-mass model, in the mean wind"]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             reflown_text = count_text(len(self.returns.jsbsim_differences), "return")

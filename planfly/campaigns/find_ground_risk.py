@@ -19,8 +19,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT
+from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
@@ -195,7 +194,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
         return none
     targets = [world.target(row) for row in starts.rows]
     _, paths = simulate_returns(world, starts, targets, store_paths=True)
-    radius = abs(ArduPlane(world.parameters).returns.rules.radius)
+    radius = abs(world.autopilot.returns.rules.radius)
     positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
@@ -422,7 +421,7 @@ def _best_glide_ratio(base: CampaignBase) -> float:
 
     Raises FlightError for a model without trims with the throttle closed.
     """
-    from flight.autopilots.arduplane.point_mass import make_point_mass
+    from flight.autopilots.point_mass import make_point_mass
 
     aircraft, setup = base.airframe.aircraft, base.nominal_setup()
     model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())

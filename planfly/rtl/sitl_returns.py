@@ -11,16 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.rtl_point_mass import (
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.catalog import program_class_for
+from flight.autopilots.simulated_returns import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
     RETURN_OFF_TERRAIN,
     RETURN_RESULT,
     RETURN_TIMEOUT,
 )
-from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.catalog import program_class_for
 from flight.mission.return_path import ReturnTarget
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import (
@@ -355,7 +354,7 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
 
 def _other_targets(world: ReturnWorld, simulated_target: ReturnTarget) -> Iterator[ReturnTarget]:
     """Yield home and all rally points, except the target of the simulated ArduPlane."""
-    home_altitude = ArduPlane(world.parameters).returns.rules.height + world.home.up
+    home_altitude = world.autopilot.returns.rules.height + world.home.up
     positions = [
         ("home", (world.home.east, world.home.north, home_altitude)),
         *(

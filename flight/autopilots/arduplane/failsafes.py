@@ -4,48 +4,8 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
 """
 
-from typing import Literal, NamedTuple
-
 from flight.autopilots.arduplane.parameters import OTHER_BATTERY_MONITORS, ArduPilotParameters
-from flight.autopilots.parts import BatteryFailsafe
-
-# Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or RTL
-# without that mode; "on": continue the mission; "landed": none, because the aircraft is on the ground; "never": none,
-# because nothing can trigger the cause; the other reactions do not lead home.
-FailsafeAction = Literal[
-    "return",
-    "land",
-    "autoland",
-    "on",
-    "circle",
-    "glide",
-    "parachute",
-    "terminate",
-    "level",
-    "guided",
-    "landed",
-    "never",
-]
-
-
-class Cause(NamedTuple):
-    """An event that can end the mission, and ArduPlane's reaction.
-
-    name: name of the event in messages.
-    action: ArduPlane's reaction.
-    parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
-    """
-
-    name: str
-    action: FailsafeAction
-    parameter: str = ""
-    value: int = 0
-
-    @property
-    def is_return(self) -> bool:
-        """True if the reaction is an RTL; a landing is not an RTL."""
-        return self.action == "return"
-
+from flight.autopilots.parts import BatteryFailsafe, Cause, FailsafeAction
 
 _LONG_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
 # FBWA without a pilot: wings level, nose level, throttle at its minimum.

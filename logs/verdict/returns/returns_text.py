@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from flight.autopilots.arduplane.failsafes import Cause
+from flight.autopilots.parts import Cause
 from flight.mission.return_path import ReturnPoint
 from logs.verdict.returns.judge_returns import (
     KINDS,
@@ -13,7 +13,6 @@ from logs.verdict.returns.judge_returns import (
     ReturnRange,
     Returns,
     SimulatedReturn,
-    UnjudgedPart,
 )
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
@@ -69,8 +68,10 @@ _ACTION_TEXTS = {
     "guided": "circles at the fence's return point",
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
+    "land here": "lands where it is",
+    "disarm": "stops its motor, which ends its flight",
 }
-_UNJUDGED_PART_TEXTS: dict[UnjudgedPart, str] = {
+_UNJUDGED_PART_TEXTS = {
     "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return is used instead",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
@@ -131,7 +132,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
-    reasons = "; ".join(_UNJUDGED_PART_TEXTS[reason] for reason in returns.unjudged_parts)
+    reasons = "; ".join(_UNJUDGED_PART_TEXTS.get(reason, reason) for reason in returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no position to return from"
     landing_suffix = "; the landing is not judged" if returns.lands else ""
@@ -218,7 +219,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     for heading, is_landing in (("it lands", True), ("it does not", False)):
         other_causes: dict[str, list[str]] = {}
         for cause in causes:
-            if not cause.is_return and (cause.action in ("land", "autoland")) == is_landing:
+            if not cause.is_return and (cause.action in ("land", "autoland", "land here")) == is_landing:
                 other_causes.setdefault(_ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
         text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
         lines += [f"{heading}: {'; '.join(text)}"] if text else []
@@ -228,13 +229,13 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 def describe_landing(returns: Returns) -> list[str]:
     """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
 
-    Return [] for an autopilot other than ArduPlane.
+    For an autopilot other than ArduPlane, return its sentence on the path of an RTL.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return keeps circling at its target']
     """
     if returns.autoland is None:
-        return []
+        return [returns.path_text] if returns.path_text else []
     loiter_text = "a return keeps circling at its target"
     items_text = (
         f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(landing.item) for landing in returns.landings)}"

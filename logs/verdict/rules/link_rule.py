@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from flight.autopilots.arduplane.failsafes import Cause
+from flight.autopilots.parts import Cause
 from logs.verdict.findings import Fact, Finding, make_finding, message
 from logs.verdict.measures.link_outages import LinkAlongPath, Outage, link_along_path, station_antenna
 from logs.verdict.measures.route_requirements import RouteRequirements
