@@ -283,10 +283,12 @@ class ReturnTrials(NamedTuple):
 
     altitudes: groups of parameters that are set to the same height, m.
     others: values by name, tried without and with such a height.
+    text: names of all of them, in messages.
     """
 
     altitudes: tuple[tuple[str, ...], ...] = ()
     others: tuple[Mapping[str, float], ...] = ()
+    text: str = ""
 
 
 NO_TRIALS = ReturnTrials()

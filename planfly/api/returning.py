@@ -35,7 +35,12 @@ from planfly.flight_options import LogOptions, select_log_options, select_missio
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.rtl.return_summary import return_starts
-from planfly.rtl.sitl_returns import ProgramReturns, check_is_arduplane, fly_by_program
+from planfly.rtl.sitl_returns import (
+    ProgramReturns,
+    check_is_arduplane,
+    check_returns_as_arduplane,
+    fly_by_program,
+)
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import airframe_for_setup
@@ -276,7 +281,9 @@ def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest)
 
 def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResult:
     """Fly a mission, and judge the returns of its flight."""
-    make_return_world(setup)  # Raises errors before the flight.
+    world = make_return_world(setup)  # Raises errors before the flight.
+    if request.program is not None:
+        check_returns_as_arduplane(world, request.program)
     with stage("flying the mission"):
         flight = fly_and_judge(setup, airframe_for_setup(setup), None, reference="never")
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
@@ -285,6 +292,8 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
     """Simulate and judge returns from points of a flight, with glides and requested remedies and files."""
     world = make_return_world(setup)
+    if request.program is not None:
+        check_returns_as_arduplane(world, request.program)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {count_text(len(starts), 'return')}", "flying returns"):
         judged_returns = judge_returns(world, starts, request.every, fly_return)

@@ -25,7 +25,7 @@ from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.returns.glide_map import glide_slopes
 from logs.verdict.returns.judge_glides import fly_without_engine
-from logs.verdict.returns.judge_returns import make_return_world, simulate_returns
+from logs.verdict.returns.judge_returns import make_return_world, simulate_returns, without_engine_world
 from logs.verdict.returns.return_starts import flown_starts
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import draw_flight
@@ -198,7 +198,9 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
-        gliding = fly_without_engine(world, starts, targets, store_paths=True)
+        gliding_world = without_engine_world(world)
+        gliding_targets = [gliding_world.target(row) for row in starts.rows]
+        gliding = fly_without_engine(gliding_world, starts, gliding_targets, store_paths=True)
         glides = [
             one
             for one, result in zip(gliding.tracks, gliding.results, strict=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.catalog import program_class_for
 from flight.autopilots.simulated_returns import (
@@ -157,6 +158,13 @@ def check_is_arduplane(program: Path) -> None:
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
+
+
+def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
+    """Raise ArgumentError if the simulated returns are not those of ArduPlane, which its program could not check."""
+    if not isinstance(world.autopilot, ArduPlane):
+        allowed = f"ArduPlane's program does not fly the returns of {world.autopilot.title}"
+        raise ArgumentError.of_argument("sitl", str(program), allowed)
 
 
 def choose_worst_returns(

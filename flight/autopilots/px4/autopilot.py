@@ -15,6 +15,7 @@ from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
+    Cause,
     ControlLaw,
     Deviations,
     FeasibilityLimits,
@@ -399,13 +400,14 @@ class Px4(Autopilot):
             self._return_rules,
             _rtl_parameters,
             fly=self._fly_returns,
-            causes=lambda mission: failsafe_causes(self.parameters, has_fence=mission.has_fence),
+            causes=self._failsafe_causes,
             unsimulated_text=self._unsimulated_returns,
             unjudged_texts=self._unjudged_returns,
             path_text=self._return_path_text,
             trials=ReturnTrials(
                 (("RTL_RETURN_ALT",), ("RTL_RETURN_ALT", "RTL_DESCEND_ALT")),
                 tuple({"RTL_TYPE": value} for value in sorted(other_types)),
+                "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
             ),
         )
 
@@ -435,6 +437,10 @@ class Px4(Autopilot):
             store_positions=store_positions,
             abort_limits=abort_limits,
         )
+
+    def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
+        """Return the events that can end a mission, with PX4's reaction to each."""
+        return failsafe_causes(self.parameters, has_fence=mission.has_fence)
 
     def _unsimulated_returns(self, mission: ReturnMission) -> str:
         """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated."""

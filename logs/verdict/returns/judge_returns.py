@@ -186,6 +186,7 @@ class Returns:
     autoland_assumed: True if this value is assumed, because ArduPlane does not arm with 0.
     autopilot: title of the autopilot whose return is simulated.
     path_text: its sentence on the path of its returns; "" if there is nothing to say.
+    trials_text: its parameters that may make its returns safe, in messages.
     landings: the mission's landing sequences.
     omitted_count: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing
         that it sinks to the ground before it can return.
@@ -205,6 +206,7 @@ class Returns:
     autoland_assumed: bool = False
     autopilot: str = ArduPlane.title
     path_text: str = ""
+    trials_text: str = ""
     landings: tuple[LandingStart, ...] = ()
     omitted_count: int = 0
 
@@ -568,6 +570,7 @@ def judge_returns(
         autoland_assumed=parameters is not None and "RTL_AUTOLAND" in parameters.by_origin("assumed"),
         autopilot=world.autopilot.title,
         path_text=world.autopilot.returns.path_text,
+        trials_text=world.autopilot.returns.trials.text,
         landings=world.landings,
         omitted_count=omitted_count,
     )

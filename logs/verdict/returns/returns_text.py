@@ -80,6 +80,15 @@ _UNJUDGED_PART_TEXTS = {
 }
 
 
+def unjudged_parts_text(parts: Sequence[str]) -> str:
+    """Describe the parts of returns that are not judged; "" if all are.
+
+    >>> unjudged_parts_text(("autoland", "RTL_LAND_DELAY 0 lands after the return, which is not simulated"))
+    'mode AUTOLAND lands by a pattern of its own; RTL_LAND_DELAY 0 lands after the return, which is not simulated'
+    """
+    return "; ".join(_UNJUDGED_PART_TEXTS.get(part, part) for part in parts)
+
+
 def segment_text(kind: Kind) -> str:
     """Return the legend text of a path segment: the outcome of returns that start on it.
 
@@ -132,7 +141,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
-    reasons = "; ".join(_UNJUDGED_PART_TEXTS.get(reason, reason) for reason in returns.unjudged_parts)
+    reasons = unjudged_parts_text(returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no position to return from"
     landing_suffix = "; the landing is not judged" if returns.lands else ""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.simulated_returns import RETURN_ARRIVED
-from flight.mission.return_path import ReturnPoint, ReturnTarget
+from flight.mission.return_path import ReturnPoint, ReturnTarget, rally_target
 from logs.verdict.returns.judge_returns import (
     KINDS,
     TURN_HEIGHT_LOSS_M,
@@ -363,6 +363,8 @@ def _rally_candidates(
             break
         spacing *= 1.2
     candidates = []
+    # PX4 ends its return above a rally point, which is a place on the ground; ArduPlane at the point itself.
+    end_height = world.autopilot.returns.rules.rally_height
     for grid_east, grid_north in grid.tolist():
         min_altitude = _highest_ground(world, grid_east, grid_north) + world.limit + MARGIN
         for altitude in (min_altitude, min_altitude + 200.0):
@@ -370,9 +372,18 @@ def _rally_candidates(
                 math.isfinite(altitude)
                 and _sphere_clearance(world, (grid_east, grid_north, altitude)) > _LOITER_RADIUS_M + MARGIN
             ):
-                height = math.ceil(altitude - world.home.up)
+                point_altitude = altitude
+                if end_height > 0.0:
+                    point_altitude = max(_ground_altitude(world, grid_east, grid_north), altitude - end_height)
+                height = math.ceil(point_altitude - world.home.up)
                 candidates.append(ReturnPoint(grid_east, grid_north, world.home.up + height, world.home.up))
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
+
+
+def _ground_altitude(world: ReturnWorld, east: float, north: float) -> float:
+    """Return the altitude of the ground at a point, or home's altitude without terrain, m AMSL."""
+    terrain = world.scenario.terrain
+    return world.home.up if terrain is None else float(terrain.height(east, north))
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
@@ -418,7 +429,12 @@ class _RallySearch:
         self._distances = np.hypot(
             rows["east"][:, None] - positions[None, :, 0], rows["north"][:, None] - positions[None, :, 1]
         )
-        self._home_distances = np.hypot(rows["east"] - world.home.east, rows["north"] - world.home.north)
+        # Without rally points the return goes home, or to the mission's landing, which competes with them.
+        other_targets = [world.with_rally(()).target(row) for row in rows]
+        includes_home = world.autopilot.returns.rules.includes_home
+        self._other_distances = np.array(
+            [target.distance if includes_home or target.straight else math.inf for target in other_targets]
+        )
         limit = world.autopilot.returns.rules.rally_limit
         self._max_rally_distance = limit if limit > 0.0 else math.inf
         self._is_good = np.zeros(self._distances.shape, dtype=np.bool_)
@@ -461,9 +477,12 @@ class _RallySearch:
         if not pairs:
             return
         start_indices, candidate_indices = (np.array(column) for column in zip(*pairs, strict=True))
-        candidate_places = (self.candidates[candidate] for candidate in candidate_indices.tolist())
+        rules, rows = self._world.autopilot.returns.rules, self._starts.rows
         targets = [
-            self._world.with_landing(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in candidate_places
+            self._world.with_landing(
+                rally_target(rules, (row["east"], row["north"], row["up"]), self.candidates[candidate])
+            )
+            for row, candidate in zip(rows[start_indices], candidate_indices.tolist(), strict=True)
         ]
         starts, limits = self._starts.subset(start_indices), self._limits.subset(start_indices)
         self._is_good[start_indices, candidate_indices] = _meets_criterion(
@@ -478,8 +497,7 @@ class _RallySearch:
         nearest_indices = np.argmin(distances, axis=1)
         min_distances = distances[np.arange(len(searched_starts)), nearest_indices]
         goes_home = min_distances > self._max_rally_distance
-        if self._world.autopilot.returns.rules.includes_home:
-            goes_home |= self._home_distances[searched_starts] <= min_distances
+        goes_home |= self._other_distances[searched_starts] <= min_distances
         is_good = np.where(
             goes_home,
             self._is_good_from_home[searched_starts],

@@ -22,7 +22,7 @@ from logs.verdict.tolerances import LINK_LOSS_REACTION_S
 from world.errors import MissionError
 from world.radio import LinkUse, RadioLink
 
-# Causes in `flight.autopilots.arduplane.failsafes.failsafe_causes` that the loss of a link triggers.
+# Causes (`ReturnBehaviour.causes` of an autopilot) that the loss of a link triggers.
 _LOSS_CAUSES: dict[LinkUse, tuple[str, ...]] = {
     "telemetry": ("station lost",),
     "control": ("RC lost for 1.5 s", "RC lost"),
@@ -76,9 +76,9 @@ def _link_text(link_on_path: LinkAlongPath) -> str:
 
 
 def _loss_reaction(requirements: RouteRequirements, link: RadioLink) -> Cause | None:
-    """Return the failsafe by which ArduPlane leaves its mission when this link is lost.
+    """Return the failsafe by which the autopilot leaves its mission when this link is lost.
 
-    Return None if ArduPlane continues its mission, or if its reaction is unknown.
+    Return None if the autopilot continues its mission, or if its reaction is unknown.
     """
     world = _make_return_world(requirements)
     causes = () if world is None else world.causes
