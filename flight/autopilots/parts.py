@@ -281,12 +281,13 @@ class FlyReturns(Protocol):
 class ReturnTrials(NamedTuple):
     """Changes of parameters that may make an autopilot's RTLs safe, in the order in which they are tried.
 
-    altitudes: groups of parameters that are set to the same height, m.
+    altitudes: groups of parameters that are set to the same height, m, with their present values, which they keep if
+        these are greater; the heights that are tried begin at the first one's present value.
     others: values by name, tried without and with such a height.
     text: names of all of them, in messages.
     """
 
-    altitudes: tuple[tuple[str, ...], ...] = ()
+    altitudes: tuple[Mapping[str, float], ...] = ()
     others: tuple[Mapping[str, float], ...] = ()
     text: str = ""
 

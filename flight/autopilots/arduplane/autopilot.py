@@ -355,7 +355,8 @@ class ArduPlane(Autopilot):
         """Heights of RTL_ALTITUDE, and climbs before the turn by RTL_CLIMB_MIN or FLIGHT_OPTIONS."""
         options = float(int(self.parameters.flight_options) | CLIMB_BEFORE_TURN)
         climbs = [{"RTL_CLIMB_MIN": climb} for climb in _TRIED_CLIMBS_M]
-        return ReturnTrials((("RTL_ALTITUDE",),), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb")
+        altitude = {"RTL_ALTITUDE": max(0.0, self.parameters.rtl_altitude)}
+        return ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb")
 
     def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
         """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX that a scenario's RTL settings require.

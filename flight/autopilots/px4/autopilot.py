@@ -395,7 +395,6 @@ class Px4(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
-        other_types = {0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]}
         return ReturnBehaviour(
             self._return_rules,
             _rtl_parameters,
@@ -404,11 +403,18 @@ class Px4(Autopilot):
             unsimulated_text=self._unsimulated_returns,
             unjudged_texts=self._unjudged_returns,
             path_text=self._return_path_text,
-            trials=ReturnTrials(
-                (("RTL_RETURN_ALT",), ("RTL_RETURN_ALT", "RTL_DESCEND_ALT")),
-                tuple({"RTL_TYPE": value} for value in sorted(other_types)),
-                "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
-            ),
+            trials=self._return_trials,
+        )
+
+    @property
+    def _return_trials(self) -> ReturnTrials:
+        """Heights of RTL_RETURN_ALT, then of RTL_DESCEND_ALT, and the values of RTL_TYPE that are simulated."""
+        first, last = ({name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
+        other_types = sorted({0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]})
+        return ReturnTrials(
+            (first, last | first),
+            tuple({"RTL_TYPE": value} for value in other_types),
+            "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
         )
 
     def _fly_returns(

@@ -328,13 +328,6 @@ class ReturnWorld:
         return "" if limits is None else limits.min_name
 
     @property
-    def return_height(self) -> float:
-        """Height above its destination at which a return flies or to which it descends, m; at least 0."""
-        rules = self.autopilot.returns.rules
-        height = rules.transit_height if rules.holds_height else rules.height
-        return 0.0 if math.isnan(height) else max(0.0, height)
-
-    @property
     def fly(self) -> FlyReturns:
         """Function that simulates the autopilot's RTLs.  Raises ValueError for an autopilot without an RTL."""
         fly = self.autopilot.returns.fly

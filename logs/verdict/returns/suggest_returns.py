@@ -7,7 +7,7 @@ away from a better point.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -186,8 +186,8 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
         return []
     remedies: list[Remedy] = []
     lowest_values: dict[str, float] = {}
-    for names in world.autopilot.returns.trials.altitudes:
-        search = _AltitudeSearch(world, names)
+    for present_values in world.autopilot.returns.trials.altitudes:
+        search = _AltitudeSearch(world, present_values)
         ground_altitude = search.lowest(0.0, _clears_ground, trial)
         if ground_altitude is not None and ground_altitude > search.current:
             lowest_values = lowest_values or search.values(ground_altitude)
@@ -207,10 +207,10 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 class _AltitudeSearch:
     """Search for the lowest height of the returns above their destination, from the present height upwards."""
 
-    def __init__(self, world: ReturnWorld, names: tuple[str, ...]) -> None:
-        """Prepare the heights to try.  names: parameters that are set to the same height."""
-        self._world, self._names = world, names
-        self.current = world.return_height
+    def __init__(self, world: ReturnWorld, present_values: Mapping[str, float]) -> None:
+        """Prepare the heights to try.  present_values: as in `ReturnTrials.altitudes`."""
+        self._world, self._present_values = world, present_values
+        self.current = next(iter(present_values.values()))
         ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
         max_altitude = (
             float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
@@ -225,8 +225,8 @@ class _AltitudeSearch:
         self._candidates = [float(altitude) for altitude in altitude_grid]
 
     def values(self, altitude: float) -> dict[str, float]:
-        """Return the parameters with the same height, m, by name."""
-        return dict.fromkeys(self._names, altitude)
+        """Return the parameters that a height (m) changes, by name."""
+        return {name: altitude for name, present in self._present_values.items() if altitude > present}
 
     def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
         """Return the lowest height, at least ``min_altitude``, with which all returns pass, or None."""
