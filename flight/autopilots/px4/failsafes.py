@@ -16,6 +16,7 @@ _LINK_LOSS: dict[int, FailsafeAction] = {
     3: "land here",
     5: "terminate",
     6: "disarm",
+    7: "circle",
 }
 # Reactions by the value of GF_ACTION.
 _FENCE: dict[int, FailsafeAction] = {0: "on", 1: "on", 2: "circle", 3: "return", 4: "terminate", 5: "land here"}
