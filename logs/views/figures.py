@@ -243,9 +243,11 @@ FIGURES = (
         "The worst returns",
         _returns_view("worst-returns"),
         alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
-        caption=_fixed_caption(
-            "Simulated with the ArduPlane model on a point mass, in the mean wind, from the "
-            "point where each return begins."
+        caption=lambda subject: (
+            ""
+            if subject.returns is None
+            else f"Simulated with the {subject.returns.returns.autopilot} model on a point"
+            " mass, in the mean wind, from the point where each return begins."
         ),
     ),
     FigureEntry(

@@ -7,6 +7,7 @@ import numpy as np
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.wording import place_text
 from planfly.campaigns.find_battery import MIN_MASS_FACTOR, BatteryResult
+from planfly.rtl.return_summary import return_law_lines
 
 # Number of parts that decide the battery, and of legs, in the lines.
 _MAX_LISTED = 3
@@ -15,7 +16,8 @@ _MAX_LISTED = 3
 def answer_line(result: BatteryResult) -> str:
     """Return the smallest battery in one line."""
     goal = result.goal
-    keeps_text = f"{goal.reserve:.0%} in the mission and in every return with probability {goal.probability:g}"
+    where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
+    keeps_text = f"{goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
     if math.isinf(result.capacity):
         return (
             f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg its own mass needs too much of the"
@@ -76,14 +78,15 @@ def battery_lines(result: BatteryResult) -> list[str]:
         f"{len(result.rows)} flights, {len(result.rows) - total} of them without completing the mission;"
         f" a return every {result.goal.interval:g} s, up to its loiter: the reserve has to cover loiter and landing"
     )
-    return lines
+    return [*lines, *return_law_lines(result.base.nominal_setup())]
 
 
 def _own_battery_line(result: BatteryResult) -> str:
     """Compare the aircraft's own battery with the smallest battery."""
     if result.is_guessed:
         return "the aircraft does not state its battery, so it is not compared: state battery_wh in the scenario"
-    verdict = {True: "is enough", False: "is too small", None: "may be enough, more flights would show it"}
+    unknown_text = "may be enough, more flights would show it" if result.has_returns else "may not cover the returns"
+    verdict = {True: "is enough", False: "is too small", None: unknown_text}
     low, high = result.own_probability
     return (
         f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve in"

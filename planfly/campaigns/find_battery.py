@@ -190,6 +190,7 @@ class BatteryResult:
     mass_factor: mass of the aircraft with the found battery, relative to its stated mass.
     mass: stated mass, kg.
     volts: nominal voltage of the battery, V; 0 if unknown.
+    has_returns: False if the autopilot's returns are not simulated, so that the battery covers only the mission.
     """
 
     goal: BatteryGoal
@@ -203,6 +204,7 @@ class BatteryResult:
     mass_factor: float
     mass: float
     volts: float
+    has_returns: bool = True
 
     def __repr__(self) -> str:
         return f"<BatteryResult {self.base.name}: {self.capacity:.0f} Wh>"
@@ -224,7 +226,7 @@ class BatteryResult:
     @property
     def is_enough(self) -> bool | None:
         """True if the aircraft's own battery keeps the reserve with the probability; None if it is not known."""
-        if self.is_guessed or math.isnan(self.capacity):
+        if self.is_guessed or math.isnan(self.capacity) or not self.has_returns:
             return None
         if self.own_probability.low >= self.goal.probability:
             return True
@@ -276,7 +278,8 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
             capacity, interval = quantile_of_capacities(rows, goal)
             if not math.isfinite(capacity) or abs(capacity - assumed) <= _CAPACITY_TOLERANCE * assumed:
                 break
-    envelope = base.nominal_setup().envelope
+    setup = base.nominal_setup()
+    envelope = setup.envelope
     return BatteryResult(
         goal=goal,
         base=base,
@@ -289,6 +292,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
         mass_factor=mass_factor,
         mass=aircraft.mass,
         volts=envelope.volts or 0.0,
+        has_returns=setup.mission.home is None or make_return_world(setup).is_simulated,
     )
 
 

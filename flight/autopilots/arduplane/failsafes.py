@@ -5,31 +5,10 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 """
 
 import math
-from typing import NamedTuple
 
 from flight.autopilots.arduplane.parameters import OTHER_BATTERY_MONITORS, ArduPilotParameters
-from flight.autopilots.parts import BatteryFailsafe, FailsafeAction, LinkLossReaction
+from flight.autopilots.parts import BatteryFailsafe, Cause, FailsafeAction, LinkLossReaction
 from world.scenario_tables import LinkUse
-
-
-class Cause(NamedTuple):
-    """An event that can end the mission, and ArduPlane's reaction.
-
-    name: name of the event in messages.
-    action: ArduPlane's reaction.
-    parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
-    """
-
-    name: str
-    action: FailsafeAction
-    parameter: str = ""
-    value: int = 0
-
-    @property
-    def is_return(self) -> bool:
-        """True if the reaction is an RTL; a landing is not an RTL."""
-        return self.action == "return"
-
 
 _LONG_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
 # FBWA without a pilot: wings level, nose level, throttle at its minimum.
