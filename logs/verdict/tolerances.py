@@ -27,6 +27,9 @@ HOME_ERROR_M = 50.0
 HEIGHT_TOLERANCE_M = 0.1
 # m.  A loiter's radius may be this much smaller than the radius at the bank limit: 1e-7 degrees at its center.
 LOITER_RADIUS_TOLERANCE_M = 0.02
+# Laps.  A loiter by an autopilot that steers to its center may be flown by this much less than drawn, because the
+# aircraft joins and leaves the circle on other courses; half a lap is the difference of joining on the other side.
+LOITER_LAPS_TOLERANCE = 0.5
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25

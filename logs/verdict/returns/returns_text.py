@@ -9,6 +9,8 @@ from logs.verdict.returns.judge_returns import (
     KINDS,
     POINT_MASS_ERROR_M,
     POINT_MASS_POSITION_ERROR_M,
+    UNJUDGED,
+    UNSAFE,
     Kind,
     ReturnRange,
     Returns,
@@ -273,7 +275,7 @@ def describe_landing(returns: Returns) -> list[str]:
 
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe a time range: destination and outcome of its returns, and its worst return."""
+    """Describe a time range: whether its returns are safe, their destination and outcome, and its worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -282,9 +284,16 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
     )
     reason = f" ({worst_return.target.reason})" if worst_return.target.reason else ""
     return (
-        f"{time_text}: to {worst_return.target.name}{reason}:"
+        f"{time_text}, {_judgement_text(worst_return)}: to {worst_return.target.name}{reason}:"
         f" {_range_outcome_text(worst_return, return_range, returns, scenario)}"
     )
+
+
+def _judgement_text(ret: SimulatedReturn) -> str:
+    """Return the judgement of a return: "safe", "unsafe", "too low" or "not judged"."""
+    if ret.kind in UNJUDGED:
+        return "not judged"
+    return "safe" if ret.safe else "unsafe" if ret.kind in UNSAFE else "too low"
 
 
 def _range_outcome_text(

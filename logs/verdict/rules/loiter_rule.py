@@ -30,6 +30,7 @@ from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_stating_bank
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
+    LOITER_LAPS_TOLERANCE,
     LOITER_RADIUS_TOLERANCE_M,
     LOITER_SWING_RADII,
     LOITER_WIDENING_FRACTION,
@@ -38,10 +39,6 @@ from logs.verdict.tolerances import (
 from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.geometry import tangent_length
-
-# Part of a lap by which a whole loiter may be shorter than drawn, because the aircraft joins and leaves its circle on
-# other courses.
-_LAPS_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,7 +342,7 @@ def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, cir
     seq = int(requirements.setup.route.items[circle.first])
     loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     is_to_altitude, laps = loiter is not None and loiter.to_altitude, _flown_laps(requirements, aligned, circle)
-    return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - _LAPS_TOLERANCE)
+    return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
@@ -443,6 +440,7 @@ RULE = Rule(
     name="loiter",
     tolerances=(
         "LOITER_RADIUS_TOLERANCE_M",
+        "LOITER_LAPS_TOLERANCE",
         "WAYPOINT_PASS_MARGIN_M",
         "BANK_TOLERANCE_RAD",
         "POSSIBLE_BANK_RAD",

@@ -354,7 +354,7 @@ RULE = Rule(
             "MIN_PHOTO_HEIGHT_ERROR_M",
             "MAX_PHOTO_COURSE_ERROR_RAD",
         ),
-        *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII"),
+        *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII", "CLEARANCE_TOLERANCE_M"),
     ),
     judge=survey_findings,
     log=LogNeeds(("attitude",), needs_planned_heights=True, needs_full_leg=True),

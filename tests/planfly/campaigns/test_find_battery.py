@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import planfly
+from flight.mission_files.formats import mission_text
 from planfly.campaigns.battery_text import answer_line, battery_lines
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
@@ -21,7 +22,8 @@ from planfly.campaigns.find_battery import (
     quantile_of_capacities,
 )
 from planfly.campaigns.worker_pool import Workers
-from tests.logs.verdict.returns.hill import SCENARIO, mission_text
+from tests.logs.verdict.returns import hill
+from tests.mission_lines import mission, wp
 
 _DRAW = draw_flight(default_dispersions(), 1, 0)
 
@@ -142,8 +144,8 @@ def test_a_flight_uses_what_its_track_says(base: CampaignBase) -> None:
 
 def px4_base(folder: Path, stated: str) -> CampaignBase:
     """Open a mission behind the hill for PX4, which returns over it."""
-    (folder / "hill.toml").write_text(SCENARIO, encoding="utf-8")
-    (folder / "behind.waypoints").write_text(mission_text(5000.0, 6500.0, amsl=200.0), encoding="utf-8")
+    (folder / "hill.toml").write_text(hill.SCENARIO, encoding="utf-8")
+    (folder / "behind.waypoints").write_text(hill.mission_text(5000.0, 6500.0, amsl=200.0), encoding="utf-8")
     (folder / "mine.params").write_text(f"# Stack: PX4 Pro\n{stated}\n", encoding="utf-8")
     options = {"seed": 1, "scenario": str(folder / "hill.toml"), "params": str(folder / "mine.params")}
     return open_campaign(str(folder / "behind.waypoints"), default_dispersions(), options)  # type: ignore[arg-type]
@@ -173,6 +175,26 @@ def test_a_battery_without_simulated_returns_is_not_compared(tmp_path: Path) -> 
     )
     found = find_battery(base, BatteryGoal(flights=2, interval=60.0), Workers(1), lambda *_: None)
     assert not found.has_returns
+
+
+def test_the_legs_around_a_loiter_are_one_in_the_energies_and_in_the_lines(tmp_path: Path) -> None:
+    """A loiter of two laps between two legs has many corners: people count a leg to it and one from it."""
+    file = tmp_path / "loiter.waypoints"
+    lines = (wp(0, 500), wp(0, 2500, command=18, p="2 0 200 0"), wp(2500, 2500))
+    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    base = open_campaign(str(file), default_dispersions(), {"seed": 1})
+    assert base.nominal_setup().route.legs > 4
+    row = fly_for_energy(base, 0, interval=10.0, mass_factor=1.0)
+    assert row.ended == "completed"
+    assert len(row.leg_energies) == 2
+    assert sum(row.leg_energies) == pytest.approx(row.mission_energy, rel=1e-3)
+    assert row.return_leg in (0, 1)
+    # Two returns from different corners of the loiter decide at one place, which has one line.
+    rows = [replace(row, return_energy=2.0 * row.mission_energy, return_leg=0, return_time=30.0 + k) for k in range(2)]
+    lines_on_it = [line for line in battery_lines(battery_result(base, rows, own=888.0)) if "the return that" in line]
+    assert lines_on_it == [
+        "decided by the return that starts at 30 s (leg 0, to item 2): in 2 of 2 flights",
+    ]
 
 
 def test_a_found_battery_keeps_the_reserve_in_other_flights(base: CampaignBase) -> None:

@@ -156,21 +156,6 @@ def test_a_track_that_leaves_the_terrain_is_judged_up_to_there() -> None:
     assert of(judge(linked(setup), leaving), "link").ok is False
 
 
-def test_a_lost_station_lets_px4_return_by_its_own_parameters() -> None:
-    """NAV_DLL_ACT 2 returns at RTL_RETURN_ALT or the height of the flight, 300 m; 0, PX4's default, does nothing."""
-    setup = linked(make_setup(WAY), max_outage_s=600.0)
-    mission = replace(setup.mission, home=Home(46.0, 8.0, 0.0))
-    for action, ok, said in (
-        (2.0, False, "; PX4 then returns (NAV_DLL_ACT 2): all "),
-        (3.0, False, "; PX4 then leaves the mission (NAV_DLL_ACT 3)"),
-        (0.0, True, "; PX4 continues its mission without the link"),
-    ):
-        px4 = Px4(Px4Parameters.defaults().changed(NAV_DLL_ACT=action, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=30.0))
-        finding = of(judge_geometry(replace(setup, mission=mission, autopilot=px4)), "link")
-        assert finding.ok is ok
-        assert said in finding.reason
-
-
 def test_a_station_without_a_position_is_at_home() -> None:
     setup = make_setup(WAY)
     link = make_link(LinkTable(**FOUR_KILOMETRES), "mine.toml", GeoOrigin(46.0, 8.0), None)
@@ -226,7 +211,7 @@ def test_a_station_without_a_position_is_at_home() -> None:
             10.0,
             [
                 "PX4 circles where it is after 10 s (COM_FAIL_ACT_T 5), then returns after 15 s (NAV_DLL_ACT 2): ",
-                "not judged in full (the autopilot's own return is not simulated; ArduPlane's return is used instead)",
+                "returns are safe: never lower than",
             ],
         ),
         (
