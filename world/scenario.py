@@ -157,6 +157,19 @@ class Scenario:
         )[0]
         return east + float(deviation[0]), north + float(deviation[1])
 
+    def wind_velocities(self, positions: Floats, times: Floats) -> Floats:
+        """Return the mean wind at positions and times, m/s, (n, 2) east and north.
+
+        positions: (n, 3) east, north and up, m.
+        times: (n,) s after take-off.
+        """
+        altitudes = np.ascontiguousarray(positions[:, 2], dtype=np.float64)
+        velocities = self.wind.velocities_at(altitudes)
+        if self.wind.field is None:
+            return velocities
+        latitudes, longitudes = to_geo(self.origin, positions[:, 0], positions[:, 1])
+        return velocities + self.wind.field.velocities_at(times, latitudes, longitudes, altitudes)
+
     def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
         """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).
 

@@ -17,7 +17,7 @@ from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     available_lengths,
-    performance_tables,
+    leg_performance,
     slope_limit,
     steep_arc,
     tighter_turn_limit,
@@ -283,7 +283,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
     first_point, end_point = max(0, corner - 2), min(len(requirements.points), corner + 3)
     route = requirements.route
     nearby_route = replace(route, points=route.points[first_point:end_point])
-    tables, local_corner = performance_tables(nearby_route, requirements.limits), corner - first_point
+    tables, local_corner = leg_performance(requirements.limits), corner - first_point
     for _ in range(SUGGESTION_TRIAL_COUNT):
         degrees = math.floor(10.0 * math.degrees(max_turn)) / 10.0
         if degrees <= 0.0:

@@ -231,7 +231,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     condition = f"at {speed:.0f} m/s and {altitude:.0f} m AMSL"
     if limit <= 0.0:
         return f"{condition} the aircraft cannot fly steadily on this course"
-    wind = requirements.setup.scenario.wind
+    wind = requirements.wind_on(leg)
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
