@@ -29,10 +29,9 @@ from flight.autopilots.parts import (
     SpeedRules,
     TurnRules,
 )
-from flight.autopilots.px4.failsafes import failsafe_causes
+from flight.autopilots.px4.failsafes import failsafe_causes, link_loss_reactions
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE_M
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
-from flight.autopilots.px4.link_loss import link_loss_reactions
 from flight.autopilots.px4.open_settings import describe_open_settings
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error

@@ -176,7 +176,7 @@ _WHEN_STATED = {
     "BAT_EMERGEN_THR": 0.05,
     "BAT1_CAPACITY": -1.0,
     "CBRK_FLIGHTTERM": 121212.0,
-    # Loss of a radio link (`flight.autopilots.px4.link_loss`).
+    # Loss of a radio link (`flight.autopilots.px4.failsafes`).
     **dict.fromkeys(("COM_DLL_EXCEPT", "COM_RCL_EXCEPT", "NAV_DLL_ACT"), 0.0),
     "COM_DL_LOSS_T": 10.0,
     "COM_FAIL_ACT_T": 5.0,
