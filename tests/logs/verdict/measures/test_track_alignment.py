@@ -31,7 +31,7 @@ def test_a_short_leg_within_a_turn_has_the_segment_at_which_both_of_its_waypoint
     flown = align_track(route_requirements(setup), fly_path(setup, rate=20.0))
     assert flown is not None
     last = len(flown.track) - 1
-    at = replace(flown, rows=np.array([0, 400, 400, last]))
+    at = replace(flown, rows=np.array([5, 400, 400, last - 3]))
     assert [at.leg_segments(leg) for leg in range(3)] == [(0, 400), (400, 401), (400, last)]
     # A flight that ended on leg 1 never passed its end.
     ended = replace(at, rows=np.array([0, 400, last, last]), passed=np.array([True, True, False, False]))
