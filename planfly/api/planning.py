@@ -54,7 +54,7 @@ def plan(
     waypoints: a path of your own, (w, 3): east and north of the scenario's origin and altitude AMSL, m, from the
     scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.  Margins
     of the planner that it does not meet make the plan "not feasible" and are named by the verdict, which judges only
-    the flight.
+    the flight; `Plan.margins` has them as numbers, also for a path that leaves the terrain.
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 
@@ -115,9 +115,6 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
             if not abs(value) <= MAP_EXTENT:
                 allowed = f"allowed -{MAP_EXTENT:.0f}..{MAP_EXTENT:.0f} m"
                 raise ArgumentError.of_argument(f"waypoints row {row}: {column}", value, allowed)
-        if scenario.terrain is not None and math.isnan(scenario.terrain.height(point[0], point[1])):
-            place = f"row {row}: east {point[0]:g} m, north {point[1]:g} m"
-            raise ArgumentError.of_argument("waypoints", point, "outside the terrain data", shown=place)
     for row, name, end in ((0, "start", scenario.start), (len(path) - 1, "destination", scenario.destination)):
         if (distance := math.dist(path[row], end)) > _END_TOLERANCE_M:
             place = f"row {row}: {distance:.0f} m from the scenario's {name}"

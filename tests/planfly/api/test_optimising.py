@@ -205,3 +205,29 @@ def test_before_anything_is_told_there_is_no_best() -> None:
         _ = search.best
     search.minimise(lambda points: points[:, 0] * 0.0 + 2.0, 1)
     assert repr(search) == "<Optimiser Umda: 1 variables, 100 evaluations, best 2>"
+
+
+def test_the_least_of_a_cost_of_ones_own_is_a_safe_plan() -> None:
+    """The recipe of docs/planner-and-paper.md: to pass far from a place, with samples that leave the terrain."""
+    path = planfly.plan("jacksboro-air", seed=1)
+    waves = np.sin(np.outer(np.linspace(0.0, np.pi, len(path.waypoints)), [1, 2]))
+
+    def planned(x: np.ndarray) -> planfly.Plan:
+        moved = np.array(path.waypoints)
+        # The last tenth of the box leads off the map.
+        moved[1:-1, 1] += (waves @ np.where(x > 2700.0, 60_000.0, x))[1:-1]
+        return planfly.plan(path.scenario, waypoints=moved)
+
+    def nearness(plan: planfly.Plan) -> float:
+        return float(-np.abs(plan.waypoints[5, 1] - path.waypoints[5, 1]))
+
+    search, off_terrain = planfly.optimise([-3000.0] * 2, [3000.0] * 2, population=40, seed=1), 0
+    for _ in range(12):
+        plans = [planned(x) for x in search.ask()]
+        off_terrain += sum(np.isnan(plan.certificate.clearance) for plan in plans)
+        search.tell([nearness(plan) for plan in plans], [-np.minimum(plan.margins, 0.0).sum() for plan in plans])
+    found = planned(search.best.x)
+    assert off_terrain
+    assert search.best.feasible
+    assert found.safe
+    assert search.best.value == nearness(found) < 0.0
