@@ -61,12 +61,12 @@ class FlightOptions(TypedDict, total=False):
 class MissionOptions(FlightOptions, total=False):
     """Options of the flight of a mission file or a plan, and of its world.
 
-    scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
+    scenario: a name, a TOML file or a `Scenario`; None for the plan's own, or one made around the mission.
     fence: files of fences and zones in addition to those of the mission.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     """
 
-    scenario: str | Path | None
+    scenario: Scenario | str | Path | None
     fence: Annotated[FencePaths, ()]
     seed: int | None
 

@@ -26,7 +26,7 @@ from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zone
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
-from world.files import absolute_path, did_you_mean
+from world.files import absolute_path, did_you_mean, toml_text, write_atomically
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
 from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
@@ -190,10 +190,44 @@ class Scenario:
             ("threats, zones", f"{len(self.threats)}, {len(self.zones)}"),
             ("wind", f"{wind.speed:g} m/s from {math.degrees(wind.from_course):.0f}°, turbulence {wind.turbulence}"),
             ("clearance", f"at least {limits.min_clearance_m:g} m above ground"),
-            ("aircraft", self.flight.aircraft),
+            *self._flight_rows(),
             *(("note", note) for note in self.notes),
         ]
         return html_table(f"Scenario {self.name}", rows)
+
+    def _flight_rows(self) -> list[tuple[str, str]]:
+        """Return the rows of the table for notebooks about aircraft, autopilot and the corridor of the verdict."""
+        flight, steering = self.flight, self.flight.steering
+        corridor = self.limits.corridor_m
+        airspeed = "the aircraft's" if flight.airspeed_mps is None else f"{flight.airspeed_mps:g} m/s"
+        autopilot = f"planfly, {steering.guidance}" if steering.autopilot == OWN_GUIDANCE else steering.autopilot
+        return [
+            ("aircraft", flight.aircraft),
+            ("airspeed", airspeed),
+            ("autopilot", autopilot if flight.params is None else f"{autopilot}, {flight.params}"),
+            ("navigation", steering.nav),
+            ("corridor", "as wide as the autopilot needs" if corridor is None else f"{corridor:g} m to each side"),
+        ]
+
+    def to_toml(self, path: str | Path) -> None:
+        """Write the scenario as a TOML file, from which `planfly.plan` and other functions make it again.
+
+        path: the file, replaced if it exists.  Elevation files, an aircraft's folder and parameters are named by their
+        absolute paths.
+        Raises ScenarioError for a scenario that was made around a mission, and OSError for a file that cannot be
+        written.
+
+        >>> from tempfile import TemporaryDirectory
+        >>> scenario = load_scenario("hard-07")
+        >>> with TemporaryDirectory() as folder:
+        ...     scenario.to_toml(folder + "/mine.toml")
+        ...     load_scenario(folder + "/mine.toml").to_json() == scenario.to_json()
+        True
+        """
+        if self.external:
+            reason = "made around a mission, which is its file; planfly.make_scenario makes a scenario with an area"
+            raise ScenarioError(f"{self.name}: {reason}", file=self.name)
+        write_atomically(Path(path), toml_text(self.to_json()))
 
     def to_json(self) -> dict[str, Any]:
         """Return the scenario as plain JSON data, from which `scenario_from_spec` makes it again."""

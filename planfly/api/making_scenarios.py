@@ -36,7 +36,10 @@ def make_scenario(
     threats: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]] | ArrayLike | None = None,
     **tables: Any,
 ) -> Scenario:
-    """Return a scenario with other threats and other values, for `planfly.plan`, `planfly.fly` and other functions.
+    """Return a scenario with other threats and other values.
+
+    It is a scenario for `planfly.plan`, for `scenario` of `planfly.fly` and other functions, and a target of
+    `planfly.campaign`; its method ``to_toml`` writes it to a file.
 
     base: a built-in scenario's name, a TOML file's path, or a `Scenario`.
     threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
