@@ -227,8 +227,8 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
             if name not in signature.parameters:
                 hint = did_you_mean(name, signature.parameters)
                 raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
-        check_types(signature, args, keywords)
-        return function(*args, **{**defaults, **keywords})  # type: ignore[arg-type]
+        checked_args, checked_keywords = check_types(signature, args, keywords)
+        return function(*checked_args, **{**defaults, **checked_keywords})
 
     with_defaults.__signature__ = signature  # type: ignore[attr-defined]
     return with_defaults

@@ -1,7 +1,7 @@
 """A scenario: start and destination of a flight, terrain, threats, zones, wind and limits."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial, wraps
 from importlib import resources
@@ -700,20 +700,22 @@ def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
 
 def with_threats(
     scenario: Scenario,
-    added_threats: Sequence[tuple[float, float, float, float]],
+    added_threats: Sequence[Mapping[str, Any]],
     source: str,
     preceding: Sequence[ThreatTable] = (),
 ) -> Scenario:
-    """Return a scenario with additional threats on the ground.
+    """Return a scenario with additional threats.
 
-    added_threats: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.
+    added_threats: values of each by the keys of [[threats]].
     source: name of the threats in messages.
     preceding: tables to insert before the added threats.
 
-    The ratio of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for
-    detection. Raises ScenarioError for a threat that is not allowed in a scenario file.
+    The ratio of a scale that is not given to its radius is the median of the scenario's threats, or a quarter for kill
+    and a third for detection. Raises ScenarioError for a threat that is not allowed in a scenario file, and for one on
+    the ground outside the terrain data.
 
-    >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
+    >>> threat = {"east_m": 1300.0, "north_m": 90.0, "kill_radius_m": 20.0}
+    >>> more = with_threats(load_scenario("tight"), [threat], "--threat")
     >>> more.threats.names[-1], float(more.threats.kill_radius[-1])
     ('pop-up 1', 20.0)
     """
@@ -724,17 +726,23 @@ def with_threats(
         return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 
     threats = scenario.threats
-    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, SCALE_RATIOS["kill"])
-    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, SCALE_RATIOS["detection"])
+    ratios = {
+        "kill": scale_ratio(threats.kill_radius, threats.kill_scale, SCALE_RATIOS["kill"]),
+        "detection": scale_ratio(threats.detection_radius, threats.detection_scale, SCALE_RATIOS["detection"]),
+    }
     tables = [*scenario.spec.threats, *preceding]
-    for index, (east, north, kill, detection) in enumerate(added_threats):
-        data: dict[str, Any] = {"name": f"pop-up {len(preceding) + index + 1}", "east_m": east, "north_m": north}
-        if kill != 0.0:
-            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
-        if detection != 0.0:
-            data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_ratio}
+    for index, threat in enumerate(added_threats):
+        data: dict[str, Any] = {"name": f"pop-up {len(preceding) + index + 1}", **threat}
+        for kind, ratio in ratios.items():
+            radius = data.get(f"{kind}_radius_m")
+            if isinstance(radius, int | float):
+                data.setdefault(f"{kind}_scale_m", radius * ratio)
         row = f"{source}.{index}" if len(added_threats) > 1 else source
         tables.append(checked_table(partial(ThreatTable, **data), row))
+        east, north = map_coordinates(tables[-1], scenario.origin)
+        if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
+            reason = f"east {east:g} m, north {north:g} m: outside the terrain data"
+            raise ScenarioError.of_argument(row, (east, north), reason, shown="")
     spec = scenario.spec.model_copy(update={"threats": tables})
     return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))
 

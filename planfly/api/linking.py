@@ -13,7 +13,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules.link_rule import link_findings
 from planfly.api.flying import FlownMission, judge
-from planfly.arguments import check_arguments
+from planfly.arguments import check_arguments, parse_position
 from planfly.flight_options import LogOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
@@ -103,12 +103,13 @@ def link(
     >>> found.finding.ok
     False
     """
+    lat, lon = (None, None) if station is None else parse_position("station", station)
     entries: dict[str, Any] = {
         "frequency_mhz": frequency,
         "power_dbm": power,
         "sensitivity_dbm": sensitivity,
-        "lat_deg": None if station is None else station[0],
-        "lon_deg": None if station is None else station[1],
+        "lat_deg": lat,
+        "lon_deg": lon,
         "antenna_m": antenna,
         "fade_margin_db": fade_margin,
     }

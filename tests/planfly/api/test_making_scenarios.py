@@ -67,9 +67,21 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"threats": [[1.0, 2.0]]}, "threats list: expected a data frame"),
+        ({"threats": [[1.0, 2.0]]}, r"threats of shape \(1, 2\): expected a data frame"),
+        ({"threats": np.zeros((4, 3))}, r"threats of shape \(4, 3\): expected a data frame .*array \(n, 4\)"),
+        ({"threats": (0.0, 0.0, 100.0, 200.0)}, r"threats of shape \(4,\): expected a data frame"),
+        ({"threats": [[9.0, np.nan, 60.0, 0.0]]}, "threats row 0: north_m nan: expected a position"),
+        ({"threats": [("a", 0, 100, 0)]}, "threats list: expected a data frame"),
         ({"threats": 7}, "threats int: expected a data frame"),
-        ({"threats": {"east_m": [1.0, 2.0], "north_m": [1.0]}}, "threats dict: expected a data frame"),
+        (
+            {"threats": {"east_m": [1.0, 2.0], "north_m": [1.0]}},
+            r"threats east_m of shape \(2,\), north_m of shape \(1,\): expected columns \(n,\) of equal length",
+        ),
+        (
+            {"threats": {"lat_deg": [46.0, np.nan], "lon_deg": [8.0, 8.0], "kill_radius_m": [60.0, 60.0]}},
+            r"threats\.1: lat_deg: missing; a position needs lat_deg and lon_deg",
+        ),
+        ({"threats": [{"kill_radius_m": 60.0}]}, r"threats\.0: position: missing; give east_m and north_m, or lat_deg"),
         ({"threats": [{"east_m": 900.0, "north_m": 90.0}]}, "a threat has a missile, a radar, or both"),
         ({"threats": [{**ROWS[0], "colour": "red"}]}, "colour"),
         ({"wind": {"speed_mps": 400.0}}, "wind.speed_mps: 400"),

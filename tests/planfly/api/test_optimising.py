@@ -167,29 +167,30 @@ def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(planfly.ArgumentError, match=words):
         planfly.optimise(*arguments)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"population": 2}, "even number from 4"),
-        ({"population": 5}, "even number from 4"),
-        ({"model": "ga"}, "allowed umda, emna, multistart, partial, differential"),
+        ({"population": 2}, "population 2: expected an even whole number from 4"),
+        ({"population": 5}, "population 5: expected an even whole number from 4"),
+        ({"model": "ga"}, "model ga: expected umda, emna, multistart, partial, differential"),
+        ({"seed": np.nan}, "seed nan: expected a whole number"),
         ({"initial": [[0.5]]}, r"shape \(1, 1\): expected finite numbers of shape \(100, 1\)"),
         ({"initial": [[np.nan]] * 100}, "finite"),
     ],
 )
 def test_options_that_are_none_are_refused(options: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(planfly.ArgumentError, match=words):
         planfly.optimise([0.0], [1.0], **options)
 
 
 def test_values_of_another_shape_are_refused() -> None:
     search = planfly.optimise([0.0], [1.0], population=4)
-    for values in ([1.0, 2.0], 1.0, np.zeros((4, 1, 1)), np.zeros((4, 0))):
-        with pytest.raises(ValueError, match=r"values"):
+    for values in ([1.0, 2.0], 1.0, np.zeros((4, 1, 1)), np.zeros((4, 0)), ["a"] * 4):
+        with pytest.raises(planfly.ArgumentError, match=r"values"):
             search.tell(values)
     search.tell(np.zeros(4))
     with pytest.raises(ValueError, match="differ from the previous call"):

@@ -309,8 +309,15 @@ def test_planning_again_keeps_what_is_flown_and_goes_round_a_new_threat(tmp_path
     assert (tmp_path / "new.json").read_bytes() == (tmp_path / "theirs.json").read_bytes()
     with pytest.raises(planfly.MissionError, match="at_leg 99: the plan has legs"):
         planfly.replan("hard-07", old, 99)
-    with pytest.raises(planfly.ScenarioError, match=r"threats: east 900000 m, .*: outside the terrain"):
-        planfly.replan("hard-07", old, 1, threats=[(9e5, 0.0, 10.0, 0.0)])
+    with pytest.raises(planfly.ScenarioError, match=r"threats: east 400000 m, .*: outside the terrain"):
+        planfly.replan("hard-07", old, 1, threats=[(4e5, 0.0, 10.0, 0.0)])
+    with pytest.raises(planfly.ArgumentError, match=r"threats of shape \(1, 3\): expected .*array \(n, 4\)"):
+        planfly.replan("hard-07", old, 1, threats=[(0.0, 0.0, 100.0)])
+    # The same threat, as columns with its name and its height.
+    columns = {"name": ["S-1"], "east_m": [east], "north_m": [north], "kill_radius_m": [300.0], "height_m": [0.0]}
+    named = planfly.replan("hard-07", old, 3, threats=columns, seed=1)
+    assert named.waypoints.tolist() == new.waypoints.tolist()
+    assert named.scenario.threats.names[-1] == "S-1"
 
 
 def test_a_search_stops_where_it_is_told(tmp_path: Path) -> None:
