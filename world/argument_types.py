@@ -94,7 +94,8 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
         return None
     if kinds == {Callable}:
         return None if callable(value) else "a function"
-    if kinds == {Sequence}:
+    # The functions themselves check positions and boxes, which are sequences of numbers.
+    if kinds == {Sequence} and float not in get_args(members[0]):
         return None if isinstance(value, Iterable) and not isinstance(value, str | bytes) else "a list"
     return None
 

@@ -38,7 +38,8 @@ def make_scenario(
     the kill radius and a third of the detection radius.
     tables: values of other tables, as mappings with the keys of a scenario file, and its name and description; other
     keys of a table stay, except for a position, and a table of another kind or file, which are replaced as a whole.
-    Another elevation file replaces the base's origin, too, unless an origin is given: its centre becomes the origin.
+    Another elevation file replaces the base's origin, too, unless an origin is given: the middle of its
+    latitudes and longitudes becomes the origin.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
 
     >>> import planfly

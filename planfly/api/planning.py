@@ -57,7 +57,8 @@ def plan(
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 
-    seed: seed of the search; None takes the seed of the scenario, or 1.
+    seed: seed of the search; None takes the seed of the scenario, or 1.  The default algorithm seldom draws: most of
+    its plans are the same for every seed.
     algorithm: a name of ``planfly plan --help``; None for the default.
     budget: maximum number of evaluations.
     seconds: time limit, after which the best path found is returned.
