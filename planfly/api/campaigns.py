@@ -46,6 +46,7 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.process_setup import end_repeated_call
 from planfly.runtime.stages import report_line, stage
 from planner.plan import Plan
 from world.argument_types import checks_types
@@ -139,6 +140,7 @@ def make_workers(count: int | None, scheduler: str | None, seed: int | None) -> 
 
     count: number of processes on this machine; None for one per core.
     """
+    end_repeated_call()
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
         check_scheduler_address(scheduler)
