@@ -1,5 +1,6 @@
 """Define the allowed numbers and words of arguments, for keywords of the API and command-line options."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -100,6 +101,8 @@ RANGES: Mapping[str, Range] = {
     "most": Range(1.0, 40.0, "expected a speed from 1 to 40 m/s"),
     "margin": Range(0.0, 100.0, "expected a distance from 0 to 100 km"),
     "height": Range(1.0, 5000.0, "expected a height above ground from 1 to 5,000 m"),
+    "width": Range(1, 10_000, "expected a whole number of characters, 1 to 10,000", integer=True),
+    "population": Range(4, 10**6, "expected an even whole number from 4 to 1,000,000", integer=True),
 }
 # Allowed words for each keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
@@ -172,6 +175,26 @@ def is_valid_position(lat: float, lon: float) -> bool:
     (True, False)
     """
     return -89.0 <= lat <= 89.0 and -180.0 <= lon <= 180.0
+
+
+def parse_position(keyword: str, coordinates: Sequence[float]) -> tuple[float, float]:
+    """Return a latitude and a longitude, degrees.  Raises ArgumentError for anything else.
+
+    keyword: name of the argument, for the message.
+
+    >>> parse_position("station", ["46", 8])
+    (46.0, 8.0)
+    >>> parse_position("station", (46.0,))
+    Traceback (most recent call last):
+    world.errors.ArgumentError: station (46.0,): expected latitude -89..89 and longitude -180..180
+    """
+    try:
+        lat, lon = (float(value) for value in coordinates)
+    except (TypeError, ValueError):
+        lat = lon = math.nan
+    if not is_valid_position(lat, lon):
+        raise ArgumentError.of_argument(keyword, coordinates, "expected latitude -89..89 and longitude -180..180")
+    return lat, lon
 
 
 def is_valid_camera(numbers: Sequence[float]) -> bool:

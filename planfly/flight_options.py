@@ -73,12 +73,12 @@ class FlightOptions(TypedDict, total=False):
 class MissionOptions(FlightOptions, total=False):
     """Options of the flight of a mission file or a plan, and of its world.
 
-    scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
+    scenario: a name, a TOML file or a `Scenario`; None for the plan's own, or one made around the mission.
     fence: files of fences and zones in addition to those of the mission.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     """
 
-    scenario: str | Path | None
+    scenario: Scenario | str | Path | None
     fence: Annotated[FencePaths, ()]
     seed: int | None
 
@@ -281,8 +281,8 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
             if name not in signature.parameters:
                 hint = did_you_mean(name, signature.parameters)
                 raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
-        check_types(signature, args, keywords)
-        return function(*args, **{**defaults, **keywords})  # type: ignore[arg-type]
+        checked_args, checked_keywords = check_types(signature, args, keywords)
+        return function(*checked_args, **{**defaults, **checked_keywords})
 
     with_defaults.__signature__ = signature  # type: ignore[attr-defined]
     return with_defaults

@@ -280,10 +280,15 @@ class AreaTable(ScenarioTable):
 
 def _check_one_position(table: "PositionTable") -> None:
     """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
-    metres = (table.east_m is not None, table.north_m is not None)
-    degrees = (table.lat_deg is not None, table.lon_deg is not None)
-    if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
+    pairs = [{key: getattr(table, key) for key in keys} for keys in (("east_m", "north_m"), ("lat_deg", "lon_deg"))]
+    given_pairs = [pair for pair in pairs if any(value is not None for value in pair.values())]
+    if len(given_pairs) > 1:
         raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+    if not given_pairs:
+        raise ValueError("position: missing; give east_m and north_m, or lat_deg and lon_deg")
+    for key, value in given_pairs[0].items():
+        if value is None:
+            raise ValueError(f"{key}: missing; a position needs {' and '.join(given_pairs[0])}")
 
 
 class PositionTable(ScenarioTable):

@@ -118,7 +118,7 @@ def export(
     fence: FencePaths = (),
     at: str | None = None,
     autopilot: str | None = None,
-    scenario: str | Path | None = None,
+    scenario: Scenario | str | Path | None = None,
     params: str | Path | None = None,
     aircraft: str | Path | None = None,
     overwrite: bool = False,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Unpack
+from typing import NamedTuple, Unpack
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from logs.verdict.returns.returns_text import range_text
 from logs.verdict.rules.link_rule import duration_text, judge_link, period_text
 from logs.verdict.wording import place_text
 from planfly.api.flying import FlownMission, judge
-from planfly.arguments import check_arguments
+from planfly.arguments import check_arguments, parse_position
 from planfly.flight_options import LinkOptions, select_log_and_mission_options, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.rtl.jsbsim_returns import fly_return
@@ -160,26 +160,11 @@ def link(
         missing = next((name for name in _NEEDED if given[name] is None), None)
         if missing is not None:
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
-    lat, lon = (None, None) if station is None else _station_numbers(station)
+    lat, lon = (None, None) if station is None else parse_position("station", station)
     entries = {_ENTRIES[name]: value for name, value in given.items()}
     setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon))
     result = _judge_link(setup, judged.track)
     return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
-
-
-def _station_numbers(station: Any) -> tuple[float, float]:
-    """Return latitude and longitude of the argument `station`, degrees.
-
-    Raises ArgumentError if they are not two numbers; a scenario's table checks their range.
-    """
-    try:
-        if isinstance(station, str | bytes):
-            raise TypeError
-        lat, lon = (float(part) for part in station)
-    except (TypeError, ValueError):
-        allowed = "expected latitude and longitude, degrees"
-        raise ArgumentError.of_argument("station", station, allowed) from None
-    return lat, lon
 
 
 def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:

@@ -212,6 +212,8 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
 # ----------------------------------------------------------------------
 # Open and clear a campaign's folder, and write its summary, report and logs of the worst flights.
 
+# Scenario of a campaign that was not given as a file.
+SCENARIO_FILE = "scenario.toml"
 # Files that a campaign or a search for winds writes into its folder, and removes when it is replaced.
 CAMPAIGN_FILES = (
     *(f"{table}{ending}" for table in (CAMPAIGN_DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
@@ -221,6 +223,7 @@ CAMPAIGN_FILES = (
     "winds.png",
     "winds.html",
     "plan.json",
+    SCENARIO_FILE,
 )
 
 

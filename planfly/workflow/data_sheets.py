@@ -226,7 +226,7 @@ def parse_sheet(
     volts, energy = _parse_battery(battery) if battery is not None else (0.0, 0.0)
     propeller = _parse_propeller(prop) if prop is not None else (0.0, 0.0)
     layouts: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
-    if layout is not None and layout not in layouts:
+    if layout is not None and layout not in list(layouts):
         raise FlightError.of_argument("layout", layout, f"expected {', '.join(layouts)}")
     sheet_values = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
     return DataSheet(**sheet_values, volts=volts, energy=energy, propeller=propeller, layout=layouts[layout or "tail"])

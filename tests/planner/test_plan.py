@@ -125,6 +125,13 @@ def test_feasible_is_counted_and_continuous_and_safe_is_outside_missiles_too() -
     assert not made(certificate=failed).safe
 
 
+def test_the_last_margin_counts_what_no_other_measures() -> None:
+    assert made().margins == (0.1, 20.0, 0.2, 9.0, 10.0, 50.0, math.inf, math.inf, 0.0)
+    blocked = replace(CERTIFICATE, problems=("climb-out: no path", "landing: no path"))
+    assert made(certificate=blocked).margins[-1] == -2.0
+    assert made(violations=np.array([0, 1, 2, 0])).margins[-1] == -3.0
+
+
 def test_plans_are_equal_if_their_files_are() -> None:
     assert made() == made()
     moved = made(certificate=CERTIFICATE, violations=np.array([0, 1, 0, 0]))
