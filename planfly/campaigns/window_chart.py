@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from datetime import datetime
 
 import matplotlib.dates as mdates
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from logs import theme
 from logs.verdict.rule_words import RULE_WORDS
 from logs.views.drawing import clean_style, new_figure
-from planfly.campaigns.find_window import Departure, WindowResult
+from planfly.campaigns.find_window import WindowResult
 
 _OPEN_COLOUR = theme.colour("good")
 _CLOSED_COLOUR = theme.colour("bad")
@@ -30,7 +31,7 @@ def draw_window(result: WindowResult) -> Figure:
         wind = figure.add_axes((0.08, 0.30, 0.89, 0.17), sharex=probability)
         energy = figure.add_axes((0.08, 0.09, 0.89, 0.15), sharex=probability)
         departures = result.departures
-        times = [_number(departure) for departure in departures]
+        times = [_number(departure.time) for departure in departures]
         width = 0.8 * min((after - before for before, after in itertools.pairwise(times)), default=1.0 / 24.0)
         _draw_probability(probability, result, times, width)
         wind.plot(times, [departure.wind[0] for departure in departures], color=_WIND_COLOUR, marker="o", markersize=3)
@@ -61,15 +62,16 @@ def draw_window(result: WindowResult) -> Figure:
             for spine in ("top", "right"):
                 axes.spines[spine].set_visible(False)
             axes.tick_params(labelbottom=axes is energy)
-        locator = mdates.AutoDateLocator(minticks=3, maxticks=12)
+        locator = mdates.AutoDateLocator(minticks=3, maxticks=12)  # type: ignore[no-untyped-call]  # matplotlib has none
         energy.xaxis.set_major_locator(locator)
-        energy.xaxis.set_major_formatter(mdates.ConciseDateFormatter(locator))
+        formatter = mdates.ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]  # nor here
+        energy.xaxis.set_major_formatter(formatter)
     return figure
 
 
-def _number(departure: Departure) -> float:
-    """Return the time of a departure as matplotlib's number of days."""
-    return float(mdates.date2num(departure.time))
+def _number(time: datetime) -> float:
+    """Return a time as matplotlib's number of days."""
+    return float(mdates.date2num(time))  # type: ignore[no-untyped-call]  # nor here
 
 
 def _draw_probability(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
@@ -92,7 +94,7 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
             axes.text(time, 1.06, title, rotation=45, ha="left", va="bottom", color=_INK_COLOUR, fontsize=7)
     axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
     if result.goal.asked is not None:
-        axes.axvline(float(mdates.date2num(result.goal.asked)), color=_WIND_COLOUR, linewidth=1.4)
+        axes.axvline(_number(result.goal.asked), color=_WIND_COLOUR, linewidth=1.4)
     axes.set_ylim(0.0, 1.05)
     axes.set_ylabel("flyable flights")
     axes.set_title(

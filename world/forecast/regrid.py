@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from world.arrays import Floats
-from world.extras import require_extra
 
 # Degrees of latitude per metre, for the distance between nodes.
 _DEGREE_M = 111_200.0
@@ -46,7 +45,6 @@ def regrid(values: Floats, latitudes: Floats, longitudes: Floats, rows: Floats, 
 
     Return (m, t, y, x, k); NaN outside the nodes.
     """
-    require_extra("forecast", "a forecast on a projected grid needs")
     from scipy.interpolate import LinearNDInterpolator
 
     center = 0.5 * (columns[0] + columns[-1])
