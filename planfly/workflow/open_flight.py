@@ -221,13 +221,15 @@ def make_setup(
 
 
 def planned_duration(route: Route, mission: Mission) -> float:
-    """Return the duration of a flight without wind, s: of the route's legs and of its loiters for a time."""
-    lengths = np.linalg.norm(np.diff(route.positions, axis=0), axis=1)
-    loiter_times = {item.seq: loiter.seconds for item in mission.items if (loiter := stated_loiter(item)) is not None}
-    items_of_stops = dict(zip(route.stops.tolist(), route.items.tolist(), strict=True))
-    return float((lengths / route.leg_airspeeds).sum()) + sum(
-        loiter_times.get(seq, 0.0) for seq in items_of_stops.values()
-    )
+    """Return the duration of a flight without wind, s; a loiter takes at least the time that its item states."""
+    leg_times = np.linalg.norm(np.diff(route.positions, axis=0), axis=1) / route.leg_airspeeds
+    stops = route.stops
+    is_loiter = stops[1:] == stops[:-1]
+    times_at_stops = np.bincount(stops[1:][is_loiter], leg_times[is_loiter], minlength=int(stops[-1]) + 1)
+    stated_times = {item.seq: loiter.seconds for item in mission.items if (loiter := stated_loiter(item)) is not None}
+    for stop, item in set(zip(stops.tolist(), route.items.tolist(), strict=True)):
+        times_at_stops[stop] = max(times_at_stops[stop], stated_times.get(item, 0.0))
+    return float(leg_times[~is_loiter].sum() + times_at_stops.sum())
 
 
 def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:

@@ -6,6 +6,7 @@ ground are placed above the model's ground if the file has it, and otherwise abo
 """
 
 import functools
+import importlib
 import re
 import warnings
 from collections.abc import Iterator, Sequence
@@ -102,9 +103,9 @@ def _open_datasets(path: Path, start: bytes) -> list[Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             if start.startswith(b"GRIB"):
-                import cfgrib
-
-                return list(cfgrib.open_datasets(str(path), backend_kwargs={"indexpath": "", "errors": "raise"}))
+                return list(
+                    import_cfgrib().open_datasets(str(path), backend_kwargs={"indexpath": "", "errors": "raise"})
+                )
             import xarray
 
             engine = "h5netcdf" if start.startswith(b"\x89HDF") else "scipy"
@@ -112,6 +113,17 @@ def _open_datasets(path: Path, start: bytes) -> list[Any]:
     # Each library raises errors of its own for damaged files.
     except Exception as error:
         raise _damaged(path, error) from error
+
+
+def import_cfgrib() -> Any:
+    """Import cfgrib, after the modules whose libraries eccodes brings in other versions (PROJ, SQLite).
+
+    eccodes replaces these libraries for all modules that are imported after it: pyproj and rasterio then end the
+    process, and sqlite3 becomes older.
+    """
+    for name in ("pyproj", "rasterio", "sqlite3", "cfgrib"):
+        module = importlib.import_module(name)
+    return module
 
 
 def _damaged(path: Path, error: Exception) -> ForecastError:

@@ -5,7 +5,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import cfgrib
 import numpy as np
 import pytest
 import xarray
@@ -24,7 +23,7 @@ from tests.world.made.forecast_files import (
     write_netcdf,
 )
 from world.arrays import Floats
-from world.forecast.read_forecast import Box, read_forecast
+from world.forecast.read_forecast import Box, import_cfgrib, read_forecast
 from world.forecast.wind_field import WindField
 
 DEPARTURE = datetime.fromisoformat(ISSUED).replace(tzinfo=UTC)
@@ -103,7 +102,7 @@ def test_grib_on_pressure_levels_with_geopotential_height(tmp_path: Path, random
     u, v = random.normal(0.0, 8.0, (2, *SHAPE))
     dataset = wind_dataset(u, v, kind="pressure", levels=levels, heights=heights, latitudes=LATITUDES[::-1])
     path = write_grib(tmp_path / "a.grib2", grib_messages(dataset))
-    parts = cfgrib.open_datasets(str(path), backend_kwargs={"indexpath": ""})
+    parts = import_cfgrib().open_datasets(str(path), backend_kwargs={"indexpath": ""})
     read = parts[0].assign({name: array for part in parts for name, array in part.data_vars.items()})
     # Packed: what counts is what the file states.
     assert np.abs(read.u.values - u).max() < 1e-3

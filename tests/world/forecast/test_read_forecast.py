@@ -1,5 +1,7 @@
 """Forecasts as the weather services write them, and how each states its levels, times, members and grid."""
 
+import subprocess
+import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -240,6 +242,39 @@ def test_an_ensemble_as_grib(tmp_path: Path) -> None:
     forecast = read_forecast(write_grib(tmp_path / "ens.grib2", *groups), BOX, 0.0)
     assert forecast.members == 3
     assert wind_at(forecast, 50.0, member=2) == pytest.approx([7.0, -2.0], abs=1e-4)
+
+
+_AFTER_GRIB = """
+import sys
+from pathlib import Path
+from world.forecast.read_forecast import Box, read_forecast
+read_forecast(Path(sys.argv[1]), Box(45.95, 7.95, 46.05, 8.05), 0.0)
+import pyproj, rasterio, sqlite3
+from rasterio.warp import transform
+print(round(pyproj.Transformer.from_crs(4326, 32632, always_xy=True).transform(9.0, 0.0)[0]))
+print(round(transform("EPSG:4326", "EPSG:32632", [9.0], [0.0])[0][0]))
+print(sqlite3.sqlite_version)
+"""
+
+
+def test_what_is_imported_after_a_grib_file_keeps_its_libraries(tmp_path: Path) -> None:
+    """Eccodes brings other versions of PROJ and SQLite for all that is loaded after it."""
+    path = write_grib(tmp_path / "a.grib2", grib_messages(pressure_dataset()))
+    done = subprocess.run(
+        [sys.executable, "-c", _AFTER_GRIB, str(path)],
+        cwd=Path(__file__).parents[3],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    plain = subprocess.run(
+        [sys.executable, "-c", "import sqlite3; print(sqlite3.sqlite_version)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    # At the middle of the zone, 500 km of false easting.
+    assert (done.returncode, done.stdout.split()) == (0, ["500000", "500000", plain.stdout.strip()]), done.stderr
 
 
 # ----------------------------------------------------------------------

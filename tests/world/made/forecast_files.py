@@ -5,12 +5,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import eccodes
 import numpy as np
 import xarray
 from numpy.typing import ArrayLike
 
 from world.arrays import Floats
+from world.forecast.read_forecast import import_cfgrib
+
+import_cfgrib()
+import eccodes  # noqa: E402  # only after it
 
 # Time of issue, and the first time of a made forecast.
 ISSUED = "2026-05-01T06:00"
