@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from typing import NamedTuple
 
 from world.arrays import Floats
 from world.forecast.wind_field import WindField
@@ -10,6 +11,15 @@ from world.forecast.wind_field import WindField
 OLD_AGE = timedelta(hours=12)
 # Longest time after the departure for which the wind is kept, s.
 LONGEST_FLIGHT_S = 24 * 3600.0
+
+
+class Box(NamedTuple):
+    """Area around a mission, deg; the west is below the east, and may be below -180."""
+
+    south: float
+    west: float
+    north: float
+    east: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -6,13 +6,14 @@ ground are placed above the model's ground if the file has it, and otherwise abo
 """
 
 import functools
-import importlib
+import gc
 import re
+import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +21,11 @@ from world.arrays import Floats
 from world.errors import ForecastError
 from world.extras import require_extra
 from world.files import missing_text
-from world.forecast.forecast import Forecast
+from world.forecast.forecast import Box, Forecast
+from world.forecast.grib_process import read_in_process
 from world.forecast.levels import LevelGroup, LevelKind, merge_levels
 from world.forecast.open_meteo import read_open_meteo
-from world.forecast.regrid import regrid, regular_axes, rotate_to_north
+from world.forecast.regrid import near_nodes, regrid, regular_axes, rotate_to_north
 from world.forecast.units import (
     GEOPOTENTIAL_UNITS,
     GRAVITY_STANDARD,
@@ -50,15 +52,6 @@ _HEIGHT_NAMES = {"gh", "z", "hgt", "height_above_sea_level"}
 _GROUND_NAMES = {"orog", "orography", "zsfc", "surface_altitude", "hsurf", "topography", "surface_geopotential"}
 
 
-class Box(NamedTuple):
-    """Area around a mission, deg; the west is below the east, and may be below -180."""
-
-    south: float
-    west: float
-    north: float
-    east: float
-
-
 def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
     """Read the part of a forecast that determines the wind in a box.
 
@@ -67,10 +60,9 @@ def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
     Raises ForecastError, in one line, for a file that is missing, damaged, or lacks what is needed, and
     MissingExtraError if xarray or cfgrib is not installed.
     """
-    try:
-        status = path.stat()
-    except OSError:
-        raise ForecastError(f"{path}: {missing_text(path)}", file=str(path)) from None
+    if not path.is_file():
+        raise ForecastError(f"{path}: {missing_text(path)}", file=str(path))
+    status = path.stat()
     return _read_cached(path, (status.st_mtime_ns, status.st_size), box, ground_amsl)
 
 
@@ -84,52 +76,50 @@ def _read_cached(path: Path, version: tuple[int, int], box: Box, ground_amsl: fl
         raise ForecastError(f"{path}: cannot be read: {error.strerror}", file=str(path)) from error
     if start.lstrip()[:1] in (b"{", b"["):
         return read_open_meteo(path, ground_amsl)
-    return _ForecastReader(path, box, ground_amsl).read(_open_datasets(path, start))
-
-
-def _open_datasets(path: Path, start: bytes) -> list[Any]:
-    """Open a file as xarray datasets, one for each kind of level.
-
-    start: first bytes of the file.
-    """
     if start.startswith(b"GRIB"):
         require_extra("grib")
-    elif start.startswith((b"\x89HDF", b"CDF")):
-        require_extra("forecast")
-    else:
+        return read_in_process(path, box, ground_amsl)
+    if not start.startswith((b"\x89HDF", b"CDF")):
         allowed = "expected NetCDF, GRIB, or the JSON of Open-Meteo"
         raise ForecastError(f"{path}: not a forecast: {allowed}", file=str(path), allowed=allowed)
+    require_extra("forecast")
+    import xarray
+
+    engine = "h5netcdf" if start.startswith(b"\x89HDF") else "scipy"
+    dataset = _call_library(
+        path, lambda: xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False)
+    )
+    return _ForecastReader(path, box, ground_amsl).read([dataset])
+
+
+def read_grib(path: Path, box: Box, ground_amsl: float) -> Forecast:
+    """Read a GRIB file as `read_forecast` does; see `world.forecast.grib_process`."""
+    import cfgrib
+
+    arguments = {"indexpath": "", "errors": "raise"}
+    datasets = _call_library(path, lambda: list(cfgrib.open_datasets(str(path), backend_kwargs=arguments)))
+    return _ForecastReader(path, box, ground_amsl).read(datasets)
+
+
+def _call_library(path: Path, function: Callable[[], Any]) -> Any:
+    """Return what a function of a library returns, without its warnings.
+
+    Raises ForecastError for a damaged file, with the first line of the library's reason: each library raises errors of
+    its own for it.
+    """
+    hook = sys.unraisablehook
+    # Objects of files that are not open fail when they are closed: Python would print that.
+    sys.unraisablehook = lambda _: None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            if start.startswith(b"GRIB"):
-                return list(
-                    import_cfgrib().open_datasets(str(path), backend_kwargs={"indexpath": "", "errors": "raise"})
-                )
-            import xarray
-
-            engine = "h5netcdf" if start.startswith(b"\x89HDF") else "scipy"
-            return [xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False)]
-    # Each library raises errors of its own for damaged files.
+            return function()
     except Exception as error:
-        raise _damaged(path, error) from error
-
-
-def import_cfgrib() -> Any:
-    """Import cfgrib, after the modules whose libraries eccodes brings in other versions (PROJ, SQLite).
-
-    eccodes replaces these libraries for all modules that are imported after it: pyproj and rasterio then end the
-    process, and sqlite3 becomes older.
-    """
-    for name in ("pyproj", "rasterio", "sqlite3", "cfgrib"):
-        module = importlib.import_module(name)
-    return module
-
-
-def _damaged(path: Path, error: Exception) -> ForecastError:
-    """Return the error for a file that a library cannot read, with the first line of the library's reason."""
-    reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
-    return ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
+        reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
+    finally:
+        gc.collect()
+        sys.unraisablehook = hook
+    raise ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
 
 
 class _ForecastReader:
@@ -189,12 +179,9 @@ class _ForecastReader:
             calendar = variable.attrs.get("calendar")
             if calendar not in (None, "standard", "gregorian", "proleptic_gregorian"):
                 raise self.fail(str(name), f"calendar {calendar!r}: allowed standard, gregorian, proleptic_gregorian")
-        try:
-            decoded = xarray.decode_cf(dataset, decode_timedelta=False)
-            for name in decoded.coords:
-                decoded.variables[name].load()
-        except Exception as error:
-            raise _damaged(self.path, error) from error
+        decoded = _call_library(self.path, lambda: xarray.decode_cf(dataset, decode_timedelta=False))
+        for name in decoded.coords:
+            _call_library(self.path, decoded.variables[name].load)
         return decoded
 
     def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
@@ -461,20 +448,20 @@ class _ForecastReader:
                 str(array.name), f"dimension {extra[0]!r} is not known: allowed time, level, member and place"
             )
         array = array.isel(dict.fromkeys(extra, 0))
-        for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
-            array = array.expand_dims(name) if dim is None else array.rename({dim: name})
         if latitude.ndim == 1:
-            rows, columns = self._node_indices(latitude, longitude)
-            array = array.isel({space[0]: rows, space[1]: columns})
-        array = array.transpose("_member", "_time", *space, "_level")
+            nodes = self._node_indices(latitude, longitude)
+        else:
+            nodes = near_nodes(latitude.values, longitude.values, self.latitudes, self.longitudes)
+        array = array.isel(dict(zip(space, nodes, strict=True)))
         if array.size > MAX_NODES:
             raise self.fail(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
-        try:
-            values = array.values.astype(np.float64)
-        except Exception as error:
-            raise _damaged(self.path, error) from error
+        array = _call_library(self.path, array.load)
+        for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
+            array = array.expand_dims(name) if dim is None else array.rename({dim: name})
+        values = array.transpose("_member", "_time", *space, "_level").values.astype(np.float64)
         if latitude.ndim == 2:
-            values = regrid(values, latitude.values, longitude.values, self.latitudes, self.longitudes)
+            around = np.ix_(*nodes)
+            values = regrid(values, latitude.values[around], longitude.values[around], *axes)
         return values
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from world.airspace.zone_times import parse_span
 from world.arrays import Floats
 from world.errors import ForecastError
-from world.forecast.forecast import Forecast, ForecastFacts
-from world.forecast.read_forecast import Box, read_forecast
+from world.forecast.forecast import Box, Forecast, ForecastFacts
+from world.forecast.read_forecast import read_forecast
 from world.forecast.wind_field import (
     MAX_FIELD_NUMBERS,
     MeanProfile,

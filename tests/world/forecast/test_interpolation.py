@@ -16,6 +16,7 @@ from tests.world.made.forecast_files import (
     LATITUDES,
     LONGITUDES,
     grib_messages,
+    import_cfgrib,
     open_meteo_answer,
     wind_dataset,
     write_grib,
@@ -23,7 +24,8 @@ from tests.world.made.forecast_files import (
     write_netcdf,
 )
 from world.arrays import Floats
-from world.forecast.read_forecast import Box, import_cfgrib, read_forecast
+from world.forecast.forecast import Box
+from world.forecast.read_forecast import read_forecast
 from world.forecast.wind_field import WindField
 
 DEPARTURE = datetime.fromisoformat(ISSUED).replace(tzinfo=UTC)

@@ -30,8 +30,8 @@ from tests.world.made.forecast_files import (
 )
 from world.arrays import Floats
 from world.errors import ForecastError
-from world.forecast.forecast import Forecast
-from world.forecast.read_forecast import Box, read_forecast
+from world.forecast.forecast import Box, Forecast
+from world.forecast.read_forecast import read_forecast
 
 DEPARTURE = datetime.fromisoformat(ISSUED).replace(tzinfo=UTC)
 BOX = Box(45.95, 7.95, 46.05, 8.05)
@@ -247,7 +247,8 @@ def test_an_ensemble_as_grib(tmp_path: Path) -> None:
 _AFTER_GRIB = """
 import sys
 from pathlib import Path
-from world.forecast.read_forecast import Box, read_forecast
+from world.forecast.forecast import Box
+from world.forecast.read_forecast import read_forecast
 read_forecast(Path(sys.argv[1]), Box(45.95, 7.95, 46.05, 8.05), 0.0)
 import pyproj, rasterio, sqlite3
 from rasterio.warp import transform

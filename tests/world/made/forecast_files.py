@@ -1,5 +1,6 @@
 """Forecast files made by tests: NetCDF, GRIB and the JSON of Open-Meteo, of winds that the test states."""
 
+import importlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -10,10 +11,6 @@ import xarray
 from numpy.typing import ArrayLike
 
 from world.arrays import Floats
-from world.forecast.read_forecast import import_cfgrib
-
-import_cfgrib()
-import eccodes  # noqa: E402  # only after it
 
 # Time of issue, and the first time of a made forecast.
 ISSUED = "2026-05-01T06:00"
@@ -88,6 +85,14 @@ def write_netcdf(path: Path, dataset: xarray.Dataset, **encoding: Mapping[str, A
 # ----------------------------------------------------------------------
 # GRIB.
 
+
+def import_cfgrib() -> Any:
+    """Import cfgrib, after the modules whose libraries eccodes brings in other versions for all that follows it."""
+    for name in ("pyproj", "rasterio", "sqlite3"):
+        importlib.import_module(name)
+    return importlib.import_module("cfgrib")
+
+
 _PARAMETERS = {
     # Discipline, category and number of each variable.
     "u": (0, 2, 2),
@@ -119,6 +124,9 @@ def grib_message(
     grid: keys of the grid, as `regular_grid` makes them.
     keys: other keys of eccodes.
     """
+    import_cfgrib()
+    import eccodes
+
     handle = eccodes.codes_grib_new_from_samples("GRIB2")
     discipline, category, number = _PARAMETERS[name]
     surface = _SURFACES[kind]
