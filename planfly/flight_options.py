@@ -356,7 +356,7 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     """
     wind, forecast = options.get("wind"), options.get("forecast")
     if wind is not None and forecast is not None:
-        raise ArgumentError.of_argument("wind", wind, "not with forecast, which states the wind", shown="")
+        raise ArgumentError.of_argument("wind", wind, "not allowed with a forecast, which states the wind", shown="")
     speed, from_deg = (None, None) if wind is None else _wind_numbers(wind)
     if from_deg is not None and not is_valid_wind(0.0, from_deg):
         raise ArgumentError.of_argument(

@@ -144,31 +144,23 @@ class Scenario:
     def wind_velocity(self, position: Sequence[float], seconds: float = 0.0) -> tuple[float, float]:
         """Return the mean wind at a position (east, north, up, m) and time (s after take-off), m/s, east and north.
 
+        The wind of a forecast is along true east and north, and a stated wind along the map's axes.
+
         >>> windy = with_wind(load_scenario("tight"), 5.0, math.radians(270.0), None)
         >>> windy.wind_velocity((0.0, 0.0, 75.0))
         (5.0, ...)
         """
-        east, north = self.wind.velocity_at(float(position[2]))
-        if self.wind.field is None:
-            return east, north
-        latitude, longitude = to_geo(self.origin, [position[0]], [position[1]])
-        deviation = self.wind.field.velocities_at(
-            np.array([seconds]), latitude, longitude, np.array([position[2]], dtype=np.float64)
-        )[0]
-        return east + float(deviation[0]), north + float(deviation[1])
+        east, north = self.wind_velocities(np.array([position], dtype=np.float64), np.array([seconds]))[0].tolist()
+        return east, north
 
-    def wind_velocities(self, positions: Floats, times: Floats) -> Floats:
-        """Return the mean wind at positions and times, m/s, (n, 2) east and north.
-
-        positions: (n, 3) east, north and up, m.
-        times: (n,) s after take-off.
-        """
-        altitudes = np.ascontiguousarray(positions[:, 2], dtype=np.float64)
-        velocities = self.wind.velocities_at(altitudes)
-        if self.wind.field is None:
-            return velocities
-        latitudes, longitudes = to_geo(self.origin, positions[:, 0], positions[:, 1])
-        return velocities + self.wind.field.velocities_at(times, latitudes, longitudes, altitudes)
+    def wind_velocities(self, positions: Floats, seconds: Floats) -> Floats:
+        """Return the mean wind at positions (n, 3) and times (n,), m/s, (n, 2); see `wind_velocity`."""
+        altitudes, field = np.ascontiguousarray(positions[:, 2]), self.wind.field
+        if field is None:
+            return self.wind.velocities_at(altitudes)
+        places = to_geo(self.origin, positions[:, 0], positions[:, 1])
+        deviations = field.velocities_at(seconds, *places, altitudes)
+        return self.wind.velocities_at(field.limit_altitudes(seconds, *places, altitudes)) + deviations
 
     def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
         """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).
@@ -635,6 +627,8 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     changes: dict[str, Any] = {}
     if speed is not None and from_course is not None:
         changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course), "forecast": None}
+        if table.forecast is not None:
+            changes["gradient"] = 0.0
     if turbulence is not None:
         changes["turbulence"] = turbulence
     changed_table = checked_table(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
@@ -643,6 +637,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
         scenario.wind,
         speed=spec.wind.speed_mps,
         from_course=math.radians(spec.wind.from_deg),
+        gradient=spec.wind.gradient,
         turbulence=spec.wind.turbulence,
     )
     changed_scenario = replace(scenario, spec=spec, wind=wind)

@@ -1,6 +1,7 @@
 """Start a flight: trimmed in the air on its route, or released from a rail, a hand or a runway."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
@@ -63,8 +64,6 @@ def find_start(
     convergence = local_map.convergence(lat, lon)
     # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed that
     # the aircraft can hold; the verdict reports it.
-    east_wind, north_wind = setup.scenario.wind_velocity((east, north, up))
-    cos, sin = math.cos(convergence), math.sin(convergence)
     return Start(
         lat_deg=lat,
         lon_deg=lon,
@@ -72,9 +71,20 @@ def find_start(
         course=math.atan2(first_leg[0], first_leg[1]) - convergence,
         slope=math.atan2(first_leg[2], math.hypot(first_leg[0], first_leg[1])),
         airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, airspeed)),
-        wind=(north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0),
+        wind=_find_wind(setup, (east, north, up), convergence),
         ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
     )
+
+
+def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
+    """Return the mean wind at a position (east, north, up, m) at the start, true north, east and down, m/s.
+
+    convergence: grid convergence, the map course of true north, rad.
+    """
+    east, north = setup.scenario.wind_velocity(position)
+    # The wind of a forecast is along true north, and a stated wind along the map's north.
+    angle = convergence if setup.scenario.wind.field is None else 0.0
+    return *_to_true_north(east, north, angle), 0.0
 
 
 def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
@@ -139,13 +149,12 @@ def find_release(
         position[2] += max(stand_heights, default=0.0)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
     convergence = local_map.convergence(lat, lon)
-    east, north = setup.scenario.wind_velocity(position.tolist())
     ground_altitude = ground.height(float(position[0]), float(position[1]))
     return Release(
         position=(lat, lon, float(position[2])),
         attitude=(0.0, launch.incline, take_off.course - convergence),
         velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), convergence), -float(velocity[2])),
-        wind=(*_to_true_north(east, north, convergence), 0.0),
+        wind=_find_wind(setup, position.tolist(), convergence),
         ground=float(take_off.home[2]) if math.isnan(ground_altitude) else ground_altitude,
     )
 

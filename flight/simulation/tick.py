@@ -338,9 +338,21 @@ def fill_tick(workspace: Record, block: Floats) -> None:
     cos, sin = place.north_cos, place.north_sin
     row = workspace.rows[timing.row]
     turbulence = workspace.noise[timing.row].turbulence
-    _update_wind(state, workspace.wind, workspace.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
+    wind, gusts, height = workspace.wind, workspace.gusts, place.clearance
     if workspace.settings.field > 0:
-        _add_wind_field(state, workspace, block, cos, sin)
+        # A forecast's wind is the mean wind plus the deviation that its field states, both along true north.
+        east, north, altitude = interpolate_field(
+            block[workspace.settings.field :],
+            wind.start_time + timing.tick * timing.dt,
+            math.degrees(state.latitude),
+            math.degrees(state.longitude),
+            true.up,
+        )
+        _update_wind(state, wind, gusts, turbulence, height, altitude, 1.0, 0.0, air, timing.dt)
+        air.wind_north += north
+        air.wind_east += east
+    else:
+        _update_wind(state, wind, gusts, turbulence, height, true.up, cos, sin, air, timing.dt)
     air.ground = place.ground if not math.isnan(place.ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0
     _fill_row(
@@ -484,26 +496,6 @@ def _update_wind(
         air.gust_north = gust_downwind * cos - gust_crosswind * sin
         air.gust_east = gust_downwind * sin + gust_crosswind * cos
         air.gust_down = gust_down
-
-
-@inner
-def _add_wind_field(
-    state: Record, workspace: Record, block: Floats, convergence_cos: float, convergence_sin: float
-) -> None:
-    """Add the deviation of the wind field at the aircraft to the mean wind in ``air``.
-
-    convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
-    """
-    timing, air = workspace.timing, workspace.air
-    east, north = interpolate_field(
-        block[workspace.settings.field :],
-        workspace.wind.start_time + timing.tick * timing.dt,
-        math.degrees(state.latitude),
-        math.degrees(state.longitude),
-        workspace.true.up,
-    )
-    air.wind_north += north * convergence_cos + east * convergence_sin
-    air.wind_east += east * convergence_cos - north * convergence_sin
 
 
 @inner

@@ -1,6 +1,7 @@
 """Find the times of take-off at which a mission is flyable in a weather forecast."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -8,14 +9,15 @@ from typing import Unpack
 
 from planfly.api.campaigns import make_workers, open_sample
 from planfly.arguments import check_arguments
+from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_window import (
     DEFAULT_PROBABILITY,
+    DEFAULT_SPAN,
     MAX_DEPARTURES,
     WindowGoal,
     WindowResult,
     departure_times,
     find_window,
-    first_departure,
     last_departure,
 )
 from planfly.flight_options import WindowOptions, takes_options
@@ -24,7 +26,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import WINDOW_FILES, check_output_folder, clean_folder
 from planner.plan import Plan
-from world.errors import ArgumentError
+from world.errors import ArgumentError, ForecastError
 from world.extras import requires_extra
 from world.files import write_atomically
 
@@ -54,8 +56,8 @@ def window(
     target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     forecast: file of the forecast; None for the forecast of the scenario.
     at: asked time of take-off, in ISO 8601 with its offset from UTC; None asks about any.
-    earliest, latest: first and last time of take-off; None for the asked time, and 24 hours later or the end of the
-    forecast.
+    earliest, latest: first and last time of take-off; None for the asked time, and 24 hours later or the last time from
+    which the forecast covers the flight.
     every: time between two departures, such as "30min" or "1h".
     probability: probability of a flyable flight at which a departure is open.
     out: folder for the chart, ``window.png``; None writes none.  overwrite: True replaces it.
@@ -71,33 +73,49 @@ def window(
     """
     check_arguments(probability=probability, window_flights=options["flights"])
     step = _parse_step(every)
-    asked = None if options["at"] is None else _parse_time("at", options["at"])
-    first, last = (
-        None if text is None else _parse_time(name, text) for name, text in (("earliest", earliest), ("latest", latest))
+    asked, first, last = (
+        None if text is None else _parse_time(name, text)
+        for name, text in (("at", options["at"]), ("earliest", earliest), ("latest", latest))
     )
     if out is not None:
         check_output_folder(Path(out), overwrite)
-    workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
-    start = first or asked
-    if start is None:
-        allowed = "missing: the first time of take-off, or the asked one by at, is needed"
+    workers = make_workers(options["workers"], options["scheduler"], options["seed"])
+    first = first or asked
+    if first is None:
+        allowed = "missing: the first time of take-off is needed, or the time that is asked about"
         raise ArgumentError.of_argument("earliest", None, allowed, shown="")
-    base = open_sample(target, {**options, "at": start.isoformat()})
-    facts = base.scenario.wind.forecast
-    if facts is None:
-        raise ArgumentError.of_argument(
-            "forecast", None, "missing: a window needs a forecast, by this option or in [wind]", shown=""
-        )
-    first = first_departure(base.scenario)
-    end = last or last_departure(first, facts.last_time)
-    if end < first:
+    if last is not None and last < first:
         raise ArgumentError.of_argument("latest", latest, f"expected a time after {first.isoformat()}")
+    base = _open_base(target, options, departure_times(first, last or first + DEFAULT_SPAN, step))
+    end = last or last_departure(base, first)
     if (end - first) / step > MAX_DEPARTURES:
         raise ArgumentError.of_argument("every", every, f"expected at most {MAX_DEPARTURES} departures")
     goal = WindowGoal(departure_times(first, end, step, asked), asked, probability, options["flights"])
     with stage("flying", f"flying {len(goal.departures)} departures") as advance:
-        result = find_window(base, goal, workers_used, advance)
+        result = find_window(base, goal, workers, advance)
     return result if out is None else _with_chart(result, Path(out), overwrite=overwrite)
+
+
+def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Sequence[datetime]) -> CampaignBase:
+    """Return the base of the flights at the first departure that the forecast covers.
+
+    Raises ArgumentError without a forecast, and the ForecastError of the first departure if none is covered.
+    """
+    errors: list[ForecastError] = []
+    for departure in departures[:MAX_DEPARTURES]:
+        try:
+            base = open_sample(target, {**options, "at": departure.isoformat()})
+        except ForecastError as error:
+            errors.append(error)
+            # Only these errors depend on the departure.
+            if error.field in ("time", "wind at the start"):
+                continue
+            break
+        if base.scenario.wind.forecast is None:
+            allowed = "missing: a window needs a forecast, by this option or in [wind]"
+            raise ArgumentError.of_argument("forecast", None, allowed, shown="")
+        return base
+    raise errors[0]
 
 
 def _with_chart(result: WindowResult, folder: Path, *, overwrite: bool) -> WindowResult:

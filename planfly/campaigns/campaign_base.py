@@ -39,6 +39,7 @@ from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
 from world.files import write_atomically
+from world.forecast.scenario_wind import shift_wind
 from world.scenario import Scenario
 from world.terrain import Terrain
 
@@ -318,19 +319,12 @@ def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: Gi
     speed = min(MAX_WIND_MPS, max(0.0, nominal.speed + values["wind_speed"]))
     from_deg = (nominal.from_deg + values["wind_from"]) % 360.0
     gradient = min(MAX_WIND_GRADIENT, max(-MAX_WIND_GRADIENT, old_wind.gradient + values["wind_gradient"]))
+    wind = shift_wind(old_wind, speed, math.radians(from_deg), gradient)
     level = TURBULENCE_LEVELS.index(old_wind.turbulence) + round(values["turbulence"])
     turbulence = TURBULENCE_LEVELS[min(len(TURBULENCE_LEVELS) - 1, max(0, level))]
-    changes = {"speed_mps": speed, "from_deg": from_deg, "gradient": gradient, "turbulence": turbulence, "seed": None}
-    wind_table = scenario.spec.wind.model_copy(update=changes)
-    # In a forecast, the drawn difference applies at all its nodes alike.
-    wind = replace(
-        old_wind,
-        speed=speed,
-        from_course=math.radians(from_deg),
-        gradient=gradient,
-        turbulence=turbulence,
-        seed=None,
-    )
+    changes = {"speed_mps": speed, "from_deg": from_deg, "gradient": wind.gradient}
+    wind_table = scenario.spec.wind.model_copy(update=changes | {"turbulence": turbulence, "seed": None})
+    wind = replace(wind, turbulence=turbulence, seed=None)
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": wind_table}), wind=wind)
 
 

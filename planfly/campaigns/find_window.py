@@ -16,8 +16,8 @@ from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Interval, clopper_pearson
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from planfly.runtime.stages import Advance
+from planfly.workflow.open_flight import planned_duration
 from world.errors import ForecastError
-from world.forecast.scenario_wind import departure_of
 from world.scenario import Scenario, forecast_of_scenario, in_forecast_member, with_flight_time
 
 # Largest number of departures in one search.
@@ -49,13 +49,13 @@ class Departure:
     """Flights of one time of take-off.
 
     time: time of take-off.
-    scenario: scenario at this time; None if the forecast does not cover the flight.
+    scenarios: scenario at this time in each member of the forecast; () if the forecast does not cover the flight.
     rows: the flights, in the order of their draws.
     not_judged: why the departure was not flown; "" if it was.
     """
 
     time: datetime
-    scenario: Scenario | None
+    scenarios: tuple[Scenario, ...] = ()
     rows: tuple[FlightRow, ...] = ()
     not_judged: str = ""
 
@@ -92,10 +92,14 @@ class Departure:
 
     @property
     def wind(self) -> tuple[float, float]:
-        """Mean wind at the start: m/s, and the direction it blows from, deg; NaN if the departure was not flown."""
-        if self.scenario is None:
+        """Mean wind at the start: m/s, and the direction it blows from, deg; NaN if the departure was not flown.
+
+        With several members, their mean.
+        """
+        if not self.scenarios:
             return math.nan, math.nan
-        east, north = self.scenario.wind_velocity(self.scenario.start.tolist())
+        winds = [scenario.wind_velocity(scenario.start.tolist()) for scenario in self.scenarios]
+        east, north = np.mean(winds, axis=0)
         return math.hypot(east, north), math.degrees(math.atan2(-east, -north)) % 360.0
 
 
@@ -174,7 +178,7 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
     With the members of an ensemble, flight k flies in member k modulo their number.
     """
     departures = [_open_departure(base, time) for time in goal.departures]
-    scenarios = [_member_scenarios(departure.scenario) for departure in departures if departure.scenario is not None]
+    scenarios = [departure.scenarios for departure in departures if departure.scenarios]
     total = len(scenarios) * goal.flights
     indices: Iterator[int] = iter(range(total))
 
@@ -192,7 +196,7 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
     flown = iter(range(len(scenarios)))
     results = []
     for departure in departures:
-        if departure.scenario is None:
+        if not departure.scenarios:
             results.append(departure)
             continue
         start = next(flown) * goal.flights
@@ -221,13 +225,13 @@ def fly_departure(
 
 
 def _open_departure(base: CampaignBase, time: datetime) -> Departure:
-    """Return a departure without flights, with its scenario if the forecast covers the flight."""
+    """Return a departure without flights, with its scenarios if the forecast covers the flight."""
     try:
-        scenario = with_flight_time(base.scenario, time.isoformat())
-        replace(base, scenario=scenario).nominal_setup()
+        scenarios = _member_scenarios(with_flight_time(base.scenario, time.isoformat()))
+        replace(base, scenario=scenarios[0]).nominal_setup()
     except ForecastError as error:
-        return Departure(time, None, not_judged=str(error))
-    return Departure(time, scenario)
+        return Departure(time, not_judged=str(error))
+    return Departure(time, scenarios)
 
 
 def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
@@ -238,11 +242,14 @@ def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
     return tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
 
 
-def first_departure(scenario: Scenario) -> datetime:
-    """Return the time of flight of a scenario."""
-    return departure_of(str(scenario.spec.at))
+def last_departure(base: CampaignBase, first: datetime) -> datetime:
+    """Return the default end of a search: `DEFAULT_SPAN` after the first departure.
 
-
-def last_departure(first: datetime, last_time: datetime) -> datetime:
-    """Return the default end of a search: `DEFAULT_SPAN` after the first departure, or the end of the forecast."""
-    return min(first + DEFAULT_SPAN, last_time.astimezone(UTC))
+    It is earlier, but not before the first departure, if the forecast covers no flight that begins later.
+    """
+    forecast_end = first + DEFAULT_SPAN
+    if base.scenario.wind.forecast is not None:
+        setup = base.nominal_setup()
+        duration = planned_duration(setup.route, setup.mission)
+        forecast_end = base.scenario.wind.forecast.last_time - timedelta(seconds=duration)
+    return max(first, min(first + DEFAULT_SPAN, forecast_end.astimezone(UTC)))

@@ -170,7 +170,7 @@ def add_forecast_option(group: OptionGroup) -> None:
         "--forecast",
         metavar="FILE",
         help="weather forecast (NetCDF, GRIB, or the JSON of Open-Meteo) that states the wind in time, height and "
-        "place; --at states the take-off",
+        "place; --at states the take-off (NetCDF requires planfly[forecast], GRIB planfly[grib])",
     )
     with_completer(option, file_completer("nc", "nc4", "grib", "grib2", "grb2", "json"))
 

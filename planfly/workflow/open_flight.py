@@ -12,6 +12,7 @@ from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import OTHER_VEHICLES, Command, Mission, command_name
+from flight.mission.itinerary import stated_loiter
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.preflight_notes import preflight_notes
 from flight.mission.route import Route, route_through_stops, with_end_courses
@@ -24,6 +25,7 @@ from planfly.workflow.file_autopilots import with_file_autopilot
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.errors import ForecastError, MissionError
 from world.files import did_you_mean, missing_text
+from world.forecast.scenario_wind import check_coverage
 from world.frames import to_geo
 from world.scenario import Scenario
 
@@ -193,7 +195,7 @@ def make_setup(
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
-    _check_forecast(scenario, route, airspeed)
+    _check_forecast(scenario, route, mission)
     file_parameters, assumed_parameters = (
         {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
     )
@@ -218,21 +220,28 @@ def make_setup(
     )
 
 
-def _check_forecast(scenario: Scenario, route: Route, airspeed: float) -> None:
-    """Raise ForecastError if a route leaves the box, the levels or the times of the forecast that states the wind.
+def planned_duration(route: Route, mission: Mission) -> float:
+    """Return the duration of a flight without wind, s; a loiter takes at least the time that its item states."""
+    leg_times = np.linalg.norm(np.diff(route.positions, axis=0), axis=1) / route.leg_airspeeds
+    stops = route.stops
+    is_loiter = stops[1:] == stops[:-1]
+    times_at_stops = np.bincount(stops[1:][is_loiter], leg_times[is_loiter], minlength=int(stops[-1]) + 1)
+    stated_times = {item.seq: loiter.seconds for item in mission.items if (loiter := stated_loiter(item)) is not None}
+    for stop, item in set(zip(stops.tolist(), route.items.tolist(), strict=True)):
+        times_at_stops[stop] = max(times_at_stops[stop], stated_times.get(item, 0.0))
+    return float(leg_times[~is_loiter].sum() + times_at_stops.sum())
 
-    airspeed: m/s, for the duration of the flight, without wind.
-    """
+
+def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
+    """Raise ForecastError if a route leaves the box, the levels or the times of the forecast that states the wind."""
     facts = scenario.wind.forecast
     if facts is None:
         return
     positions, file = route.positions, str(scenario.spec.wind.forecast)
     latitudes, longitudes = to_geo(scenario.origin, positions[:, 0], positions[:, 1])
-    if fault := facts.place_fault(latitudes, longitudes) or facts.altitude_fault(positions[:, 2].tolist()):
-        raise ForecastError(f"{file}: {fault}", file=file)
-    duration = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum()) / airspeed
-    left = (facts.last_time - facts.departure).total_seconds()
-    if duration > left:
+    check_coverage(scenario.wind, file, latitudes, longitudes, positions[:, 2])
+    duration = planned_duration(route, mission)
+    if duration > (facts.last_time - facts.departure).total_seconds():
         raise ForecastError.at(
             file,
             "time",

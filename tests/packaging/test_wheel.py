@@ -197,6 +197,8 @@ MISSED = {
     "px4-logs": "check a.ulg",
     "data-logs": "check a.csv",
     "identification": "aircraft --identify a.BIN --mass 13 --span 2.9 --out mine",
+    "forecast": "fly out/plan.json --forecast a.nc --at 2026-05-01T06:00Z",
+    "grib": "fly out/plan.json --forecast a.grib2 --at 2026-05-01T06:00Z",
 }
 
 
@@ -236,6 +238,8 @@ def test_the_base_installs_flies_and_misses_each_extra_on(version: str, wheel: P
     assert {file.name for file in folder.iterdir()} == {"out"}
     (folder / "a.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
     (folder / "a.csv").write_text("t,roll\n0,1\n")
+    (folder / "a.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
+    (folder / "a.grib2").write_bytes(b"GRIB")
     before = sorted(folder.rglob("*"))
     # A cluster's extra is missed where that of campaigns is there.
     assert set(MISSED) == set(EXTRAS) - {"cluster"}

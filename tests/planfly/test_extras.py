@@ -66,6 +66,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (made / "flight.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
     (made / "flight.csv").write_text("t,roll\n0,1\n")
     (made / "flight.columns.toml").write_text("[columns]\n")
+    (made / "winds.nc").write_bytes(b"\x89HDF\r\n\x1a\n")
+    (made / "winds.grib2").write_bytes(b"GRIB")
     (made / "arduplane").write_text("#!/bin/sh\n")
     (made / "arduplane").chmod(0o755)
     write_geotiff(made / "dem.tif", compress="lzw", predictor=3)
@@ -100,6 +102,15 @@ MISSED = {
     "campaign paper-07": ("campaigns", "campaigns need"),
     "campaign paper-07 --out c --refly 3": ("campaigns", "campaigns need"),
     "winds paper-07": ("campaigns", "campaigns need"),
+    "window paper-07 --from 2026-05-01T06:00Z": ("campaigns", "campaigns need"),
+    "check mission.waypoints --terrain dem.tif --forecast winds.nc --at 2026-05-01T06:00Z": (
+        "forecast",
+        "a forecast as NetCDF needs",
+    ),
+    "check mission.waypoints --terrain dem.tif --forecast winds.grib2 --at 2026-05-01T06:00Z": (
+        "grib",
+        "a forecast as GRIB needs",
+    ),
     "studio": ("studio", "the studio needs"),
     "serve": ("live", "serve needs"),
     "replay flight.mcap --to 127.0.0.1:9": ("live", "playing to ground stations needs"),

@@ -33,6 +33,7 @@ FUNCTIONS = {
     "campaign": ("campaign", "campaign_flight"),
     "winds": ("winds",),
     "battery": ("battery",),
+    "window": ("window",),
     "ground-risk": ("ground_risk",),
     "paper": ("paper_tables",),
     "aircraft": ("aircraft", "describe_aircraft", "new_aircraft", "identify_aircraft"),

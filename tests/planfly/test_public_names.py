@@ -45,6 +45,7 @@ VERBS = {
         "campaign_flight",
         "winds",
         "battery",
+        "window",
         "ground_risk",
         "compare_campaigns",
         "serve",
@@ -83,13 +84,14 @@ RESULTS = {
         "BatteryResult",
         "GroundRiskResult",
         "CampaignComparison",
+        "WindowResult",
         "WindsResult",
         "WrittenReport",
     ),
 }
 ERRORS = {
     *("PlanflyError", "FlightError", "LogError", "MissionError", "ParameterError", "ScenarioError", "StartError"),
-    *("TerrainError", "SchedulerError", "SpreadError", "ArgumentError", "MissingExtraError"),
+    *("TerrainError", "ForecastError", "SchedulerError", "SpreadError", "ArgumentError", "MissingExtraError"),
 }
 
 

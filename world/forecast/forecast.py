@@ -1,11 +1,8 @@
 """Forecast of the wind, as its file states it, and the wind of a mission made from it."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-
-import numpy as np
+from typing import NamedTuple
 
 from world.arrays import Floats
 from world.forecast.wind_field import WindField
@@ -14,10 +11,15 @@ from world.forecast.wind_field import WindField
 OLD_AGE = timedelta(hours=12)
 # Longest time after the departure for which the wind is kept, s.
 LONGEST_FLIGHT_S = 24 * 3600.0
-# Distance below the lowest level within which the lowest level's wind applies, m.
-MAX_DEPTH_BELOW_LEVELS_M = 100.0
-# Distance around a forecast of a single place within which it applies, m: half a cell of a global model.
-PLACE_RADIUS_M = 15_000.0
+
+
+class Box(NamedTuple):
+    """Area around a mission, deg; the west is below the east, and may be below -180."""
+
+    south: float
+    west: float
+    north: float
+    east: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -147,47 +149,3 @@ class ForecastFacts:
         levels = f"{self.levels} level{'s' * (self.levels != 1)} to {self.highest_amsl:.0f} m AMSL"
         member_text = f", {self.members} members" if self.members > 1 else ""
         return f"forecast {self.source}, {issue}, {grid}, {levels}{member_text}"
-
-    def altitude_fault(self, altitudes: Sequence[float]) -> str:
-        """Return why altitudes (m AMSL) of a mission are outside the levels; "" if they are inside."""
-        if max(altitudes) > self.highest_amsl:
-            return (
-                f"the mission flies up to {max(altitudes):.0f} m AMSL, and the forecast's highest level is at "
-                f"{self.highest_amsl:.0f} m"
-            )
-        if min(altitudes) < self.lowest_amsl - MAX_DEPTH_BELOW_LEVELS_M:
-            return (
-                f"the mission flies down to {min(altitudes):.0f} m AMSL, and the forecast's lowest level is at "
-                f"{self.lowest_amsl:.0f} m: a level at most {MAX_DEPTH_BELOW_LEVELS_M:.0f} m above it is needed"
-            )
-        return ""
-
-    def place_fault(self, latitudes: Floats, longitudes: Floats) -> str:
-        """Return why places (deg) of a mission are outside the forecast's box; "" if they are inside."""
-        south, west, north, east = self.box
-        near = west + (longitudes - west + 180.0) % 360.0 - 180.0
-        if not self.grid_km:
-            dy = (latitudes - south) * 111_000.0
-            dx = (near - west) * 111_000.0 * math.cos(math.radians(south))
-            distance = float(np.hypot(dx, dy).max())
-            if distance <= PLACE_RADIUS_M:
-                return ""
-            return (
-                f"the mission is up to {distance / 1000.0:.0f} km from the forecast's only place, "
-                f"{south:.3f}, {west:.3f}; at most {PLACE_RADIUS_M / 1000.0:.0f} km are allowed"
-            )
-        # A box that crosses no turn has its nodes in ascending order.
-        tolerance = 1e-6
-        is_outside = (
-            (latitudes < south - tolerance)
-            | (latitudes > north + tolerance)
-            | (near < west - tolerance)
-            | (near > east + tolerance)
-        )
-        if not is_outside.any():
-            return ""
-        k = int(np.argmax(is_outside))
-        return (
-            f"the mission is at {latitudes[k]:.3f}, {longitudes[k]:.3f}, outside the forecast's box "
-            f"{south:.3f} to {north:.3f}, {west:.3f} to {east:.3f}"
-        )

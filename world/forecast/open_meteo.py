@@ -1,10 +1,9 @@
 """Read the forecast of Open-Meteo's API: hourly winds at heights above ground and on pressure levels, as JSON."""
 
 import json
-import math
 import re
-from collections.abc import Mapping
-from datetime import UTC, datetime
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,10 +14,12 @@ from world.errors import ForecastError
 from world.files import read_small_file
 from world.forecast.forecast import Forecast
 from world.forecast.levels import LevelGroup, LevelKind, merge_levels
-from world.forecast.units import DIRECTION_UNITS, HEIGHT_UNITS, SPEED_UNITS, unit_factor
+from world.forecast.units import DIRECTION_UNITS, HEIGHT_UNITS, MAX_WIND_MPS, SPEED_UNITS, unit_factor
 
 # Largest size of a file, bytes.
 MAX_BYTES = 50_000_000
+# Number that no value reaches, in any unit.
+_MAX_NUMBER = 1e9
 _SPEED_NAME = re.compile(r"^wind_?speed_(\d+)(m|hPa)$")
 
 
@@ -52,9 +53,13 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     if not entries or not all(isinstance(entry, dict) for entry in entries):
         raise _fault(path, "hourly", "expected the answer of Open-Meteo's API, one object or a list of objects")
     places = [_read_place(path, entry, ground_amsl) for entry in entries]
-    latitudes = np.unique([place.latitude for place in places])
-    longitudes = np.unique([place.longitude for place in places])
     first = places[0]
+    latitudes = np.unique([place.latitude for place in places])
+    # In one turn: a grid may extend over the antimeridian.
+    place_longitudes = [
+        first.longitude + (place.longitude - first.longitude + 180.0) % 360.0 - 180.0 for place in places
+    ]
+    longitudes = np.unique(place_longitudes)
     if len(latitudes) * len(longitudes) != len(places) or any(
         place.altitudes.shape != first.altitudes.shape or not np.array_equal(place.times, first.times)
         for place in places
@@ -62,7 +67,7 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
         raise _fault(
             path, "latitude, longitude", "several places must form a regular grid, with the same times and levels"
         )
-    order = np.lexsort(([place.longitude for place in places], [place.latitude for place in places]))
+    order = np.lexsort((place_longitudes, [place.latitude for place in places]))
     shape = (len(latitudes), len(longitudes))
     altitudes = np.stack([places[k].altitudes for k in order], axis=1).reshape(
         len(first.times), *shape, first.altitudes.shape[-1]
@@ -102,57 +107,69 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
     longitude = _number(path, entry, "longitude", -180.0, 360.0)
     ground = _number(path, entry, "elevation", -500.0, 9000.0) if "elevation" in entry else ground_amsl
     times = _read_times(path, hourly, units, entry)
-    count = _count_complete_times(hourly, len(times))
+    found = [_find_level(path, hourly, match) for name in hourly if (match := _SPEED_NAME.match(name)) is not None]
+    # A model has null at all times of a level that it does not have.
+    levels = [level for level in found if not any(_is_null(hourly[name]) for name in level if name)]
+    if not levels:
+        allowed = "no wind: wind_speed_10m and wind_direction_10m, or those of other levels, are needed"
+        raise _fault(path, "hourly", allowed)
+    count = _count_complete_times([hourly[name] for level in levels for name in level if name], len(times))
     groups = []
-    for name in hourly:
-        if (match := _SPEED_NAME.match(name)) is None:
-            continue
-        level = f"{match.group(1)}{match.group(2)}"
-        direction = next(
-            (text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly), None
-        )
-        if direction is None:
-            raise _fault(path, f"hourly.wind_direction_{level}", f"missing, although {name} is there")
-        speeds = _column(path, hourly, units, name, count, SPEED_UNITS)
-        if (speeds < 0.0).any() or (speeds > 150.0).any():
-            raise _fault(path, f"hourly.{name}", "allowed 0..150 m/s")
-        courses = np.radians(_column(path, hourly, units, direction, count, DIRECTION_UNITS))
-        kind: LevelKind = "height" if match.group(2) == "m" else "pressure"
-        heights = np.full(count, float(match.group(1)))
-        if kind == "pressure":
-            if f"geopotential_height_{level}" not in hourly:
-                raise _fault(path, f"hourly.geopotential_height_{level}", f"missing, although {name} is there")
-            heights = _column(path, hourly, units, f"geopotential_height_{level}", count, HEIGHT_UNITS)
+    for speed_name, direction_name, height_name in levels:
+        speeds = _column(path, hourly, units, speed_name, count, SPEED_UNITS)
+        if (speeds < 0.0).any() or (speeds > MAX_WIND_MPS).any():
+            shown = f"{speeds.min():.4g} to {speeds.max():.4g} m/s"
+            raise _fault(path, f"hourly.{speed_name}", f"{shown}: allowed 0..{MAX_WIND_MPS:g} m/s")
+        courses = np.radians(_column(path, hourly, units, direction_name, count, DIRECTION_UNITS))
+        kind: LevelKind = "pressure" if height_name else "height"
+        if height_name:
+            heights = _column(path, hourly, units, height_name, count, HEIGHT_UNITS)
+        else:
+            heights = np.full(count, float(re.findall(r"\d+", speed_name)[0]))
         winds = np.stack([-speeds * np.sin(courses), -speeds * np.cos(courses)], axis=-1)
         groups.append(LevelGroup(kind, heights.reshape(-1, 1, 1, 1), winds.reshape(1, -1, 1, 1, 1, 2)))
-    if not groups:
-        raise _fault(
-            path, "hourly", "no wind: wind_speed_10m and wind_direction_10m, or those of other levels, are needed"
-        )
     altitudes, velocities = merge_levels(groups, None, ground)
     return _Place(latitude, longitude, times[:count], altitudes[:, 0, 0], velocities[0, :, 0, 0])
 
 
-def _count_complete_times(hourly: dict[str, Any], count: int) -> int:
-    """Return the number of times up to the last time at which no wind is null.
+def _find_level(path: Path, hourly: dict[str, Any], match: re.Match[str]) -> tuple[str, str, str]:
+    """Return the names of a level's speed, direction and geopotential height, which is "" for a height above ground.
+
+    match: match of the speed's name.
+    """
+    name, level = match.group(), f"{match.group(1)}{match.group(2)}"
+    direction = next((text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly), None)
+    if direction is None:
+        raise _fault(path, f"hourly.wind_direction_{level}", f"missing, although {name} is there")
+    height = "" if match.group(2) == "m" else f"geopotential_height_{level}"
+    if height and height not in hourly:
+        raise _fault(path, f"hourly.{height}", f"missing, although {name} is there")
+    return name, direction, height
+
+
+def _is_null(values: Any) -> bool:
+    """Return True if a variable is null at all times."""
+    return isinstance(values, list) and bool(values) and all(value is None for value in values)
+
+
+def _count_complete_times(columns: Sequence[Any], count: int) -> int:
+    """Return the number of times up to the last time at which no value of the columns is null.
 
     A model that ends before the requested days has null at all later times.
     """
-    columns = [
-        values
-        for name, values in hourly.items()
-        if name.startswith(("wind", "geopotential_height")) and isinstance(values, list) and len(values) == count
-    ]
-    while count > 0 and any(column[count - 1] is None for column in columns):
+    lists = [values for values in columns if isinstance(values, list) and len(values) == count]
+    while count > 0 and any(values[count - 1] is None for values in lists):
         count -= 1
     return count
 
 
-def _number(path: Path, entry: dict[str, Any], name: str, low: float, high: float) -> float:
+def _number(
+    path: Path, entry: dict[str, Any], name: str, low: float, high: float, default: float | None = None
+) -> float:
     """Return a number of an entry."""
-    value = entry.get(name)
+    value = entry.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise _fault(path, name, f"allowed {low:g}..{high:g}")
+        raise _fault(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
     return float(value)
 
 
@@ -165,10 +182,9 @@ def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry
         if units.get("time") == "unixtime":
             times = np.array([float(value) for value in values])
         else:
-            offset = float(entry.get("utc_offset_seconds", 0.0))
-            times = np.array(
-                [datetime.fromisoformat(value).replace(tzinfo=UTC).timestamp() - offset for value in values]
-            )
+            zone = timezone(timedelta(seconds=_number(path, entry, "utc_offset_seconds", -86_399.0, 86_399.0, 0.0)))
+            read_times = [datetime.fromisoformat(value) for value in values]
+            times = np.array([(time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in read_times])
     except (TypeError, ValueError, OverflowError, AttributeError):
         raise _fault(path, "hourly.time", "allowed ISO 8601 times, or unixtime") from None
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
@@ -190,6 +206,6 @@ def _column(
     if not values:
         raise _fault(path, f"hourly.{name}", "no values")
     for k, value in enumerate(values):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise _fault(path, f"hourly.{name}", f"value {k + 1} is {value!r}: a number is needed")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not -_MAX_NUMBER < value < _MAX_NUMBER:
+            raise _fault(path, f"hourly.{name}", f"value {k + 1} is {str(value)[:40]}: a number is needed")
     return np.array(values, dtype=np.float64) * factor

@@ -6,12 +6,14 @@ ground are placed above the model's ground if the file has it, and otherwise abo
 """
 
 import functools
+import gc
 import re
+import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,33 +21,35 @@ from world.arrays import Floats
 from world.errors import ForecastError
 from world.extras import require_extra
 from world.files import missing_text
-from world.forecast.forecast import Forecast
+from world.forecast.forecast import Box, Forecast
+from world.forecast.grib_process import read_in_process
 from world.forecast.levels import LevelGroup, LevelKind, merge_levels
 from world.forecast.open_meteo import read_open_meteo
-from world.forecast.regrid import regrid, regular_axes, rotate_to_north
-from world.forecast.units import GRAVITY_STANDARD, HEIGHT_UNITS, PRESSURE_UNITS, SPEED_UNITS, unit_factor
+from world.forecast.regrid import near_nodes, regrid, regular_axes, rotate_to_north
+from world.forecast.units import (
+    GEOPOTENTIAL_UNITS,
+    GRAVITY_STANDARD,
+    HEIGHT_UNITS,
+    MAX_WIND_MPS,
+    PRESSURE_UNITS,
+    SPEED_UNITS,
+    unit_factor,
+)
 
 # Largest number of nodes around a mission, over all times, levels and members.
 MAX_NODES = 20_000_000
-# Fastest wind that a forecast may state, m/s: faster winds are an error of units.
-_MAX_WIND_MPS = 150.0
 
 _U_NAME = re.compile(r"^(u|u(\d+)m?|(\d+)u|ugrd.*|uwnd|u_component_of_wind.*|u-component.*|wind_u)$", re.IGNORECASE)
 _V_NAME = re.compile(r"^(v|v(\d+)m?|(\d+)v|vgrd.*|vwnd|v_component_of_wind.*|v-component.*|wind_v)$", re.IGNORECASE)
+# Height of a wind above ground, m, as its name states it: u10, 10u, u80m, UGRD_10maboveground.  Another number may be a
+# pressure, as in u850 and u200.
+_HEIGHT_IN_NAME = re.compile(r"^[uv]?(10|100)[uv]?$|(?:^[uv]|_)(\d+)_?m(?:_?above_?ground)?$", re.IGNORECASE)
 _EAST_NAMES = ("eastward_wind", "x_wind")
 _NORTH_NAMES = ("northward_wind", "y_wind")
 _MEMBER_DIMS = ("number", "member", "realization", "ensemble", "ens", "ensemble_member")
-_HEIGHT_NAMES = {"gh", "z", "hgt", "geopotential", "geopotential_height", "height_above_sea_level"}
+# Besides names that begin with "geopotential".
+_HEIGHT_NAMES = {"gh", "z", "hgt", "height_above_sea_level"}
 _GROUND_NAMES = {"orog", "orography", "zsfc", "surface_altitude", "hsurf", "topography", "surface_geopotential"}
-
-
-class Box(NamedTuple):
-    """Area around a mission, deg; the west is below the east, and may be below -180."""
-
-    south: float
-    west: float
-    north: float
-    east: float
 
 
 def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
@@ -56,10 +60,9 @@ def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
     Raises ForecastError, in one line, for a file that is missing, damaged, or lacks what is needed, and
     MissingExtraError if xarray or cfgrib is not installed.
     """
-    try:
-        status = path.stat()
-    except OSError:
-        raise ForecastError(f"{path}: {missing_text(path)}", file=str(path)) from None
+    if not path.is_file():
+        raise ForecastError(f"{path}: {missing_text(path)}", file=str(path))
+    status = path.stat()
     return _read_cached(path, (status.st_mtime_ns, status.st_size), box, ground_amsl)
 
 
@@ -73,41 +76,50 @@ def _read_cached(path: Path, version: tuple[int, int], box: Box, ground_amsl: fl
         raise ForecastError(f"{path}: cannot be read: {error.strerror}", file=str(path)) from error
     if start.lstrip()[:1] in (b"{", b"["):
         return read_open_meteo(path, ground_amsl)
-    return _ForecastReader(path, box, ground_amsl).read(_open_datasets(path, start))
-
-
-def _open_datasets(path: Path, start: bytes) -> list[Any]:
-    """Open a file as xarray datasets, one for each kind of level.
-
-    start: first bytes of the file.
-    """
     if start.startswith(b"GRIB"):
         require_extra("grib")
-    elif start.startswith((b"\x89HDF", b"CDF")):
-        require_extra("forecast")
-    else:
+        return read_in_process(path, box, ground_amsl)
+    if not start.startswith((b"\x89HDF", b"CDF")):
         allowed = "expected NetCDF, GRIB, or the JSON of Open-Meteo"
         raise ForecastError(f"{path}: not a forecast: {allowed}", file=str(path), allowed=allowed)
+    require_extra("forecast")
+    import xarray
+
+    engine = "h5netcdf" if start.startswith(b"\x89HDF") else "scipy"
+    dataset = _call_library(
+        path, lambda: xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False)
+    )
+    return _ForecastReader(path, box, ground_amsl).read([dataset])
+
+
+def read_grib(path: Path, box: Box, ground_amsl: float) -> Forecast:
+    """Read a GRIB file as `read_forecast` does; see `world.forecast.grib_process`."""
+    import cfgrib
+
+    arguments = {"indexpath": "", "errors": "raise"}
+    datasets = _call_library(path, lambda: list(cfgrib.open_datasets(str(path), backend_kwargs=arguments)))
+    return _ForecastReader(path, box, ground_amsl).read(datasets)
+
+
+def _call_library(path: Path, function: Callable[[], Any]) -> Any:
+    """Return what a function of a library returns, without its warnings.
+
+    Raises ForecastError for a damaged file, with the first line of the library's reason: each library raises errors of
+    its own for it.
+    """
+    hook = sys.unraisablehook
+    # Objects of files that are not open fail when they are closed: Python would print that.
+    sys.unraisablehook = lambda _: None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            if start.startswith(b"GRIB"):
-                import cfgrib
-
-                return list(cfgrib.open_datasets(str(path), backend_kwargs={"indexpath": "", "errors": "raise"}))
-            import xarray
-
-            engine = "h5netcdf" if start.startswith(b"\x89HDF") else "scipy"
-            return [xarray.open_dataset(path, engine=engine, decode_times=False, decode_timedelta=False)]
-    # Each library raises errors of its own for damaged files.
+            return function()
     except Exception as error:
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception) -> ForecastError:
-    """Return the error for a file that a library cannot read, with the first line of the library's reason."""
-    reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
-    return ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
+        reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
+    finally:
+        gc.collect()
+        sys.unraisablehook = hook
+    raise ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
 
 
 class _ForecastReader:
@@ -134,15 +146,11 @@ class _ForecastReader:
         if not pairs:
             raise self.fail("wind", "missing: no pair of an eastward and a northward wind was found")
         self._set_axes([pair[0] for pair in pairs])
-        for dataset in decoded:
-            for name, array in dataset.data_vars.items():
-                is_ground = _names_of(name, array) & _GROUND_NAMES
-                if self.ground is None and is_ground and self._level_of(array, name) is None:
-                    heights, factor = self._values(array.mean([d for d in array.dims if d in ("time", "step")])), 1.0
-                    if unit_factor(array.attrs.get("units"), HEIGHT_UNITS) is None:
-                        factor = 1.0 / GRAVITY_STANDARD
-                    self.ground = heights[0, 0, ..., 0] * factor
+        self.ground = self._read_ground(decoded)
         groups = [self._group(decoded, *pair) for pair in pairs]
+        members = {len(group.velocities) for group in groups} - {1}
+        if len(members) > 1:
+            raise self.fail("members", f"{' and '.join(map(str, sorted(members)))}: allowed as many at all levels")
         ground_source = ""
         if any(group.kind == "height" for group in groups):
             ground_source = "of the forecast's model" if self.ground is not None else "at the mission's start"
@@ -150,7 +158,7 @@ class _ForecastReader:
         degrees = np.diff(self.latitudes)
         return Forecast(
             source=self.path.name,
-            issued=self._find_issue(datasets, decoded),
+            issued=self._find_issue(decoded),
             times=self.times,
             latitudes=self.latitudes,
             longitudes=self.longitudes,
@@ -171,34 +179,33 @@ class _ForecastReader:
             calendar = variable.attrs.get("calendar")
             if calendar not in (None, "standard", "gregorian", "proleptic_gregorian"):
                 raise self.fail(str(name), f"calendar {calendar!r}: allowed standard, gregorian, proleptic_gregorian")
-        try:
-            return xarray.decode_cf(dataset, decode_timedelta=False)
-        except (ValueError, TypeError, OverflowError) as error:
-            raise _damaged(self.path, error) from error
+        decoded = _call_library(self.path, lambda: xarray.decode_cf(dataset, decode_timedelta=False))
+        for name in decoded.coords:
+            _call_library(self.path, decoded.variables[name].load)
+        return decoded
 
     def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
         """Return the dimension of a variable's times (None for a single time), and the times in s since 1970."""
-        for name in ("valid_time", "time", *array.coords):
-            coordinate = array.coords.get(name)
-            if coordinate is None or not np.issubdtype(coordinate.dtype, np.datetime64):
+        times = _time_coordinates(array)
+        for name in ("valid_time", *array.dims, "time", *times):
+            coordinate = times.get(str(name))
+            if coordinate is None or (name != "valid_time" and coordinate.ndim == 0 and "step" in array.dims):
                 continue
             if coordinate.ndim > 1:
                 raise self.fail(str(name), "several times of issue in one file: allowed one")
-            if name != "valid_time" and coordinate.ndim == 0 and "step" in array.dims:
-                continue
             seconds = (coordinate.values.reshape(-1) - np.datetime64(0, "s")) / np.timedelta64(1, "s")
             if not np.isfinite(seconds).all() or (np.diff(seconds) <= 0.0).any():
                 raise self.fail(str(name), "the times are not in ascending order")
             return (str(coordinate.dims[0]) if coordinate.ndim else None), seconds.astype(np.float64)
         raise self.fail("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
 
-    def _find_issue(self, raw: Sequence[Any], decoded: Sequence[Any]) -> datetime | None:
-        """Return the time of issue that a file states, or None."""
+    def _find_issue(self, decoded: Sequence[Any]) -> datetime | None:
+        """Return the time of issue that a file states, or None; an analysis of several times has none."""
         for dataset in decoded:
             for name, variable in dataset.variables.items():
                 is_issue = variable.attrs.get("standard_name") == "forecast_reference_time"
                 is_grib_time = name == "time" and "valid_time" in dataset.variables
-                if (is_issue or is_grib_time) and np.issubdtype(variable.dtype, np.datetime64) and variable.size:
+                if (is_issue or is_grib_time) and np.issubdtype(variable.dtype, np.datetime64) and variable.size == 1:
                     seconds = (variable.values.reshape(-1)[0] - np.datetime64(0, "s")) / np.timedelta64(1, "s")
                     if np.isfinite(seconds):
                         return datetime.fromtimestamp(float(seconds), UTC)
@@ -208,20 +215,13 @@ class _ForecastReader:
     # Axes.
 
     def _set_axes(self, arrays: Sequence[Any]) -> None:
-        """Set times, latitudes and longitudes from the first variable; the other variables must have the same axes.
-
-        Times that not all variables have are left out.
-        """
+        """Set latitudes and longitudes from the first variable, and the times that all variables have."""
         times = [self._valid_times(array)[1] for array in arrays]
         common = functools.reduce(np.intersect1d, times)
         if not len(common):
             raise self.fail("time", "the levels have no time in common")
         self.times = common
-        axes = [self._axes(array) for array in arrays]
-        self.latitudes, self.longitudes = axes[0][0], axes[0][1]
-        for array, (latitudes, longitudes) in zip(arrays, axes, strict=True):
-            if latitudes.shape != self.latitudes.shape or longitudes.shape != self.longitudes.shape:
-                raise self.fail(str(array.name), "its grid differs from the grid of the other winds")
+        self.latitudes, self.longitudes = self._axes(arrays[0])
 
     def _horizontal(self, array: Any) -> tuple[Any, Any]:
         """Return the coordinates of latitude and longitude of a variable."""
@@ -281,6 +281,31 @@ class _ForecastReader:
     # ------------------------------------------------------------------
     # Winds.
 
+    def _read_ground(self, datasets: Sequence[Any]) -> Floats | None:
+        """Return the ground of the forecast's model, (y, x) m AMSL; None if the file does not state it."""
+        for dataset in datasets:
+            for name, array in dataset.data_vars.items():
+                if not _names_of(name, array) & _GROUND_NAMES or self._level_of(array, name) is not None:
+                    continue
+                times = [coordinate.dims for coordinate in _time_coordinates(array).values()]
+                dims = {*(dim for names in times for dim in names), *(dim for dim in array.dims if dim in _MEMBER_DIMS)}
+                first = array.isel(dict.fromkeys(dims, 0), drop=True)
+                heights: Floats = self._values(first.drop_vars(_time_coordinates(first)))[0, 0, ..., 0]
+                if not np.isfinite(heights).all():
+                    raise self.fail(str(name), "values are missing around the mission")
+                return heights * self._height_factor(array)
+        return None
+
+    def _height_factor(self, array: Any) -> float:
+        """Return the factor from the values of a height or a geopotential to m."""
+        units = array.attrs.get("units")
+        factor = unit_factor(units, HEIGHT_UNITS)
+        if factor is None and str(units).replace(" ", "") in GEOPOTENTIAL_UNITS:
+            factor = 1.0 / GRAVITY_STANDARD
+        if factor is None:
+            raise self.fail(str(array.name), f"units {units!r}: allowed m, gpm, m2 s-2")
+        return factor
+
     def _wind_pairs(self, dataset: Any) -> Iterator[tuple[Any, Any]]:
         """Yield the pairs of an eastward and a northward wind of a dataset."""
         east = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _U_NAME, _EAST_NAMES)}
@@ -314,8 +339,8 @@ class _ForecastReader:
                 raise self.fail(str(coordinate_name), f"units {stated!r}: allowed {', '.join(sorted(units))}")
             values = coordinate.values.reshape(-1).astype(np.float64) * factor
             return kind, (str(coordinate.dims[0]) if coordinate.ndim else None), values
-        if digits := re.search(r"\d+", str(name)):
-            return "height", None, np.array([float(digits.group())])
+        if match := _HEIGHT_IN_NAME.search(str(name)):
+            return "height", None, np.array([float(match[1] or match[2])])
         return None
 
     @staticmethod
@@ -323,16 +348,18 @@ class _ForecastReader:
         """Return the kind of level that a coordinate states, or None for another coordinate."""
         standard_name, lower = str(coordinate.attrs.get("standard_name", "")), name.lower()
         units = coordinate.attrs.get("units")
+        texts = " ".join((lower, standard_name, str(coordinate.attrs.get("long_name", "")))).lower()
         if standard_name == "air_pressure" or lower.startswith(("isobaric", "plev", "pressure")):
             return "pressure"
         if lower in ("level", "lev") and unit_factor(units, PRESSURE_UNITS) is not None:
             return "pressure"
-        if standard_name in ("altitude", "height_above_mean_sea_level", "height_above_geopotential_datum"):
+        if "ellipsoid" in texts:
+            return None
+        is_above_sea = "sea" in texts or "msl" in texts or standard_name == "height_above_geopotential_datum"
+        if standard_name == "altitude" or lower in ("altitude", "alt"):
             return "altitude"
-        if lower in ("altitude", "alt", "heightabovesea", "height_above_sea", "amsl"):
-            return "altitude"
-        if standard_name == "height" or lower.startswith(("heightaboveground", "height")):
-            return "height"
+        if standard_name.startswith("height") or lower.startswith("height"):
+            return "altitude" if is_above_sea else "height"
         return None
 
     def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
@@ -351,9 +378,11 @@ class _ForecastReader:
         velocities = np.stack(components, axis=-1)
         if self._is_grid_relative(east):
             latitude, longitude = self._horizontal(east)
-            rotate_to_north(velocities, latitude.values, longitude.values, self.latitudes, self.longitudes)
+            # A regular grid has its axes along east and north.
+            if latitude.ndim == 2:
+                rotate_to_north(velocities, latitude.values, longitude.values, self.latitudes, self.longitudes)
         shape = velocities.shape[1:-1]
-        altitudes = self._geopotential(datasets, east, dim) if kind == "pressure" else np.broadcast_to(values, shape)
+        altitudes = np.broadcast_to(self._geopotential(datasets, east, dim) if kind == "pressure" else values, shape)
         is_missing = ~np.isfinite(velocities).all(axis=(0, -1)) | ~np.isfinite(altitudes)
         is_used = ~is_missing.all(axis=(0, 1, 2))
         if not is_used.any():
@@ -366,9 +395,9 @@ class _ForecastReader:
                 f"{east.name}, {north.name}",
                 f"values are missing around the mission, the first at {values[k]:g} {unit}, {time:%Y-%m-%d %H:%M} UTC",
             )
-        if np.abs(velocities[..., is_used, :]).max() > _MAX_WIND_MPS:
+        if np.abs(velocities[..., is_used, :]).max() > MAX_WIND_MPS:
             largest = float(np.abs(velocities[..., is_used, :]).max())
-            raise self.fail(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {_MAX_WIND_MPS:g} m/s")
+            raise self.fail(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {MAX_WIND_MPS:g} m/s")
         return LevelGroup(kind, np.ascontiguousarray(altitudes[..., is_used]), velocities[..., is_used, :])
 
     @staticmethod
@@ -382,30 +411,32 @@ class _ForecastReader:
         level_kind = self._level_of(wind, wind.name)
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
-                if not _names_of(name, array) & _HEIGHT_NAMES:
+                if not any(text in _HEIGHT_NAMES or text.startswith("geopotential") for text in _names_of(name, array)):
                     continue
                 level = self._level_of(array, name)
                 if level is None or level_kind is None or level[0] != "pressure":
                     continue
                 if not np.array_equal(level[2], level_kind[2]):
                     raise self.fail(str(name), f"its pressure levels differ from those of {wind.name}")
-                units = array.attrs.get("units")
-                factor = unit_factor(units, HEIGHT_UNITS)
-                if factor is None and str(units).replace(" ", "") in ("m2s-2", "m**2s**-2", "m^2/s^2", "m2/s2"):
-                    factor = 1.0 / GRAVITY_STANDARD
-                if factor is None:
-                    raise self.fail(str(name), f"units {units!r}: allowed m, gpm, m2 s-2")
-                return self._values(array, level[1]).mean(axis=0) * factor
+                return self._values(array, level[1]).mean(axis=0) * self._height_factor(array)
         raise self.fail(
             str(wind.name), "the geopotential height of its pressure levels is missing (gh, HGT, z): add it to the file"
         )
 
     def _values(self, array: Any, level_dim: str | None = None) -> Floats:
-        """Return the values of a variable around the box at the common times, (m, t, y, x, k)."""
+        """Return the values of a variable around the box at the common times, (m, t, y, x, k).
+
+        t is 1 for a variable without times.
+        """
         latitude, longitude = self._horizontal(array)
+        axes = self._axes(array)
+        if any(not np.array_equal(*pair) for pair in zip(axes, (self.latitudes, self.longitudes), strict=True)):
+            raise self.fail(str(array.name), "its grid differs from the grid of the other variables")
         time_dim = None
-        if any(np.issubdtype(c.dtype, np.datetime64) for c in array.coords.values()):
+        if _time_coordinates(array):
             time_dim, times = self._valid_times(array)
+            if not np.isin(self.times, times).all():
+                raise self.fail(str(array.name), "its times differ from the times of the winds")
             if time_dim is not None:
                 array = array.isel({time_dim: np.flatnonzero(np.isin(times, self.times))})
         member_dim = next((str(dim) for dim in array.dims if str(dim) in _MEMBER_DIMS), None)
@@ -417,20 +448,20 @@ class _ForecastReader:
                 str(array.name), f"dimension {extra[0]!r} is not known: allowed time, level, member and place"
             )
         array = array.isel(dict.fromkeys(extra, 0))
-        for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
-            array = array.expand_dims(name) if dim is None else array.rename({dim: name})
         if latitude.ndim == 1:
-            rows, columns = self._node_indices(latitude, longitude)
-            array = array.isel({space[0]: rows, space[1]: columns})
-        array = array.transpose("_member", "_time", *space, "_level")
+            nodes = self._node_indices(latitude, longitude)
+        else:
+            nodes = near_nodes(latitude.values, longitude.values, self.latitudes, self.longitudes)
+        array = array.isel(dict(zip(space, nodes, strict=True)))
         if array.size > MAX_NODES:
             raise self.fail(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
-        try:
-            values = array.values.astype(np.float64)
-        except Exception as error:
-            raise _damaged(self.path, error) from error
+        array = _call_library(self.path, array.load)
+        for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
+            array = array.expand_dims(name) if dim is None else array.rename({dim: name})
+        values = array.transpose("_member", "_time", *space, "_level").values.astype(np.float64)
         if latitude.ndim == 2:
-            values = regrid(values, latitude.values, longitude.values, self.latitudes, self.longitudes)
+            around = np.ix_(*nodes)
+            values = regrid(values, latitude.values[around], longitude.values[around], *axes)
         return values
 
 
@@ -442,6 +473,16 @@ def _names_of(name: Any, array: Any) -> set[str]:
     """Return the names that identify a variable, in lower case."""
     stated = (name, array.attrs.get("standard_name"), array.attrs.get("GRIB_shortName"))
     return {str(text).lower() for text in stated if text is not None}
+
+
+def _time_coordinates(array: Any) -> dict[str, Any]:
+    """Return the coordinates of a variable that are times, by name, without its time of issue."""
+    return {
+        str(name): coordinate
+        for name, coordinate in array.coords.items()
+        if np.issubdtype(coordinate.dtype, np.datetime64)
+        and coordinate.attrs.get("standard_name") != "forecast_reference_time"
+    }
 
 
 def _is_component(name: Any, array: Any, pattern: re.Pattern[str], standard_names: tuple[str, ...]) -> bool:

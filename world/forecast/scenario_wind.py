@@ -1,6 +1,7 @@
 """Make the wind of a scenario from the forecast that its [wind] table names."""
 
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,9 +11,16 @@ import numpy as np
 from world.airspace.zone_times import parse_span
 from world.arrays import Floats
 from world.errors import ForecastError
-from world.forecast.forecast import Forecast
-from world.forecast.read_forecast import Box, read_forecast
-from world.forecast.wind_field import fit_mean_profile, subtract_profile, without_high_levels
+from world.forecast.forecast import Box, Forecast, ForecastFacts
+from world.forecast.read_forecast import read_forecast
+from world.forecast.wind_field import (
+    MAX_FIELD_NUMBERS,
+    MeanProfile,
+    fit_mean_profile,
+    limit_gradient,
+    subtract_profile,
+    without_high_levels,
+)
 from world.frames import GeoOrigin, to_geo
 from world.wind import Wind
 
@@ -23,6 +31,14 @@ if TYPE_CHECKING:
 _CLEARANCE_M = 150.0
 # Greatest height above the start of ground that counts for this, m.
 _MAX_CLIMB_M = 2000.0
+# Distance below the lowest level within which the lowest level's wind applies, m.
+MAX_DEPTH_BELOW_LEVELS_M = 100.0
+# Distance around a forecast of a single place within which it applies, m: half a cell of a global model.
+PLACE_RADIUS_M = 15_000.0
+# Distance beyond the outermost nodes that is a rounding error, deg.
+_BOX_TOLERANCE_DEG = 1e-6
+# Strongest mean wind at the start, m/s: the range of a scenario's [wind] speed_mps.
+_MAX_MEAN_WIND_MPS = 40.0
 
 
 def map_box(origin: GeoOrigin, bounds: Floats) -> Box:
@@ -70,8 +86,8 @@ def forecast_wind(
     at: time of flight, whose start is the take-off.
     member: member of the ensemble.
 
-    Raises ForecastError if the take-off is outside the forecast's times, or an end of the mission outside its box or
-    its levels.
+    Raises ForecastError if the take-off is outside the forecast's times, an end of the mission outside its box or its
+    levels, or the mean wind stronger than a scenario's wind may be.
     """
     file, departure = str(table.forecast), departure_of(at)
     if not forecast.first_time <= departure <= forecast.last_time:
@@ -81,24 +97,26 @@ def forecast_wind(
             f"take-off {departure:%Y-%m-%d %H:%M} UTC",
             f"the forecast covers {forecast.first_time:%Y-%m-%d %H:%M} to {forecast.last_time:%Y-%m-%d %H:%M} UTC",
         )
-    facts = forecast.facts(departure)
     latitudes, longitudes = to_geo(site.origin, [point[0] for point in site.ends], [point[1] for point in site.ends])
-    altitudes = [float(point[2]) for point in site.ends]
-    if fault := facts.place_fault(latitudes, longitudes) or facts.altitude_fault(altitudes):
-        raise ForecastError(f"{file}: {fault}", file=file)
-    reference = altitudes[0]
+    altitudes = np.array([float(point[2]) for point in site.ends])
+    reference = float(altitudes[0])
     field = without_high_levels(forecast.field_from(departure, member), reference)
+    if field.packed().size > MAX_FIELD_NUMBERS:
+        shown = f"{field.packed().size:,} numbers for a flight"
+        raise ForecastError.at(file, "nodes", shown, f"allowed {MAX_FIELD_NUMBERS:,}: make its area smaller")
     # A mission flies from its lower end to somewhat above the highest ground.
-    lowest, highest = min(altitudes), max(*altitudes, min(site.max_ground, reference + _MAX_CLIMB_M)) + _CLEARANCE_M
+    highest = max(float(altitudes.max()), min(site.max_ground, reference + _MAX_CLIMB_M)) + _CLEARANCE_M
     place = float(latitudes[0]), float(longitudes[0])
-    profile = fit_mean_profile(field, 0.0, *place, reference, (lowest, highest))
-    new_table = table.model_copy(
-        update={
-            "speed_mps": profile.speed,
-            "from_deg": round(math.degrees(profile.from_course), 5),
-            "gradient": profile.gradient,
-        }
-    )
+    profile = fit_mean_profile(field, 0.0, *place, reference, (float(altitudes.min()), highest))
+    if profile.speed > _MAX_MEAN_WIND_MPS:
+        raise ForecastError.at(
+            file,
+            "wind at the start",
+            f"{profile.speed:.1f} m/s at {departure:%Y-%m-%d %H:%M} UTC",
+            f"allowed 0..{_MAX_MEAN_WIND_MPS:g} m/s",
+        )
+    from_deg = round(math.degrees(profile.from_course), 5)
+    entries = {"speed_mps": profile.speed, "from_deg": from_deg, "gradient": profile.gradient}
     wind = Wind(
         profile.speed,
         profile.from_course,
@@ -107,6 +125,78 @@ def forecast_wind(
         table.seed,
         reference,
         subtract_profile(field, profile, reference),
-        facts,
+        forecast.facts(departure),
     )
-    return wind, new_table
+    check_coverage(wind, file, latitudes, longitudes, altitudes)
+    return wind, table.model_copy(update=entries)
+
+
+def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats, altitudes: Floats) -> None:
+    """Raise ForecastError if places of a mission are outside the box or the levels of the wind's forecast.
+
+    file: file of the forecast, for the message.
+    latitudes, longitudes: (n,) deg.
+    altitudes: (n,) m AMSL.
+    """
+    facts = wind.forecast
+    if facts is None:
+        return
+    _check_places(facts, file, latitudes, longitudes)
+    lowest, highest = np.array(facts.lowest_amsl), np.array(facts.highest_amsl)
+    if wind.field is not None:
+        # The levels at each place: levels above ground follow the ground of the forecast's model.
+        lowest = wind.field.limit_altitudes(0.0, latitudes, longitudes, -math.inf)
+        highest = wind.field.limit_altitudes(0.0, latitudes, longitudes, math.inf)
+    above, below = altitudes - highest, lowest - MAX_DEPTH_BELOW_LEVELS_M - altitudes
+    if above.max() > 0.0:
+        k = int(np.argmax(above))
+        top = float(altitudes[k] - above[k])
+        shown = f"the mission flies at {altitudes[k]:.0f} m AMSL"
+        raise ForecastError.at(file, "levels", shown, f"the forecast's highest level is at {top:.0f} m AMSL there")
+    if below.max() > 0.0:
+        k = int(np.argmax(below))
+        bottom = float(altitudes[k] + below[k]) + MAX_DEPTH_BELOW_LEVELS_M
+        raise ForecastError.at(
+            file,
+            "levels",
+            f"the mission flies at {altitudes[k]:.0f} m AMSL",
+            f"the forecast's lowest level is at {bottom:.0f} m AMSL there, and applies {MAX_DEPTH_BELOW_LEVELS_M:.0f} m"
+            " below itself",
+        )
+
+
+def _check_places(facts: ForecastFacts, file: str, latitudes: Floats, longitudes: Floats) -> None:
+    """Raise ForecastError if places (deg) are outside the forecast's box, or too far from its only place."""
+    south, west, north, east = facts.box
+    center = 0.5 * (west + east)
+    near = center + (longitudes - center + 180.0) % 360.0 - 180.0
+    if not facts.grid_km:
+        east_distance = (near - west) * 111_000.0 * math.cos(math.radians(south))
+        distances = np.hypot((latitudes - south) * 111_000.0, east_distance)
+        is_outside = distances > PLACE_RADIUS_M
+        allowed = f"within {PLACE_RADIUS_M / 1000.0:.0f} km of the forecast's only place, {south:.3f}, {west:.3f}"
+    else:
+        beyond = np.maximum.reduce([south - latitudes, latitudes - north, west - near, near - east])
+        is_outside = beyond > _BOX_TOLERANCE_DEG
+        allowed = f"the forecast's box is {south:.3f} to {north:.3f}, {west:.3f} to {east:.3f}"
+    if is_outside.any():
+        k = int(np.argmax(is_outside))
+        shown = f"the mission is at {latitudes[k]:.3f}, {longitudes[k]:.3f}"
+        raise ForecastError.at(file, "latitude, longitude", shown, allowed)
+
+
+def shift_wind(wind: Wind, speed: float, from_course: float, gradient: float) -> Wind:
+    """Return a wind with another mean.  The wind of a forecast changes by the same vector everywhere.
+
+    speed, from_course, gradient: see `Wind`.  A change of the gradient is added to the wind of a forecast.
+    """
+    field, mean_gradient = wind.field, gradient
+    if field is not None:
+        heights = field.altitudes - wind.reference_amsl
+        mean_gradient = limit_gradient(gradient, speed, heights)
+        old_mean = MeanProfile(wind.speed, wind.from_course, wind.gradient).velocities_at(heights)
+        new_mean = MeanProfile(speed, from_course, mean_gradient).velocities_at(heights)
+        old_shift = MeanProfile(wind.speed, wind.from_course, 0.0).velocities_at(heights)
+        new_shift = MeanProfile(speed, from_course, gradient - wind.gradient).velocities_at(heights)
+        field = replace(field, velocities=field.velocities + old_mean - old_shift + new_shift - new_mean)
+    return replace(wind, speed=speed, from_course=from_course, gradient=mean_gradient, field=field)

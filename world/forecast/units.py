@@ -4,10 +4,14 @@ from collections.abc import Mapping
 
 # Standard gravity, by which geopotential is divided to give geopotential height, m/s^2.
 GRAVITY_STANDARD = 9.80665
+# Fastest wind that a forecast may state, m/s: faster winds are an error of units.
+MAX_WIND_MPS = 150.0
 # Factors to m/s.
 SPEED_UNITS: Mapping[str, float] = {"m/s": 1.0, "knots": 1852.0 / 3600.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 # Factors to m.
 HEIGHT_UNITS: Mapping[str, float] = {"m": 1.0, "km": 1000.0, "ft": 0.3048}
+# Units of geopotential, without spaces.
+GEOPOTENTIAL_UNITS = ("m2s-2", "m**2s**-2", "m^2/s^2", "m2/s2", "m^2s^-2", "J/kg", "Jkg-1", "Jkg**-1")
 # Factors to hPa.
 PRESSURE_UNITS: Mapping[str, float] = {"hPa": 1.0, "Pa": 0.01}
 # Factors to degrees.

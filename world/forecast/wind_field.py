@@ -2,7 +2,7 @@
 
 The interpolation is linear in time, latitude and longitude on every level, of the level's altitude and of the wind
 alike, and then linear in altitude between the two levels around the aircraft.  Beyond the first and the last node of an
-axis, the value at that node applies.
+axis, and below the lowest and above the highest level, the value at that node or level applies.
 """
 
 import bisect
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from world.arrays import Floats
 from world.kernels import compiled, inner
@@ -83,24 +84,32 @@ class WindField:
             raise ValueError("not a wind field")
         first, second, third = np.split(numbers[_HEADER_SIZE:axes_end], np.cumsum(shape[:2]))
         nodes = numbers[axes_end:].reshape(*shape, _NODE_SIZE)
-        return cls(first, second, third, nodes[..., 0].copy(), nodes[..., 1:].copy())
+        is_ascending = all((np.diff(axis) > 0.0).all() for axis in (first, second, third))
+        if not is_ascending or (np.diff(nodes[..., _ALTITUDE], axis=-1) < 0.0).any():
+            raise ValueError("not a wind field")
+        return cls(first, second, third, nodes[..., _ALTITUDE].copy(), nodes[..., _EAST:].copy())
 
-    def velocities_at(self, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats) -> Floats:
-        """Return the wind at n points, m/s, (n, 2) east and north.
+    def velocities_at(
+        self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
+    ) -> Floats:
+        """Return the wind at n points, m/s, (n, 2) east and north; arguments as for `limit_altitudes`."""
+        return self._interpolate(seconds, latitudes, longitudes, altitudes)[:, :2]
 
-        seconds: (n,) s.
-        latitudes, longitudes: (n,) deg.
-        altitudes: (n,) m AMSL.
+    def limit_altitudes(
+        self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
+    ) -> Floats:
+        """Return the altitudes at which the wind at n points applies, (n,) m AMSL: limited to the field's levels there.
+
+        seconds: (n,) s, or one value, as all arguments.
+        latitudes, longitudes: deg.
+        altitudes: m AMSL.
         """
-        center = 0.5 * (self.longitudes[0] + self.longitudes[-1])
-        near_longitudes = center + (np.asarray(longitudes) - center + 180.0) % 360.0 - 180.0
-        return _interpolate_points(
-            self.packed(),
-            np.ascontiguousarray(seconds, dtype=np.float64),
-            np.ascontiguousarray(latitudes, dtype=np.float64),
-            np.ascontiguousarray(near_longitudes, dtype=np.float64),
-            np.ascontiguousarray(altitudes, dtype=np.float64),
-        )
+        return self._interpolate(seconds, latitudes, longitudes, altitudes)[:, 2]
+
+    def _interpolate(self, *points: ArrayLike) -> Floats:
+        """Return what `interpolate_field` does at n points, (n, 3)."""
+        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values, dtype=np.float64)) for values in points))
+        return _interpolate_points(self.packed(), *(np.ascontiguousarray(array) for array in arrays))
 
     def between(self, start: float, end: float) -> "WindField":
         """Return the part of the field that determines the wind from `start` to `end` (s)."""
@@ -158,12 +167,14 @@ def _level_number(
 @inner
 def interpolate_field(
     field: Floats, seconds: float, latitude: float, longitude: float, altitude: float
-) -> tuple[float, float]:
-    """Return the wind at a point of a packed field, m/s, east and north.
+) -> tuple[float, float, float]:
+    """Return the wind at a point of a packed field, m/s, east and north, and the altitude at which it applies, m AMSL.
+
+    That altitude is the point's altitude, limited to the levels there.
 
     field: `WindField.packed`.
     seconds: s on the field's axis of time.
-    latitude, longitude: deg; the longitude within half a turn of the field.
+    latitude, longitude: deg; the longitude in any turn.
     altitude: m AMSL.
     """
     times, rows = int(field[_TIME_COUNT]), int(field[_ROW_COUNT])
@@ -171,6 +182,10 @@ def interpolate_field(
     rows_begin = _HEADER_SIZE + times
     columns_begin = rows_begin + rows
     nodes_begin = columns_begin + columns
+    # The turn of the longitude that is nearest to the field.
+    offset = longitude - 0.5 * (field[columns_begin] + field[nodes_begin - 1])
+    if abs(offset) > 180.0:
+        longitude -= 360.0 * round(offset / 360.0)
     time, time_fraction = _bracket(field, _HEADER_SIZE, times, seconds)
     row, row_fraction = _bracket(field, rows_begin, rows, latitude)
     column, column_fraction = _bracket(field, columns_begin, columns, longitude)
@@ -196,24 +211,27 @@ def interpolate_field(
             low = high
             level += 1
         fraction = (altitude - low) / (high - low) if level < levels - 1 else 0.0
+        altitude = min(altitude, high)
+    else:
+        altitude = low
     below = corner + level * _NODE_SIZE
     east = _level_number(field, below, steps, fractions, _EAST)
     north = _level_number(field, below, steps, fractions, _NORTH)
     if fraction > 0.0:
         east += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _EAST) - east)
         north += fraction * (_level_number(field, below + _NODE_SIZE, steps, fractions, _NORTH) - north)
-    return east, north
+    return east, north, altitude
 
 
 @compiled
 def _interpolate_points(
     field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
 ) -> Floats:
-    velocities = np.empty((seconds.size, 2))
+    found = np.empty((seconds.size, 3))
     for k in range(seconds.size):
-        east, north = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])
-        velocities[k, 0], velocities[k, 1] = east, north
-    return velocities
+        east, north, altitude = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])
+        found[k, 0], found[k, 1], found[k, 2] = east, north, altitude
+    return found
 
 
 # ----------------------------------------------------------------------
@@ -223,11 +241,12 @@ def _interpolate_points(
 PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
 # Number of altitudes of a mission to which its mean profile is fitted.
 _PROFILE_POINTS = 9
-# Levels above this height over the reference altitude are left out, except the lowest of them, m.
-_MAX_HEIGHT_M = 4000.0
+# Levels above this height over the reference altitude are left out, except the lowest of them, m: all altitudes of a
+# scenario are between -500 and 9,000 m AMSL.
+_MAX_HEIGHT_M = 9500.0
 # Largest gradient of a mean profile, 1/s: the range of a scenario's [wind] gradient.
 _MAX_GRADIENT = 0.05
-# A field that differs from its mean profile by less than this everywhere is the mean profile, m/s.
+# A field that differs from its mean wind by less than this everywhere is the same everywhere, m/s.
 UNIFORM_TOLERANCE_MPS = 1e-4
 
 
@@ -302,15 +321,24 @@ def fit_mean_profile(
     ones = np.ones(points.size)
     samples = field.velocities_at(seconds * ones, latitude * ones, longitude * ones, points)
     profile = fit_profile_line(points - reference_amsl, samples)
-    heights = field.altitudes - reference_amsl
+    gradient = limit_gradient(profile.gradient, profile.speed, field.altitudes - reference_amsl)
+    return replace(profile, gradient=gradient)
+
+
+def limit_gradient(gradient: float, speed: float, heights: Floats) -> float:
+    """Return a gradient (1/s) limited so that the speed of a mean profile is at least 0 at heights (m).
+
+    speed: m/s at height 0.
+    """
     lowest, highest = min(-1.0, float(heights.min())), max(1.0, float(heights.max()))
-    gradient = max(min(profile.gradient, profile.speed / -lowest), -profile.speed / highest)
-    return replace(profile, gradient=round(gradient, 9))
+    limited = max(min(_MAX_GRADIENT, max(-_MAX_GRADIENT, gradient), speed / -lowest), -speed / highest)
+    # Nine decimals, rounded towards 0.
+    return math.trunc(limited * 1e9) / 1e9
 
 
 def subtract_profile(field: WindField, profile: MeanProfile, reference_amsl: float) -> WindField | None:
-    """Return the deviation of a field from its mean profile; None if the field is the mean profile."""
+    """Return the deviation of a field from its mean profile; None for a wind that is the same everywhere."""
     deviations = field.velocities - profile.velocities_at(field.altitudes - reference_amsl)
-    if float(np.abs(deviations).max()) < UNIFORM_TOLERANCE_MPS:
+    if profile.gradient == 0.0 and float(np.abs(deviations).max()) < UNIFORM_TOLERANCE_MPS:
         return None
     return WindField(field.times, field.latitudes, field.longitudes, field.altitudes, deviations)

@@ -17,6 +17,7 @@ from tests.planfly.commands.imported_log_files import FLIGHTS
 from tests.planfly.commands.test_survey import FIELD_SURVEY
 from tests.planfly.conftest import FIELD
 from tests.stopwatch import processes_of
+from tests.world.made.forecast_files import open_meteo_answer, wind_dataset, write_json
 
 ROOT = Path(__file__).parents[3]
 # 0.8 km there and 0.4 km on.
@@ -28,6 +29,7 @@ SHORT = """QGC WPL 110
 """
 _RADIO = ("--frequency", "915", "--power", "20", "--sensitivity", "-100")
 _AREA = ("--box", "36.25,-84.3,36.3,-84.2")
+_DEPARTURES = ("--from", "2026-05-01T06:00Z", "--to", "2026-05-01T06:00Z", "--flights", "10")
 _CAMPAIGN = ("short.waypoints", "--scenario", "field.toml", "--workers", "1", "--out", "out")
 
 
@@ -77,6 +79,7 @@ EVERY = {
             ("battery", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--json", "new.json"),
             (0, 3, 4),
         ),
+        Given(("window", *_CAMPAIGN, "--forecast", "winds.json", *_DEPARTURES), (0, 3, 4), "out"),
         Given(
             ("ground-risk", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--out", "out"),
             (3,),
@@ -108,6 +111,7 @@ def make_inputs(folder: Path, flight: Path, broken: Path, *, imported: bool) -> 
     folder.mkdir()
     (folder / "field.toml").write_text(FIELD, encoding="utf-8")
     (folder / "short.waypoints").write_text(SHORT, encoding="ascii")
+    write_json(folder / "winds.json", open_meteo_answer(wind_dataset(3.0, 1.0), 46.0, 8.0))
     shutil.copy(FIELD_SURVEY, folder / "lines.waypoints")
     for path in (flight / "flight.mcap", flight / "plan.json", broken, FLIGHTS / "tight.BIN"):
         shutil.copy(path, folder)

@@ -1,0 +1,59 @@
+"""Read a GRIB file in another process.
+
+Its library, eccodes, aborts the process on some damaged files.  It also brings other versions of PROJ and SQLite, with
+which pyproj and rasterio, if they are imported later, end the process, and prints to standard error.
+"""
+
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+from world.errors import ForecastError
+from world.forecast.forecast import Box, Forecast
+
+# Writes a pickled Forecast or ForecastError to standard output, to which no library prints.
+_PROGRAM = """
+import os, pickle, sys
+answer = os.fdopen(os.dup(1), "wb")
+os.dup2(2, 1)
+from world.errors import ForecastError
+from world.forecast.read_forecast import read_grib
+try:
+    found = read_grib(*pickle.load(sys.stdin.buffer))
+except ForecastError as error:
+    found = error
+pickle.dump(found, answer)
+"""
+# Time after which the process is ended, s.
+_TIMEOUT_S = 1800.0
+
+
+def read_in_process(path: Path, box: Box, ground_amsl: float) -> Forecast:
+    """Read a GRIB file as `world.forecast.read_forecast.read_forecast` does.  Raises ForecastError."""
+    # The child process finds planfly's packages where this process found them.
+    root = str(Path(__file__).parents[2])
+    paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        process = subprocess.run(
+            [sys.executable, "-c", _PROGRAM],
+            input=pickle.dumps((path, box, ground_amsl)),
+            env=os.environ | {"PYTHONPATH": paths},
+            capture_output=True,
+            check=False,
+            timeout=_TIMEOUT_S,
+        )
+        code, lines = process.returncode, process.stderr.decode(errors="replace").splitlines()
+    except subprocess.TimeoutExpired:
+        code, lines = None, []
+    if code == 0:
+        found: Forecast | ForecastError = pickle.loads(process.stdout)
+        if isinstance(found, ForecastError):
+            raise found
+        return found
+    # Of Python's errors, the last line states the reason.
+    reason = (
+        lines[-1][:150] if code == 1 and lines else f"eccodes {'hangs' if code is None else 'aborts'} with this file"
+    )
+    raise ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
