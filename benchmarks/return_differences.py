@@ -1,10 +1,11 @@
 """Compare returns of the point mass with the same returns flown by the simulated autopilot in six degrees of freedom.
 
-``python -m benchmarks.return_differences [--returns N] [--autopilot NAME]``: flies the plan of `jacksboro-air` with four aircraft in three
-winds, draws N returns in all (300) from places where the aircraft is level and steady, and prints the differences of
-least clearance and of least distance outside a kill sphere: six degrees of freedom minus point mass.  The lead-in to
-each return is straight, so that returns which begin in a turn are not compared.  A return that begins with its back to
-its target may turn to either side; such returns are counted apart in the distances outside kill spheres.
+``python -m benchmarks.return_differences [--returns N] [--autopilot NAME]``: flies the plan of `jacksboro-air` with
+four aircraft in three winds, draws N returns in all (300) from places where the aircraft is level and steady, and
+prints the differences of least clearance and of least distance outside a kill sphere: six degrees of freedom minus
+point mass.  The lead-in to each return is straight, so that returns which begin in a turn are not compared.  A return
+that begins with its back to its target may turn to either side; the distances outside kill spheres are also printed
+without such returns.
 """
 
 import argparse

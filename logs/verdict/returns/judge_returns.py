@@ -546,26 +546,34 @@ def judge_returns(
         ]
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
         returns += reported_returns
+    return replace(
+        _no_returns(world, starts, interval),
+        each=tuple(returns),
+        jsbsim_differences=tuple(differences),
+        omitted_count=omitted_count,
+    )
+
+
+def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Returns:
+    """Return a `Returns` with all that does not depend on simulated returns, and without any return."""
     parameters = world.autopilot.parameters
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
-        each=tuple(returns),
+        each=(),
         interval=interval,
         causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
         reserve=ENERGY_RESERVE_FRACTION * world.setup.battery,
         flown=starts.is_flown,
-        jsbsim_differences=tuple(differences),
         stands_in=world.stands_in,
         unjudged_parts=world.unjudged_parts,
         autoland=None if world.has_other_law else autoland,
         autoland_assumed=parameters is not None and "RTL_AUTOLAND" in parameters.by_origin("assumed"),
+        landings=world.landings,
         autopilot=world.autopilot.title,
         path_text=world.autopilot.returns.path_text,
         trials_text=world.autopilot.returns.trials.text,
-        landings=world.landings,
-        omitted_count=omitted_count,
     )
 
 
