@@ -159,6 +159,11 @@ def _fixed_caption(text: str) -> Callable[[Subject], str]:
     return lambda _: text
 
 
+def _returning_autopilot(subject: Subject) -> str:
+    """Return the autopilot whose returns are drawn, in a caption."""
+    return "the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}"
+
+
 def _as_sentence(line: str) -> str:
     """Return a line as a sentence, with a capital letter, a full stop and a space."""
     return f"{line[:1].upper()}{line[1:]}. "
@@ -244,10 +249,8 @@ FIGURES = (
         _returns_view("worst-returns"),
         alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=lambda subject: (
-            ""
-            if subject.returns is None
-            else f"Simulated with the {subject.returns.returns.autopilot} model on a point"
-            " mass, in the mean wind, from the point where each return begins."
+            f"Simulated with {_returning_autopilot(subject)} model on a point mass, in the mean wind, from the point"
+            " where each return begins."
         ),
     ),
     FigureEntry(

@@ -102,27 +102,48 @@ def fly_returns(
     min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
 
     def fly(k: int, positions: Floats, result: Record) -> None:
-        fly_rtl(
-            starts[k],
-            routes[k],
-            targets[k].transit_altitude,
-            record,
-            aircraft.record,
-            aircraft.excess,
-            aircraft.power,
-            environment.heights,
-            environment.to_pixel,
-            environment.spheres,
-            environment.radii,
-            environment.known,
-            timeouts[k],
-            float(min_clearances[k]),
-            float(min_distances[k]),
-            positions,
-            result,
-        )
+        limits = timeouts[k], float(min_clearances[k]), float(min_distances[k])
+        transit_altitude = targets[k].transit_altitude
+        _fly_one(starts[k], routes[k], transit_altitude, record, aircraft, environment, limits, positions, result)
 
     return simulate_each(timeouts, fly, store_positions=store_positions)
+
+
+def _fly_one(
+    start: Record,
+    route: Records,
+    transit_altitude: float,
+    parameters: Record,
+    aircraft: PointMass,
+    environment: ReturnEnvironment,
+    limits: tuple[float, float, float],
+    positions: Floats,
+    result: Record,
+) -> None:
+    """Simulate an RTL; see `fly_rtl`.
+
+    limits: timeout, s, and height above ground and distance outside spheres, m, below which the RTL is aborted.
+    """
+    timeout, min_clearance, min_distance = limits
+    fly_rtl(
+        start,
+        route,
+        transit_altitude,
+        parameters,
+        aircraft.record,
+        aircraft.excess,
+        aircraft.power,
+        environment.heights,
+        environment.to_pixel,
+        environment.spheres,
+        environment.radii,
+        environment.known,
+        timeout,
+        min_clearance,
+        min_distance,
+        positions,
+        result,
+    )
 
 
 def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) -> Records:
@@ -203,7 +224,6 @@ def fly_rtl(
     estimated, state, memory, loiter = motions[0], states[0], memories[0], progress_records[0]
     target = waypoints[waypoints.shape[0] - 1]
     initialise_outcome(start, estimated, has_terrain, result)
-    initialise_state(start, aircraft, state)
     _initialise_memory(start, waypoints, parameters, aircraft, excesses, state, memory)
     pitch, path_angle, dt, energy = state.pitch, state.pitch - state.alpha, _TICK_S, 0.0
     lands, has_begun_sequence = not target.is_rtl, False
@@ -211,36 +231,54 @@ def fly_rtl(
         time = tick * dt
         if tick % _STORED_EVERY_TICKS == 0:
             store_position(estimated, positions, result)
-        eas_to_tas = eas_to_tas_ratio(estimated.up)
-        radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas_to_tas * eas_to_tas
-        distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
-        has_arrived = memory.rtl_climb_complete and distance < max(LOITER_CAPTURE_RADIUS_M, radius)
-        if lands:
-            has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
-        if has_arrived and math.isnan(result.arrival_time):
-            result.arrival_time, result.arrival_altitude = time, estimated.up
+        radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas_to_tas_ratio(estimated.up) ** 2
+        has_arrived = _update_arrival(estimated, waypoints, memory, radius, lands, has_begun_sequence, time, result)
         update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
+        if result.outcome == RETURN_TIMEOUT:
+            if result.clearance < min_clearance or result.sphere_distance < min_distance:
+                result.outcome = RETURN_ABORTED
+            elif has_arrived if lands else advance_loiter(estimated, target, loiter, radius, dt):
+                result.outcome = RETURN_ARRIVED
         if result.outcome != RETURN_TIMEOUT:
-            break
-        if result.clearance < min_clearance or result.sphere_distance < min_distance:
-            result.outcome = RETURN_ABORTED
-            break
-        if has_arrived if lands else advance_loiter(estimated, target, loiter, radius, dt):
-            result.outcome = RETURN_ARRIVED
             break
         state.pitch = pitch
         has_begun_sequence = _steer(
             state, estimated, waypoints, transit_altitude, parameters, memory, aircraft, lands, has_begun_sequence, dt
         )
         pitch, path_angle = _follow_setpoints(state, parameters, memory, aircraft, pitch, path_angle, dt)
-        energy += dt * advance_point_mass(
-            estimated, state, path_angle, memory.throttle_setpoint, aircraft, excesses, power, dt
-        )
+        throttle = memory.throttle_setpoint
+        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, dt)
     if result.clearance <= 0.0:
         result.outcome = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     are_arrays_alive = motions.size + states.size + memories.size + progress_records.size == 4
     result.energy = energy / 3600.0 if aircraft.has_power and are_arrays_alive else math.nan
+
+
+@inner
+def _update_arrival(
+    estimated: Record,
+    waypoints: Records,
+    memory: Record,
+    radius: float,
+    lands: bool,
+    has_begun_sequence: bool,
+    time: float,
+    result: Record,
+) -> bool:
+    """Return True over the destination, or once the leg to the landing is the current leg; record the first time.
+
+    radius: distance from the center, m, within which the aircraft has arrived at its loiter.
+    """
+    if lands:
+        has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
+    else:
+        target = waypoints[waypoints.shape[0] - 1]
+        distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
+        has_arrived = memory.rtl_climb_complete and distance < max(LOITER_CAPTURE_RADIUS_M, radius)
+    if has_arrived and math.isnan(result.arrival_time):
+        result.arrival_time, result.arrival_altitude = time, estimated.up
+    return has_arrived
 
 
 @inner
@@ -325,10 +363,11 @@ def _initialise_memory(
     state: Record,
     memory: Record,
 ) -> None:
-    """Set the control law's memory as after a long steady flight, also in a climb or a descent.
+    """Set the state of the point mass, and the control law's memory as after a long steady flight, also in a climb.
 
     In a steady climb the altitude reference is ahead of the aircraft by the lag of TECS.
     """
+    initialise_state(start, aircraft, state)
     climb_rate, eas_to_tas = start.velocity_up, eas_to_tas_ratio(start.up)
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up

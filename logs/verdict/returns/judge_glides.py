@@ -10,7 +10,7 @@ path, and stay out of kill spheres.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Literal, NamedTuple
 
@@ -223,18 +223,18 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     Low starts in take-offs and landings are omitted, because from them the aircraft descends straight ahead.
     """
     starts = starts.subset(np.flatnonzero(~starts.is_low))
-    sites, airspeed = _glide_sites(world), world.min_airspeed
-    burns_fuel = world.setup.envelope.volts <= 0.0
+    none = _no_glides(world)
+    sites, airspeed = none.sites, none.airspeed
     terrain, environment, aircraft = world.scenario.terrain, world.environment, world.aircraft
     if terrain is None or not aircraft.glides:
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="terrain" if terrain is None else "trim")
+        return replace(none, not_judged="terrain" if terrain is None else "trim")
     rows = starts.rows
     if not len(rows):
-        return Glides((), sites, airspeed, fuel=burns_fuel)
+        return none
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
     grid = glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="far")
+        return replace(none, not_judged="far")
     own_returns = _simulate_engine_out_returns(world, starts)
     bank, max_altitude = float(world.autopilot.turns.max_bank), float(rows["up"].max())
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
@@ -273,13 +273,16 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
             )
         )
     footprint = GlideFootprint(grid, np.minimum(home_min_altitudes, site_min_altitudes), is_landable)
+    return replace(none, each=tuple(glides), cell=grid.cell, footprint=footprint)
+
+
+def _no_glides(world: ReturnWorld) -> Glides:
+    """Return a `Glides` with all that does not depend on simulated glides, and without any glide."""
     return Glides(
-        tuple(glides),
-        sites,
-        airspeed,
-        grid.cell,
-        burns_fuel,
-        footprint=footprint,
+        (),
+        _glide_sites(world),
+        world.min_airspeed,
+        fuel=world.setup.envelope.volts <= 0.0,
         autopilot=world.autopilot.title,
         airspeed_name=world.min_airspeed_name,
         follows_terrain="terrain" in world.unjudged_parts,
