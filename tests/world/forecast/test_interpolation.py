@@ -41,7 +41,7 @@ def random() -> np.random.Generator:
 
 
 def random_places(random: np.random.Generator, low: float, high: float) -> tuple[Floats, ...]:
-    """Return seconds after the issue, latitudes, longitudes and altitudes within the box."""
+    """Return seconds after the first time, latitudes, longitudes and altitudes within the box."""
     return (
         random.uniform(0.0, 3.0 * 3600.0, COUNT),
         random.uniform(BOX.south, BOX.north, COUNT),
