@@ -28,7 +28,7 @@ _KINDS = {
 
 
 def times_of(hours: Sequence[float]) -> Any:
-    """Return times so many hours after the issue."""
+    """Return times so many hours after the first time."""
     return np.datetime64(ISSUED, "ns") + (np.asarray(hours) * 3600.0e9).astype("timedelta64[ns]")
 
 
