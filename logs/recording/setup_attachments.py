@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 import zstandard
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError, field_validator
 
 from flight.autopilots.autopilot import Autopilot, StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot, stored_name
@@ -247,6 +247,18 @@ class _ForecastFile(SetupModel):
     facts: ForecastFacts
     numbers: Annotated[int, Field(ge=0, le=MAX_FIELD_NUMBERS)]
 
+    @field_validator("facts")
+    @classmethod
+    def _check_facts(cls, facts: ForecastFacts) -> ForecastFacts:
+        """Refuse control characters, times without an offset from UTC, and numbers that are not finite."""
+        if not (facts.source + facts.ground).isprintable():
+            raise ValueError("control characters are not allowed")
+        if any(time is not None and time.tzinfo is None for time in (facts.issued, facts.departure, facts.last_time)):
+            raise ValueError("a time has no offset from UTC")
+        if not np.isfinite((facts.grid_km, facts.lowest_amsl, facts.highest_amsl, *facts.box)).all():
+            raise ValueError("a number is not finite")
+        return facts
+
 
 def pack_forecast(wind: Wind) -> dict[str, bytes]:
     """Encode the forecast of a wind as attachments, bytes by name; none for a stated wind."""
@@ -260,12 +272,15 @@ def pack_forecast(wind: Wind) -> dict[str, bytes]:
     return attachments
 
 
-def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind) -> Wind:
+def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind, *, is_in_forecast: bool) -> Wind:
     """Return a wind with the forecast of its attachments; the same wind without any.
 
+    is_in_forecast: True if the scenario names a forecast.
     Raises LogError for an attachment that is missing or has the wrong content.
     """
     if FORECAST_FILE not in attachments:
+        if is_in_forecast:
+            raise LogError(f"{source}: {FORECAST_FILE}: missing", file=source, field=FORECAST_FILE)
         return wind
     try:
         file = _ForecastFile.model_validate_json(attachments[FORECAST_FILE])
@@ -490,7 +505,8 @@ def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain 
         scenario = scenario_from_spec(spec, file_name, ground=terrain, external=external, is_stored=True)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
-    return replace(scenario, wind=unpack_forecast(attachments, source, scenario.wind))
+    is_in_forecast = None not in (scenario.spec.wind.forecast, scenario.spec.at)
+    return replace(scenario, wind=unpack_forecast(attachments, source, scenario.wind, is_in_forecast=is_in_forecast))
 
 
 def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:

@@ -82,7 +82,7 @@ def window(
     workers = make_workers(options["workers"], options["scheduler"], options["seed"])
     first = first or asked
     if first is None:
-        allowed = "missing: the first time of take-off, or the asked one by at, is needed"
+        allowed = "missing: the first time of take-off is needed, or the time that is asked about"
         raise ArgumentError.of_argument("earliest", None, allowed, shown="")
     if last is not None and last < first:
         raise ArgumentError.of_argument("latest", latest, f"expected a time after {first.isoformat()}")

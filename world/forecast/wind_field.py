@@ -84,7 +84,10 @@ class WindField:
             raise ValueError("not a wind field")
         first, second, third = np.split(numbers[_HEADER_SIZE:axes_end], np.cumsum(shape[:2]))
         nodes = numbers[axes_end:].reshape(*shape, _NODE_SIZE)
-        return cls(first, second, third, nodes[..., 0].copy(), nodes[..., 1:].copy())
+        is_ascending = all((np.diff(axis) > 0.0).all() for axis in (first, second, third))
+        if not is_ascending or (np.diff(nodes[..., _ALTITUDE], axis=-1) < 0.0).any():
+            raise ValueError("not a wind field")
+        return cls(first, second, third, nodes[..., _ALTITUDE].copy(), nodes[..., _EAST:].copy())
 
     def velocities_at(
         self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike

@@ -4,11 +4,13 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.reader import make_reader
 
 from aircraft.envelope import Envelope
@@ -29,6 +31,8 @@ from tests.logs.log_copies import Attachments, same
 from tests.logs.made_flight import make_setup, record
 from world import scenario as scenario_module
 from world.errors import LogError
+from world.forecast.forecast import ForecastFacts
+from world.forecast.wind_field import WindField
 from world.kernels import field_names
 from world.scenario import load_scenario, scenario_from_spec
 
@@ -232,3 +236,126 @@ def test_a_log_does_not_make_its_reader_open_files(track: Track, monkeypatch: py
     monkeypatch.setattr(scenario_module, "open_tiles", trap)
     with pytest.raises(LogError, match=r"terrain\.kind: 'dem'"):
         unpack_setup(attachments, "x.mcap")
+
+
+# ----------------------------------------------------------------------
+# The wind of a forecast.
+
+_NOON = datetime(2026, 5, 1, 12, tzinfo=UTC)
+_FACTS = ForecastFacts("winds.nc", _NOON, _NOON, _NOON, 2.2, 2, 10.0, 900.0, (45.9, 7.9, 46.1, 8.1), "", 1)
+
+
+def made_field() -> WindField:
+    altitudes = np.broadcast_to([100.0, 900.0], (1, 2, 2, 2))
+    velocities = np.arange(16.0).reshape(1, 2, 2, 2, 2)
+    return WindField(np.array([0.0]), np.array([45.9, 46.1]), np.array([7.9, 8.1]), altitudes, velocities)
+
+
+def setup_in_forecast(field: WindField | None) -> FlightSetup:
+    setup = make_setup(with_plan=False)
+    scenario = setup.scenario
+    table = scenario.spec.wind.model_copy(update={"forecast": "/nowhere/winds.nc"})
+    spec = scenario.spec.model_copy(update={"wind": table, "at": _NOON.isoformat()})
+    wind = dataclasses.replace(scenario.wind, field=field, forecast=_FACTS)
+    limits = dataclasses.replace(setup.limits, wind=wind)
+    return dataclasses.replace(setup, scenario=dataclasses.replace(scenario, spec=spec, wind=wind), limits=limits)
+
+
+@pytest.mark.parametrize("field", [made_field(), None])
+def test_the_wind_of_a_forecast_comes_back_without_its_file(
+    tmp_path: Path, track: Track, field: WindField | None
+) -> None:
+    setup = setup_in_forecast(field)
+    found = read_log(record(tmp_path / "a.mcap", setup, track)).setup
+    assert found.scenario.wind == setup.scenario.wind
+    assert found.scenario.wind.forecast == _FACTS
+    same(found, setup)
+
+
+def with_part(attachments: Attachments, name: str, data: bytes | None) -> Attachments:
+    """Return attachments with another content of one of them, whose hash is right; None leaves it out."""
+    setup = json.loads(attachments["setup.json"])
+    changed = {key: value for key, value in attachments.items() if key != name}
+    setup["sha256"].pop(name, None)
+    if data is not None:
+        changed[name] = data
+        setup["sha256"][name] = hashlib.sha256(data).hexdigest()
+    return changed | {"setup.json": json.dumps(setup).encode()}
+
+
+def packed_numbers(change: Callable[[Any], Any]) -> bytes:
+    """Return the packed field with changed numbers: 4 counts, 1 + 2 + 2 axes, and 8 nodes of 3 numbers."""
+    numbers = made_field().packed()
+    assert numbers.size == 4 + 5 + 24
+    return zstandard.compress(np.asarray(change(numbers), "<f8").tobytes())
+
+
+def put(numbers: Any, index: int, value: float) -> Any:
+    numbers[index] = value
+    return numbers
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda numbers: numbers[:-1],
+        lambda numbers: np.append(numbers, 0.0),
+        lambda numbers: put(numbers, -1, np.nan),
+        lambda numbers: put(numbers, 0, 2.0),
+        lambda numbers: put(numbers, 0, -1.0),
+        lambda numbers: put(numbers, 0, 1e300),
+        # Latitudes in another order, and the upper level of a node below the lower one.
+        lambda numbers: put(numbers, 5, 47.0),
+        lambda numbers: put(numbers, 12, 50.0),
+    ],
+)
+def test_altered_numbers_of_a_field_are_refused(change: Callable[[Any], Any]) -> None:
+    attachments = with_part(pack_setup(setup_in_forecast(made_field())), "forecast.wind", packed_numbers(change))
+    with pytest.raises(LogError, match=r"^x\.mcap: forecast\.wind: not the 33 numbers that forecast\.json states$"):
+        unpack_setup(attachments, "x.mcap")
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "message"),
+    [
+        ("forecast.wind", b"text", r"forecast\.wind: not the 33 numbers"),
+        ("forecast.wind", b"", r"forecast\.wind: not the 33 numbers"),
+        ("forecast.wind", None, r"forecast\.wind: not the 33 numbers"),
+        ("forecast.json", None, r"x\.mcap: forecast\.json: missing"),
+        ("forecast.json", b"[]", r"forecast\.json"),
+        ("forecast.json", b"{", r"forecast\.json"),
+    ],
+)
+def test_a_forecast_that_is_missing_or_no_forecast_is_refused(name: str, data: bytes | None, message: str) -> None:
+    attachments = with_part(pack_setup(setup_in_forecast(made_field())), name, data)
+    with pytest.raises(LogError, match=message) as caught:
+        unpack_setup(attachments, "x.mcap")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"source": "winds\n.nc"},
+        {"ground": "\u202e"},
+        {"departure": "2026-05-01T12:00:00"},
+        {"issued": "noon"},
+        {"grid_km": "Infinity"},
+        {"box": [45.9, 7.9, 46.1]},
+        {"levels": 1.5},
+    ],
+)
+def test_altered_facts_are_refused(change: dict[str, Any]) -> None:
+    attachments = pack_setup(setup_in_forecast(made_field()))
+    data = json.loads(attachments["forecast.json"])
+    data["facts"] |= change
+    with pytest.raises(LogError, match=r"^x\.mcap: forecast\.json: facts") as caught:
+        unpack_setup(with_part(attachments, "forecast.json", json.dumps(data).encode()), "x.mcap")
+    assert "\n" not in str(caught.value)
+
+
+def test_an_attachment_whose_hash_is_another_is_refused() -> None:
+    attachments = pack_setup(setup_in_forecast(made_field()))
+    for name in ("forecast.json", "forecast.wind"):
+        with pytest.raises(LogError, match=f"{name}: altered"):
+            unpack_setup(attachments | {name: attachments[name] + b" "}, "x.mcap")

@@ -29,15 +29,18 @@ SPREAD = """
 [wind_speed]
 distribution = "norm"
 scale = 2.0
+source = "made"
 [wind_from]
 distribution = "norm"
 scale = 20.0
+source = "made"
 """
 GRADIENTS = """
 [wind_gradient]
 distribution = "uniform"
 loc = 0.01
 scale = 1e-8
+source = "made"
 """
 # Fastest wind in which a made flight is flyable, m/s.
 LIMIT_MPS = 12.0
@@ -204,7 +207,7 @@ def test_one_worker_and_two_fly_the_same_rows(tmp_path: Path) -> None:
     rows = []
     for count in (1, 2):
         result = find_window(base, goal, Workers(count), lambda *_: None)
-        rows.append([replace(row, seconds=0.0) for departure in result.departures for row in departure.rows])
+        rows.append([replace(row, seconds=0.0, worker="") for departure in result.departures for row in departure.rows])
     assert rows[0] == rows[1]
     assert {row.outcome for row in rows[0]} == {"flyable"}
 

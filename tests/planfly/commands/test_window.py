@@ -110,7 +110,7 @@ def test_the_result_in_python(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        ((), "--from: missing: the first time of take-off, or the asked one by --at, is needed"),
+        ((), "--from: missing: the first time of take-off is needed, or the time that is asked about"),
         (("--from", "06:00"), "--from 06:00: expected a time in ISO 8601 with its offset from UTC"),
         (("--from", f"{DAY}06:00"), f"--from {DAY}06:00: expected a time in ISO 8601 with its offset from UTC"),
         (("--at", f"{DAY}06:00Z/{DAY}07:00Z"), f"--at {DAY}06:00Z/{DAY}07:00Z: expected a time in ISO 8601"),
