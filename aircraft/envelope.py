@@ -37,7 +37,8 @@ class Envelope:
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
     fastest_sd: standard deviation of the fastest level flight, m/s.
     power_sd: standard deviation of the logarithm of power.
-    battery_guessed, climb_guessed: True if the battery's energy, or the steepest climb, was not stated.
+    battery_guessed, climb_guessed, bank_guessed: True if the battery's energy, the steepest climb or the bank limit was
+        not stated.
     """
 
     aircraft: str
@@ -61,6 +62,7 @@ class Envelope:
     power_sd: float = 0.0
     battery_guessed: bool = False
     climb_guessed: bool = False
+    bank_guessed: bool = False
 
     def __post_init__(self) -> None:
         """Make the tables read-only."""

@@ -34,7 +34,9 @@ _PREFIX = "ident/"
 # Required keys.
 _REQUIRED_KEYS = frozenset({"climb_sd_deg", "descent_sd_deg"})
 # Optional keys.
-_OPTIONAL_KEYS = frozenset({"source", "quantity", "battery_guessed", "climb_guessed", "fastest_sd_mps", "power_sd"})
+_OPTIONAL_KEYS = frozenset(
+    {"source", "quantity", "battery_guessed", "climb_guessed", "bank_guessed", "fastest_sd_mps", "power_sd"}
+)
 # Further keys of `posterior.toml`, about the logs.
 _LOG_KEYS = frozenset(
     {
@@ -80,6 +82,7 @@ class Uncertainty:
     max_speed_sd: standard deviation of the fastest level flight, m/s.
     battery_guessed: True if the battery's energy was not stated.
     climb_guessed: True if the steepest climb was not stated.
+    bank_guessed: True if the bank limit was not stated.
     """
 
     source: str
@@ -90,6 +93,7 @@ class Uncertainty:
     battery_guessed: bool = False
     max_speed_sd: float = 0.0
     climb_guessed: bool = False
+    bank_guessed: bool = False
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
@@ -117,7 +121,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     climb_sd, descent_sd = (
         math.radians(_read_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg")
     )
-    guesses = {name: table.get(name, False) for name in ("battery_guessed", "climb_guessed")}
+    guesses = {name: table.get(name, False) for name in ("battery_guessed", "climb_guessed", "bank_guessed")}
     for name, value in guesses.items():
         if not isinstance(value, bool):
             raise FlightError.at(str(file), name, value, "expected true or false", shown=repr(value))
@@ -190,6 +194,8 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
     ]
     if uncertainty.climb_guessed:
         lines.append("climb_guessed = true  # state the true value with --climb")
+    if uncertainty.bank_guessed:
+        lines.append("bank_guessed = true  # of max_bank_deg; state the true value with --bank")
     if uncertainty.battery_guessed:
         lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
     for quantity in uncertainty.quantities:

@@ -1,5 +1,6 @@
 """Define the allowed numbers and words of arguments, for keywords of the API and command-line options."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -88,14 +89,20 @@ RANGES: Mapping[str, Range] = {
     "directions": Range(4, 72, "expected a whole number from 4 to 72", integer=True),
     "points": Range(1, MAX_BY_PROGRAM, f"expected 1 to {MAX_BY_PROGRAM} returns", integer=True),
     "every": Range(0.1, 3600.0, "expected a time from 0.1 to 3,600 s"),
-    "frequency": Range(30.0, 100_000.0, "expected a frequency from 30 to 100,000 MHz"),
+    "frequency": Range(30.0, 15_000.0, "expected a frequency from 30 to 15,000 MHz"),
     "power": Range(-30.0, 60.0, "expected a power from -30 to 60 dBm"),
     "sensitivity": Range(-150.0, 0.0, "expected a power from -150 to 0 dBm"),
     "antenna": Range(0.5, 500.0, "expected a height above ground from 0.5 to 500 m"),
+    "station_gain": Range(-20.0, 60.0, "expected a gain from -20 to 60 dBi"),
+    "aircraft_gain": Range(-20.0, 60.0, "expected a gain from -20 to 60 dBi"),
+    "cable_loss": Range(0.0, 60.0, "expected a loss from 0 to 60 dB"),
     "fade_margin": Range(0.0, 60.0, "expected a margin from 0 to 60 dB"),
+    "max_outage": Range(0.0, 3600.0, "expected a time from 0 to 3,600 s"),
     "most": Range(1.0, 40.0, "expected a speed from 1 to 40 m/s"),
     "margin": Range(0.0, 100.0, "expected a distance from 0 to 100 km"),
     "height": Range(1.0, 5000.0, "expected a height above ground from 1 to 5,000 m"),
+    "width": Range(1, 10_000, "expected a whole number of characters, 1 to 10,000", integer=True),
+    "population": Range(4, 10**6, "expected an even whole number from 4 to 1,000,000", integer=True),
 }
 # Allowed words for each keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
@@ -107,6 +114,7 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
     "log_hz": (60, 30, 20, 10),
     "datum": ("amsl", "ellipsoid"),
     "population_unit": ("per-cell", "per-km2"),
+    "use": ("telemetry", "control"),
     "problems": (7, 15, 30, 60),
 }
 
@@ -167,6 +175,26 @@ def is_valid_position(lat: float, lon: float) -> bool:
     (True, False)
     """
     return -89.0 <= lat <= 89.0 and -180.0 <= lon <= 180.0
+
+
+def parse_position(keyword: str, coordinates: Sequence[float]) -> tuple[float, float]:
+    """Return a latitude and a longitude, degrees.  Raises ArgumentError for anything else.
+
+    keyword: name of the argument, for the message.
+
+    >>> parse_position("station", ["46", 8])
+    (46.0, 8.0)
+    >>> parse_position("station", (46.0,))
+    Traceback (most recent call last):
+    world.errors.ArgumentError: station (46.0,): expected latitude -89..89 and longitude -180..180
+    """
+    try:
+        lat, lon = (float(value) for value in coordinates)
+    except (TypeError, ValueError):
+        lat = lon = math.nan
+    if not is_valid_position(lat, lon):
+        raise ArgumentError.of_argument(keyword, coordinates, "expected latitude -89..89 and longitude -180..180")
+    return lat, lon
 
 
 def is_valid_camera(numbers: Sequence[float]) -> bool:

@@ -24,7 +24,7 @@ from world.scenario import (
     with_wind,
     without_forecast,
 )
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_tables import Guidance, LinkUse, Navigation
 
 # Wind speed, m/s, and the direction from which the wind blows, degrees.
 Wind = tuple[float, float]
@@ -73,12 +73,12 @@ class FlightOptions(TypedDict, total=False):
 class MissionOptions(FlightOptions, total=False):
     """Options of the flight of a mission file or a plan, and of its world.
 
-    scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
+    scenario: a name, a TOML file or a `Scenario`; None for the plan's own, or one made around the mission.
     fence: files of fences and zones in addition to those of the mission.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.
     """
 
-    scenario: str | Path | None
+    scenario: Scenario | str | Path | None
     fence: Annotated[FencePaths, ()]
     seed: int | None
 
@@ -111,6 +111,33 @@ class LogOptions(MissionOptions, total=False):
     plan: str | Path | None
     flight: int | None
     datum: VerticalDatum | None
+
+
+class LinkOptions(LogOptions, total=False):
+    """Options of a radio link.  A missing option, or None, keeps the entry of the scenario's [link].
+
+    frequency: MHz.
+    power: output power of the transmitter, dBm.  sensitivity: power at which the receiver still works, dBm.
+    station: latitude and longitude of the station's antenna, degrees; by default the antenna stands at the mission's
+    home.
+    antenna: height of the station's antenna above ground, m.
+    station_gain, aircraft_gain: antenna gains, dBi.  cable_loss: losses of cables and connectors at both ends, dB.
+    fade_margin: required power above the sensitivity, dB.
+    max_outage: longest accepted time below the fade margin, s.
+    use: "telemetry" for the ground station's link, "control" for the pilot's remote control.
+    """
+
+    frequency: float | None
+    power: float | None
+    sensitivity: float | None
+    station: tuple[float, float] | None
+    antenna: float | None
+    station_gain: float | None
+    aircraft_gain: float | None
+    cable_loss: float | None
+    fade_margin: float | None
+    max_outage: float | None
+    use: LinkUse | None
 
 
 # Options that apply only to the log of another program.
@@ -254,8 +281,8 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
             if name not in signature.parameters:
                 hint = did_you_mean(name, signature.parameters)
                 raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
-        check_types(signature, args, keywords)
-        return function(*args, **{**defaults, **keywords})  # type: ignore[arg-type]
+        checked_args, checked_keywords = check_types(signature, args, keywords)
+        return function(*checked_args, **{**defaults, **checked_keywords})
 
     with_defaults.__signature__ = signature  # type: ignore[attr-defined]
     return with_defaults
@@ -281,6 +308,11 @@ def select_mission_options(options: MissionOptions) -> MissionOptions:
     return cast(
         MissionOptions, {name: value for name, value in options.items() if name in MissionOptions.__annotations__}
     )
+
+
+def select_log_and_mission_options(options: LogOptions) -> LogOptions:
+    """Return the options of a mission or of the log of another program, without the options of a radio link."""
+    return cast(LogOptions, {name: value for name, value in options.items() if name in LogOptions.__annotations__})
 
 
 def fence_file_names(options: MissionOptions) -> list[str]:

@@ -78,22 +78,26 @@ class Objectives(NamedTuple):
 class Certificate:
     """Result of the continuous check along the whole path, not only at six points per leg.
 
-    Margins are the smallest difference of limit and value, negative if the path fails.  For algorithms with graded
+    Margins are the smallest difference of limit and value, negative exactly if the path fails by this limit.  The
+    limits include the margins that a plan keeps, as the lines of ``problems`` state them.  For algorithms with graded
     violations, as the default, clearance, kill_distance, zone_distance and headroom are those of the worst position
     that is predicted for the autopilot: beside the legs by its lateral deviation, navigation error and excursion at
     corners, and above or below by its lag in altitude on slopes.  Its vertical deviation on a level leg is part of the
-    required margins.  For bounds both deviations are subtracted.  For other algorithms, such as "umda" and "de-paper",
+    required margins.  For bounds all deviations are subtracted.  For other algorithms, such as "umda" and "de-paper",
     nothing is subtracted: the margins are of the legs and fly-by arcs.  For given waypoints the algorithm of the
     scenario decides.
 
-    turn, slope: margins, rad.
-    available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.
-    clearance: smallest height above ground minus the required clearance, m.
+    turn: margin to the greatest course change, rad: the scenario's limit less 0.5 degrees, or 150 degrees for
+    ``max_turn_deg = "aircraft"``, which limits turns by the lengths of their legs.
+    available_length: smallest length of a leg minus the length that its turns, the roll between them and their settling
+    need, or minus 5 m for a leg that need not contain its turns, m.
+    slope: margin to the limits of climb and dive less 0.5 degrees, rad.
+    clearance: smallest height above ground minus the required clearance and its margin, m; NaN off the terrain.
     bounds: margin to map, floor and ceiling, m.
     kill_distance: distance from the nearest missile sphere, m; negative inside, inf without missiles.
-    zone_distance: distance outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is
-    violated, inf without zones.
-    headroom: maximum height above ground minus the greatest height, m; inf without a maximum.
+    zone_distance: distance outside exclusions and inside inclusions, minus the required distance, horizontal or
+    vertical, m; inf without zones.
+    headroom: maximum height above ground minus the greatest height and its margin, m; inf without a maximum.
     problems: one line per failure, empty if the path is certified.
     path_digest: `path_digest` of the certified path; "" if unknown.
     """
@@ -113,6 +117,20 @@ class Certificate:
     def ok(self) -> bool:
         """True if no constraint is violated anywhere on the path."""
         return not self.problems
+
+    @property
+    def margins(self) -> tuple[float, ...]:
+        """All margins of the path, from `turn` to `headroom`, (8,)."""
+        return (
+            self.turn,
+            self.available_length,
+            self.slope,
+            self.clearance,
+            self.bounds,
+            self.kill_distance,
+            self.zone_distance,
+            self.headroom,
+        )
 
 
 def path_digest(waypoints: Floats) -> str:
@@ -182,6 +200,23 @@ class Plan:
     def safe(self) -> bool:
         """True if the path is feasible and outside every missile sphere."""
         return self.feasible and self.certificate.kill_distance > 0.0
+
+    @property
+    def margins(self) -> tuple[float, ...]:
+        """Margins of the plan, (9,): all are 0 or more exactly if the plan is safe.
+
+        The first eight are those of the certificate, from `Certificate.turn` to `Certificate.headroom`, rad and m.  The
+        last is 0, or minus the number of the certificate's problems and of the violations at the paper's points: some
+        problems have no margin, such as a blocked approach.
+
+        >>> from world.scenario import load_scenario
+        >>> scenario = load_scenario("tight")
+        >>> path = np.stack([scenario.start, scenario.destination])
+        >>> low = Certificate(0.1, 9.0, 0.1, -2.0, 10.0, 50.0, ("leg 0: too low",))
+        >>> Plan(scenario, path, np.zeros(4), np.ones(4), low, 7, "umda", 60, np.zeros((0, 3))).margins
+        (0.1, 9.0, 0.1, -2.0, 10.0, 50.0, inf, inf, -1.0)
+        """
+        return (*self.certificate.margins, 0.0 - len(self.certificate.problems) - sum(self.violations))
 
     @property
     def state(self) -> str:
@@ -437,6 +472,10 @@ def plan_html(plan: Plan) -> str:
         (
             "outside missiles' reach by at least",
             f"{certificate.kill_distance:.0f} m" if math.isfinite(certificate.kill_distance) else "none",
+        ),
+        (
+            "lengths of legs to spare",
+            f"{certificate.available_length:.0f} m" if math.isfinite(certificate.available_length) else "none",
         ),
         ("turns and slopes to spare", f"{math.degrees(certificate.turn):.1f}°, {math.degrees(certificate.slope):.2f}°"),
         ("algorithm, seed", f"{plan.algorithm}, {plan.seed}"),

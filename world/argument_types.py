@@ -1,13 +1,14 @@
-"""Check the types of arguments that may be a text or a path, for functions of the API."""
+"""Check texts, paths, lists and functions, and convert numbers, in the arguments of functions of the API."""
 
-import contextlib
 import functools
 import inspect
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import is_dataclass
+from numbers import Real
 from pathlib import Path
-from types import NoneType
-from typing import Any, ParamSpec, TypeVar, get_args, get_origin
+from types import NoneType, UnionType
+from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin
 
 from world.errors import ArgumentError
 
@@ -30,29 +31,73 @@ def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Paramete
 
     @functools.wraps(function)
     def with_check(*args: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
-        check_types(signature, args, keywords)
-        return function(*args, **keywords)
+        checked_args, checked_keywords = check_types(signature, args, keywords)
+        return function(*checked_args, **checked_keywords)
 
     return with_check
 
 
-def check_types(signature: inspect.Signature, args: Sequence[Any], keywords: Mapping[str, Any]) -> None:
-    """Raise ArgumentError for the first argument that may be a text or a path, and is of no type that is allowed.
+def check_types(
+    signature: inspect.Signature, args: tuple[Any, ...], keywords: dict[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Return the arguments of a call, with Python's numbers in place of numpy's and of whole numbers such as 2.0.
 
-    Other arguments are numbers, words or data, which the called functions check.
+    Raises ArgumentError for the first argument that may be a text, a path, a list or a function, and is of no type that
+    is allowed.  Other arguments are numbers, words or data, which the called functions check.
+
     signature: signature of the called function.  args, keywords: arguments of the call.
+
+    >>> def plan(scenario: str, *, seed: int | None = None) -> None: ...
+    >>> check_types(inspect.signature(plan), ("tight",), {"seed": 2.0})
+    (('tight',), {'seed': 2})
     """
-    arguments: Mapping[str, Any] = {}
-    # A call with unknown or too many arguments then raises a TypeError that names the function.
-    with contextlib.suppress(TypeError):
-        arguments = signature.bind_partial(*args, **keywords).arguments
-    for name, argument in arguments.items():
+    try:
+        bound = signature.bind_partial(*args, **keywords)
+    except TypeError:
+        # With unknown or too many arguments the call raises a TypeError that names the function.
+        return args, keywords
+    for name, argument in bound.arguments.items():
         parameter = signature.parameters[name]
-        classes, item_classes = _allowed_classes(parameter.annotation)
         for value in argument if parameter.kind is parameter.VAR_POSITIONAL else (argument,):
-            if classes and not isinstance(value, classes) and not _is_sequence_of(value, item_classes):
-                allowed = f"expected {_classes_text(classes, item_classes)}"
-                raise ArgumentError.of_argument(name, value, allowed, shown=type(value).__name__)
+            if (expected := _expected_type(value, parameter.annotation)) is not None:
+                raise ArgumentError.of_argument(name, value, f"expected {expected}", shown=type(value).__name__)
+        bound.arguments[name] = _python_number(argument, parameter.annotation)
+    return bound.args, bound.kwargs
+
+
+def _python_number(value: Any, annotation: Any) -> Any:
+    """Return a number as Python's integer or float, as an annotation asks; any other value unchanged.
+
+    A number that is not whole, where integers are allowed, is unchanged, too.
+    """
+    if not isinstance(value, Real) or isinstance(value, int):
+        return value
+    members = get_args(annotation) or (annotation,)
+    if float in members:
+        return float(value)
+    number = float(value)
+    takes_integers = int in members or all(isinstance(one, int) for one in members)
+    return int(number) if takes_integers and number.is_integer() else value
+
+
+def _expected_type(value: Any, annotation: Any) -> str | None:
+    """Return the types that an annotation allows, in words, if a value is of none of them; otherwise None."""
+    classes, item_classes = _allowed_classes(annotation)
+    if classes:
+        is_allowed = isinstance(value, classes) or _is_sequence_of(value, item_classes)
+        return None if is_allowed else _classes_text(classes, item_classes)
+    if isinstance(annotation, type) and is_dataclass(annotation):
+        return None if isinstance(value, annotation) else f"a {annotation.__name__}"
+    members = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
+    kinds = {get_origin(member) for member in members if member is not NoneType}
+    if value is None and NoneType in members:
+        return None
+    if kinds == {Callable}:
+        return None if callable(value) else "a function"
+    # The functions themselves check positions and boxes, which are sequences of numbers.
+    if kinds == {Sequence} and float not in get_args(members[0]):
+        return None if isinstance(value, Iterable) and not isinstance(value, str | bytes) else "a list"
+    return None
 
 
 def _is_sequence_of(value: Any, classes: tuple[type, ...]) -> bool:

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import json
 import os
 import re
 import shutil
@@ -23,6 +24,8 @@ from world.interruption import delay_signals, remove_at_end
 _DOTTED_NAME = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
 # Maximum number of dots in a name.
 _MAX_DOTS = 100
+# A TOML key that needs no quotes.
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 class TextLine(NamedTuple):
@@ -158,6 +161,58 @@ def toml_table(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("tables or arrays are nested too deeply") from None
+
+
+def toml_text(table: Mapping[str, Any]) -> str:
+    """Return the TOML text of a table of texts, numbers, True, False, lists and tables, which `toml_table` reads.
+
+    >>> print(toml_text({"name": "a", "wind": {"speed_mps": 4.0}, "zones": [{"radius_m": 1e3}]}))
+    name = "a"
+    <BLANKLINE>
+    [wind]
+    speed_mps = 4.0
+    <BLANKLINE>
+    [[zones]]
+    radius_m = 1000.0
+    <BLANKLINE>
+    """
+    return "".join(f"{line}\n" for line in _toml_lines(table, ()))
+
+
+def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    """Yield the lines of a table: its values first, then the tables in it.
+
+    path: keys of the table, () for the whole text.
+    """
+    subtables = {key: value for key, value in table.items() if isinstance(value, Mapping) or _is_list_of_tables(value)}
+    for key, value in table.items():
+        if key not in subtables:
+            yield f"{_toml_key(key)} = {_toml_value(value)}"
+    for key, value in subtables.items():
+        keys = (*path, key)
+        name = ".".join(map(_toml_key, keys))
+        for subtable in [value] if isinstance(value, Mapping) else value:
+            yield ""
+            yield f"[{name}]" if isinstance(value, Mapping) else f"[[{name}]]"
+            yield from _toml_lines(subtable, keys)
+
+
+def _is_list_of_tables(value: Any) -> bool:
+    """Return True for a list with at least one table, which must not have other values."""
+    return isinstance(value, list) and any(isinstance(item, Mapping) for item in value)
+
+
+def _toml_key(key: str) -> str:
+    """Return a key as TOML, in quotes if it needs them."""
+    return key if _BARE_KEY.fullmatch(key) else _toml_value(key)
+
+
+def _toml_value(value: Any) -> str:
+    """Return a text, a number, True, False or a list of these as TOML."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml_value, value))}]"
+    # JSON's texts, numbers, true and false are TOML's, but for the control character that JSON leaves as it is.
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:

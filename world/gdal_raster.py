@@ -273,15 +273,17 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
 # Writing.
 
 
-def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: float) -> bytes:
-    """Return the bytes of a GeoTIFF of heights (m), compressed with deflate.
+def geotiff_bytes(values: NDArray[np.float32], grid: Grid, crs: str, nodata: float, unit: str = "m") -> bytes:
+    """Return the bytes of a GeoTIFF of heights or other values, compressed with deflate.
 
+    values: (rows, columns), rows from north to south.
     crs: a definition that PROJ accepts.
+    unit: unit of the values.
     """
     import rasterio
     from rasterio.io import MemoryFile
 
-    rows, cols = heights.shape
+    rows, cols = values.shape
     profile: dict[str, Any] = {
         "driver": "GTiff",
         "height": rows,
@@ -296,6 +298,6 @@ def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: fl
     }
     with rasterio.Env(**GUARD), MemoryFile() as memory:
         with memory.open(**profile) as file:
-            file.write(heights, 1)
-            file.units = ("m",)
+            file.write(values, 1)
+            file.units = (unit,)
         return bytes(memory.getbuffer())

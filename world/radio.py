@@ -2,12 +2,13 @@
 
 The loss is the free-space loss (ITU-R P.525-4, equation 4) plus the diffraction loss over the terrain by the Bullington
 construction (ITU-R P.526-15, section 4.5.1, equations 47 to 55), with an Earth of 4/3 of its radius.  Not modelled:
-vegetation, buildings, rain, reflections, antenna patterns, and shadowing by the airframe.
+vegetation, buildings, rain, absorption by the air, reflections, antenna patterns, and shadowing by the airframe.
 """
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +16,8 @@ from world.arrays import Flags, Floats
 from world.errors import ScenarioError
 from world.frames import GeoOrigin
 from world.map_positions import map_coordinates
-from world.scenario_tables import LinkTable
-from world.terrain import Terrain
+from world.scenario_tables import LinkTable, LinkUse
+from world.terrain import STRAIGHT_PIECE_M, Terrain
 
 # Speed of light, m/s.
 LIGHT_SPEED_MPS = 299_792_458.0
@@ -24,12 +25,15 @@ LIGHT_SPEED_MPS = 299_792_458.0
 EFFECTIVE_EARTH_RADIUS_M = 6_371_000.0 * 4.0 / 3.0
 # Smallest distance for which the loss is computed, m: nearer, the formula of the far field does not apply.
 MIN_DISTANCE_M = 10.0
+# Smallest height of an aircraft's antenna above ground, m: an aircraft on the ground, or below it by an error of the
+# terrain, is not behind the ground that it stands on.
+MIN_AIRCRAFT_HEIGHT_M = 0.5
 # Diffraction parameter below which a knife edge causes no loss (ITU-R P.526-15, equation 31).
 _MIN_DIFFRACTION_PARAMETER = -0.78
-# Largest number of ground heights on one path.
-_MAX_PROFILE_POINTS = 4000
-
-LinkUse = Literal["telemetry", "control"]
+# Smallest number of pieces of one path, between which the ground is sampled, whatever the spacing of the terrain.
+_MIN_PROFILE_PIECES = 50
+# Largest number of pieces of one path.
+_MAX_PROFILE_PIECES = 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +106,33 @@ def knife_edge_loss(diffraction_parameter: float) -> float:
     return 6.9 + 20.0 * math.log10(math.sqrt(shifted * shifted + 1.0) + shifted)
 
 
+def earth_bulge(distance: Floats, length: float) -> Floats:
+    """Return the height of the Earth's curve above the straight line between two places, m.
+
+    distance: distances from one of the places, m.
+    length: distance between the places, m.
+
+    >>> round(float(earth_bulge(np.array([25_000.0]), 50_000.0)[0]), 1)
+    36.8
+    """
+    return np.asarray(distance * (length - distance) / (2.0 * EFFECTIVE_EARTH_RADIUS_M))
+
+
+def line_of_sight(terrain: Terrain, station: Floats, aircraft: Floats) -> bool | None:
+    """Return True if the straight line between two antennas is clear of the ground; None if the ground is unknown.
+
+    The ground is interpolated bilinearly, raised by the bulge of the Earth, and compared exactly, not sampled.
+
+    station, aircraft: positions of the antennas, (3,) m.
+    """
+    length = math.dist(station[:2], aircraft[:2])
+    fractions = np.linspace(0.0, 1.0, max(1, math.ceil(length / STRAIGHT_PIECE_M)) + 1)
+    points = station + fractions[:, None] * (aircraft - station)
+    points[:, 2] -= earth_bulge(fractions * length, length)
+    clearances = [terrain.clearance(start, end)[0] for start, end in pairwise(points)]
+    return None if any(map(math.isnan, clearances)) else min(clearances) > 0.0
+
+
 class PathProfile(NamedTuple):
     """Ground between two antennas.
 
@@ -120,30 +151,27 @@ class PathLoss(NamedTuple):
 
     loss: dB; NaN if the ground is unknown.
     diffraction_loss: part of the loss that the terrain causes, dB.
-    is_visible: True if the straight line between the antennas is clear of the ground.
     fresnel_clearance: smallest clearance over the ground as a ratio of the first Fresnel zone's radius; inf for a path
         without ground between its ends.
     """
 
     loss: float
     diffraction_loss: float
-    is_visible: bool
     fresnel_clearance: float
 
 
 def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathProfile:
-    """Sample the ground between two antennas at the spacing of the terrain.
+    """Sample the ground between two antennas at the spacing of the terrain; an aircraft above the station has none.
 
     station, aircraft: positions of the antennas, (3,) m.
     """
     length = math.dist(station[:2], aircraft[:2])
-    count = min(_MAX_PROFILE_POINTS, math.ceil(length / max(1.0, terrain.spacing)))
-    fractions = np.arange(1, count) / max(1, count)
+    pieces = max(_MIN_PROFILE_PIECES, min(_MAX_PROFILE_PIECES, math.ceil(length / max(1.0, terrain.spacing))))
+    fractions = np.arange(1, pieces) / pieces if length >= MIN_DISTANCE_M else np.zeros(0)
     east = station[0] + fractions * (aircraft[0] - station[0])
     north = station[1] + fractions * (aircraft[1] - station[1])
     distances = fractions * length
-    bulge = distances * (length - distances) / (2.0 * EFFECTIVE_EARTH_RADIUS_M)
-    return PathProfile(distances, terrain.height(east, north) + bulge, length)
+    return PathProfile(distances, terrain.height(east, north) + earth_bulge(distances, length), length)
 
 
 def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: float, frequency: float) -> PathLoss:
@@ -155,21 +183,16 @@ def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: 
     slant_distance = math.hypot(profile.length, aircraft_altitude - station_altitude)
     free_loss = free_space_loss(slant_distance, frequency)
     if not profile.distances.size:
-        return PathLoss(free_loss, 0.0, True, math.inf)
+        return PathLoss(free_loss, 0.0, math.inf)
     if np.isnan(profile.altitudes).any():
-        return PathLoss(math.nan, math.nan, False, math.nan)
+        return PathLoss(math.nan, math.nan, math.nan)
     wavelength, remaining = LIGHT_SPEED_MPS / frequency, profile.length - profile.distances
     ray = station_altitude + (aircraft_altitude - station_altitude) * profile.distances / profile.length
     excess = profile.altitudes - ray
     # Radius of the first Fresnel zone (ITU-R P.526-15, equation 2).
     fresnel_radii = np.sqrt(wavelength * profile.distances * remaining / profile.length)
     diffraction_loss = _bullington_loss(profile, excess, fresnel_radii, station_altitude, aircraft_altitude, wavelength)
-    return PathLoss(
-        free_loss + diffraction_loss,
-        diffraction_loss,
-        bool((excess < 0.0).all()),
-        float((-excess / fresnel_radii).min()),
-    )
+    return PathLoss(free_loss + diffraction_loss, diffraction_loss, float((-excess / fresnel_radii).min()))
 
 
 def _bullington_loss(
@@ -225,17 +248,39 @@ def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: F
     """Compute the radio link between a station and each position of the aircraft.
 
     station: antenna, (3,) m.
-    positions: (t, 3) m.
+    positions: (t, 3) m; the aircraft's antenna is at least `MIN_AIRCRAFT_HEIGHT_M` above ground.
     """
-    losses = [
-        path_loss(path_profile(terrain, station, position), float(station[2]), float(position[2]), link.frequency)
-        for position in positions
-    ]
-    loss, diffraction_loss, is_visible, fresnel_clearance = np.array(losses, dtype=np.float64).reshape(-1, 4).T
+    antennas = _aircraft_antennas(terrain, positions)
+    loss, diffraction_loss, fresnel_clearance = _path_losses(link, terrain, station, antennas).T
+    sights = [line_of_sight(terrain, station, antenna) for antenna in antennas]
+    is_known = np.array([sight is not None for sight in sights], dtype=np.bool_)
     return LinkPoints(
-        link.allowed_loss - loss,
-        np.asarray(np.linalg.norm(positions - station, axis=1)),
+        np.where(is_known, link.allowed_loss - loss, np.nan),
+        np.asarray(np.linalg.norm(antennas - station, axis=1)),
         diffraction_loss,
-        is_visible > 0.0,
+        np.array(sights, dtype=np.bool_),
         fresnel_clearance,
     )
+
+
+def link_margins(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> Floats:
+    """Compute only the margin of `link_points` at positions (t, 3), m, in half of the time; dB, (t,)."""
+    losses = _path_losses(link, terrain, station, _aircraft_antennas(terrain, positions))[:, 0]
+    return np.asarray(link.allowed_loss - losses)
+
+
+def _aircraft_antennas(terrain: Terrain, positions: Floats) -> Floats:
+    """Return positions (t, 3), m, raised to `MIN_AIRCRAFT_HEIGHT_M` above known ground."""
+    antennas = np.array(positions, dtype=np.float64)
+    lowest = terrain.height(antennas[:, 0], antennas[:, 1]) + MIN_AIRCRAFT_HEIGHT_M
+    antennas[:, 2] = np.fmax(antennas[:, 2], lowest)
+    return antennas
+
+
+def _path_losses(link: RadioLink, terrain: Terrain, station: Floats, antennas: Floats) -> Floats:
+    """Return the fields of `PathLoss` between a station and each antenna (t, 3), m, as rows (t, 3)."""
+    losses = [
+        path_loss(path_profile(terrain, station, antenna), float(station[2]), float(antenna[2]), link.frequency)
+        for antenna in antennas
+    ]
+    return np.array(losses, dtype=np.float64).reshape(-1, 3)

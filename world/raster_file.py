@@ -55,9 +55,10 @@ class RasterFile:
 
     @property
     def centre(self) -> GeoOrigin:
-        """Centre of the tile, with a longitude in -180..180.
+        """Middle of the smallest and largest latitude and longitude of the outer pixel centres; longitude in -180..180.
 
-        This also holds for a tile that lies across the 180th meridian.
+        This also holds for a tile that lies across the 180th meridian.  The centre of a projected grid is some metres
+        away from it.
         """
         lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
         lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))

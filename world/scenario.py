@@ -1,7 +1,7 @@
 """A scenario: start and destination of a flight, terrain, threats, zones, wind and limits."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial, wraps
 from importlib import resources
@@ -26,9 +26,10 @@ from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zone
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
-from world.files import absolute_path, did_you_mean
+from world.files import absolute_path, did_you_mean, toml_text, write_atomically
 from world.forecast.forecast import Forecast
-from world.forecast.scenario_wind import forecast_wind, scenario_forecast
+from world.forecast.scenario_wind import ForecastSite, forecast_wind, scenario_forecast
+from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
 from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
@@ -161,6 +162,25 @@ class Scenario:
         deviations = field.velocities_at(seconds, *places, altitudes)
         return self.wind.velocities_at(field.limit_altitudes(seconds, *places, altitudes)) + deviations
 
+    def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
+        """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).
+
+        Without a forecast, it is the scenario's wind.
+        """
+        if self.wind.field is None:
+            return self.wind
+        up = float(position[2])
+        winds = np.array([self.wind_velocity((*position[:2], up + height), seconds) for height in PROFILE_HEIGHTS_M])
+        profile = fit_profile_line(PROFILE_HEIGHTS_M, winds)
+        return replace(
+            self.wind,
+            speed=profile.speed,
+            from_course=profile.from_course,
+            gradient=profile.gradient,
+            reference_amsl=up,
+            field=None,
+        )
+
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on zones changed or omitted on reading, on inactive zones, and on implausibly small threats."""
@@ -213,10 +233,44 @@ class Scenario:
             ("threats, zones", f"{len(self.threats)}, {len(self.zones)}"),
             ("wind", f"{wind.speed:g} m/s from {math.degrees(wind.from_course):.0f}°, turbulence {wind.turbulence}"),
             ("clearance", f"at least {limits.min_clearance_m:g} m above ground"),
-            ("aircraft", self.flight.aircraft),
+            *self._flight_rows(),
             *(("note", note) for note in self.notes),
         ]
         return html_table(f"Scenario {self.name}", rows)
+
+    def _flight_rows(self) -> list[tuple[str, str]]:
+        """Return the rows of the table for notebooks about aircraft, autopilot and the corridor of the verdict."""
+        flight, steering = self.flight, self.flight.steering
+        corridor = self.limits.corridor_m
+        airspeed = "the aircraft's" if flight.airspeed_mps is None else f"{flight.airspeed_mps:g} m/s"
+        autopilot = f"planfly, {steering.guidance}" if steering.autopilot == OWN_GUIDANCE else steering.autopilot
+        return [
+            ("aircraft", flight.aircraft),
+            ("airspeed", airspeed),
+            ("autopilot", autopilot if flight.params is None else f"{autopilot}, {flight.params}"),
+            ("navigation", steering.nav),
+            ("corridor", "as wide as the autopilot needs" if corridor is None else f"{corridor:g} m to each side"),
+        ]
+
+    def to_toml(self, path: str | Path) -> None:
+        """Write the scenario as a TOML file, from which `planfly.plan` and other functions make it again.
+
+        path: the file, replaced if it exists.  Elevation files, an aircraft's folder and parameters are named by their
+        absolute paths.
+        Raises ScenarioError for a scenario that was made around a mission, and OSError for a file that cannot be
+        written.
+
+        >>> from tempfile import TemporaryDirectory
+        >>> scenario = load_scenario("hard-07")
+        >>> with TemporaryDirectory() as folder:
+        ...     scenario.to_toml(folder + "/mine.toml")
+        ...     load_scenario(folder + "/mine.toml").to_json() == scenario.to_json()
+        True
+        """
+        if self.external:
+            reason = "made around a mission, which is its file; planfly.make_scenario makes a scenario with an area"
+            raise ScenarioError(f"{self.name}: {reason}", file=self.name)
+        write_atomically(Path(path), toml_text(self.to_json()))
 
     def to_json(self) -> dict[str, Any]:
         """Return the scenario as plain JSON data, from which `scenario_from_spec` makes it again."""
@@ -633,9 +687,17 @@ def _with_forecast_wind(scenario: Scenario) -> Scenario:
     """
     if scenario.spec.wind.forecast is None or scenario.spec.at is None:
         return scenario
-    ends = (scenario.start, scenario.destination)
-    forecast = forecast_of_scenario(scenario)
-    wind, table = forecast_wind(scenario.spec.wind, forecast, scenario.spec.at, scenario.origin, ends)
+    return in_forecast_member(scenario, forecast_of_scenario(scenario), 0)
+
+
+def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
+    """Return a scenario in the wind of a member of its forecast, from the scenario's time of flight on.
+
+    Raises ForecastError if the forecast does not cover the start and the destination at this time.
+    """
+    max_ground = -math.inf if scenario.terrain is None else float(np.nanmax(scenario.terrain.heights))
+    site = ForecastSite(scenario.origin, (scenario.start, scenario.destination), max_ground)
+    wind, table = forecast_wind(scenario.spec.wind, forecast, str(scenario.spec.at), site, member)
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
 
 
@@ -743,20 +805,22 @@ def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
 
 def with_threats(
     scenario: Scenario,
-    added_threats: Sequence[tuple[float, float, float, float]],
+    added_threats: Sequence[Mapping[str, Any]],
     source: str,
     preceding: Sequence[ThreatTable] = (),
 ) -> Scenario:
-    """Return a scenario with additional threats on the ground.
+    """Return a scenario with additional threats.
 
-    added_threats: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.
+    added_threats: values of each by the keys of [[threats]].
     source: name of the threats in messages.
     preceding: tables to insert before the added threats.
 
-    The ratio of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for
-    detection. Raises ScenarioError for a threat that is not allowed in a scenario file.
+    The ratio of a scale that is not given to its radius is the median of the scenario's threats, or a quarter for kill
+    and a third for detection. Raises ScenarioError for a threat that is not allowed in a scenario file, and for one on
+    the ground outside the terrain data.
 
-    >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
+    >>> threat = {"east_m": 1300.0, "north_m": 90.0, "kill_radius_m": 20.0}
+    >>> more = with_threats(load_scenario("tight"), [threat], "--threat")
     >>> more.threats.names[-1], float(more.threats.kill_radius[-1])
     ('pop-up 1', 20.0)
     """
@@ -767,17 +831,23 @@ def with_threats(
         return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 
     threats = scenario.threats
-    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, SCALE_RATIOS["kill"])
-    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, SCALE_RATIOS["detection"])
+    ratios = {
+        "kill": scale_ratio(threats.kill_radius, threats.kill_scale, SCALE_RATIOS["kill"]),
+        "detection": scale_ratio(threats.detection_radius, threats.detection_scale, SCALE_RATIOS["detection"]),
+    }
     tables = [*scenario.spec.threats, *preceding]
-    for index, (east, north, kill, detection) in enumerate(added_threats):
-        data: dict[str, Any] = {"name": f"pop-up {len(preceding) + index + 1}", "east_m": east, "north_m": north}
-        if kill != 0.0:
-            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
-        if detection != 0.0:
-            data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_ratio}
+    for index, threat in enumerate(added_threats):
+        data: dict[str, Any] = {"name": f"pop-up {len(preceding) + index + 1}", **threat}
+        for kind, ratio in ratios.items():
+            radius = data.get(f"{kind}_radius_m")
+            if isinstance(radius, int | float):
+                data.setdefault(f"{kind}_scale_m", radius * ratio)
         row = f"{source}.{index}" if len(added_threats) > 1 else source
         tables.append(checked_table(partial(ThreatTable, **data), row))
+        east, north = map_coordinates(tables[-1], scenario.origin)
+        if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
+            reason = f"east {east:g} m, north {north:g} m: outside the terrain data"
+            raise ScenarioError.of_argument(row, (east, north), reason, shown="")
     spec = scenario.spec.model_copy(update={"threats": tables})
     return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))
 

@@ -335,7 +335,7 @@ def _examples_text(draft: Draft) -> str:
 # lat_deg = {threat.lat:.5f}
 # lon_deg = {threat.lon:.5f}
 {_entry_line("# kill_radius_m", _number_text(radius))}
-{_entry_line("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
+{_entry_line("# kill_scale_m", _number_text(round(radius / 4.0)), "where the exposure (scale/distance)^4 is 1")}
 {_entry_line("# detection_radius_m", _number_text(2.0 * radius))}
 {_entry_line("# detection_scale_m", _number_text(round(radius / 2.0)))}
 

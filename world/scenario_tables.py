@@ -280,10 +280,15 @@ class AreaTable(ScenarioTable):
 
 def _check_one_position(table: "PositionTable") -> None:
     """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
-    metres = (table.east_m is not None, table.north_m is not None)
-    degrees = (table.lat_deg is not None, table.lon_deg is not None)
-    if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
+    pairs = [{key: getattr(table, key) for key in keys} for keys in (("east_m", "north_m"), ("lat_deg", "lon_deg"))]
+    given_pairs = [pair for pair in pairs if any(value is not None for value in pair.values())]
+    if len(given_pairs) > 1:
         raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+    if not given_pairs:
+        raise ValueError("position: missing; give east_m and north_m, or lat_deg and lon_deg")
+    for key, value in given_pairs[0].items():
+        if value is None:
+            raise ValueError(f"{key}: missing; a position needs {' and '.join(given_pairs[0])}")
 
 
 class PositionTable(ScenarioTable):
@@ -688,21 +693,26 @@ class ReturnsTable(ScenarioTable):
         return self
 
 
+# Use of a radio link: the ground station's link, or the pilot's remote control.
+LinkUse = Literal["telemetry", "control"]
+
+
 class LinkTable(PositionTable):
     """[link]: radio link between a ground station and the aircraft.
 
     east_m, north_m or lat_deg, lon_deg: position of the station's antenna; if none is given, the mission's home.
     use: "telemetry" for the ground station's link, "control" for the pilot's remote control.
     antenna_m: height of the station's antenna above ground.
+    frequency_mhz: up to 15 GHz, because absorption by the air (ITU-R P.676) is not modelled.
     power_dbm: output of the transmitter.  sensitivity_dbm: power at which the receiver still works.
     station_gain_dbi, aircraft_gain_dbi: antenna gains.  cable_loss_db: losses of cables and connectors at both ends.
     fade_margin_db: power above the sensitivity that the link has to keep.
     max_outage_s: longest time below the fade margin that the verdict accepts.
     """
 
-    use: Literal["telemetry", "control"] = "telemetry"
+    use: LinkUse = "telemetry"
     antenna_m: Annotated[float, in_range(0.5, 500.0)] = 3.0
-    frequency_mhz: Annotated[float, in_range(30.0, 100_000.0)]
+    frequency_mhz: Annotated[float, in_range(30.0, 15_000.0)]
     power_dbm: Annotated[float, in_range(-30.0, 60.0)]
     sensitivity_dbm: Annotated[float, in_range(-150.0, 0.0)]
     station_gain_dbi: Annotated[float, in_range(-20.0, 60.0)] = 0.0

@@ -254,7 +254,14 @@ class ParameterSet:
         Raises ParameterError if a minimum is not below its maximum.
         """
         known_sources, unknown_names = cls._without_unknown_parameters(sources, *fields)
-        unused = (*unused, *unknown_names)
+        # A default value of the file that says nothing is not used, either.
+        unset_names = [
+            name
+            for origin, values in known_sources
+            for name, value in values.items()
+            if origin == "file" and not cls._is_set_on_purpose(cls.table.by_name[name], value)
+        ]
+        unused = (*unused, *unknown_names, *unset_names)
 
         def find_value(definition: Definition) -> ParameterValue:
             """Return the value from the first source that states it on purpose, or the default."""

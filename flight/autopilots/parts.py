@@ -9,7 +9,7 @@ and functions; an autopilot states only the fields that differ from the defaults
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -19,11 +19,15 @@ from aircraft.tracking import TrackingError
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.ground_ways import GroundPhases
-from flight.mission.return_path import DEFAULT_RETURN_RULES, ReturnRules
+from flight.mission.return_path import DEFAULT_RETURN_RULES, LandingStart, ReturnRules, ReturnTarget
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records
-from world.scenario_tables import Navigation
+from world.scenario_tables import LinkUse, Navigation
 from world.wind import Turbulence
+
+if TYPE_CHECKING:
+    from flight.autopilots.point_mass import PointMass
+    from flight.autopilots.simulated_returns import ReturnEnvironment, SimulatedReturns
 
 # ----------------------------------------------------------------------
 # Control law.
@@ -196,16 +200,159 @@ def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
     return {}
 
 
+# Reaction of an autopilot to a failure.  "return": RTL; "land": the mission's landing sequence; "land here": a landing
+# where the aircraft is; "autoland": mode AUTOLAND, or RTL without that mode; "on": continue the mission; "landed":
+# none, because the aircraft is on the ground; "never": none, because nothing can trigger the cause; the other reactions
+# do not lead home.
+FailsafeAction = Literal[
+    "return",
+    "land",
+    "land here",
+    "autoland",
+    "on",
+    "circle",
+    "glide",
+    "parachute",
+    "terminate",
+    "disarm",
+    "level",
+    "guided",
+    "landed",
+    "never",
+]
+
+
+class LinkLossReaction(NamedTuple):
+    """One reaction of an autopilot to the loss of a radio link in a mission.
+
+    action: what the autopilot does instead of its mission, or "on".
+    delay: time for which the link has then been lost, s; inf for "on".
+    parameter, value: the parameter that decides the reaction, and its value.
+    """
+
+    action: FailsafeAction
+    delay: float
+    parameter: str
+    value: float
+
+
+def _continue_mission(use: LinkUse) -> tuple[LinkLossReaction, ...]:
+    return ()
+
+
+class Cause(NamedTuple):
+    """An event that can end the mission, and the autopilot's reaction.
+
+    name: name of the event in messages.
+    action: reaction.
+    parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
+    """
+
+    name: str
+    action: FailsafeAction
+    parameter: str = ""
+    value: int = 0
+
+    @property
+    def is_return(self) -> bool:
+        """True if the reaction is an RTL; a landing is not an RTL."""
+        return self.action == "return"
+
+
+class ReturnMission(NamedTuple):
+    """Properties of a mission on which its RTLs depend.
+
+    commands: commands of its items.
+    has_fence: True if the mission carries a fence.
+    rally_distance: distance of the nearest rally point from home, m; infinite without one.
+    landings: its landing sequences.
+    """
+
+    commands: frozenset[int] = frozenset()
+    has_fence: bool = False
+    rally_distance: float = math.inf
+    landings: tuple[LandingStart, ...] = ()
+
+
+class FlyReturns(Protocol):
+    """Function that simulates an autopilot's RTLs with a point mass."""
+
+    def __call__(
+        self,
+        starts: Records,
+        targets: Sequence[ReturnTarget],
+        aircraft: "PointMass",
+        environment: "ReturnEnvironment",
+        *,
+        store_positions: bool = False,
+        abort_limits: tuple[Floats, Floats] | None = None,
+        engine_out: bool = False,
+    ) -> "SimulatedReturns":
+        """Simulate the RTL from each of n starts to its target.
+
+        starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
+        store_positions: True to store the positions.
+        abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
+        engine_out: True after an engine failure, for an autopilot whose `ReturnBehaviour.flies_without_engine` is True.
+        """
+
+
+class ReturnTrials(NamedTuple):
+    """Changes of parameters that may make an autopilot's RTLs safe, in the order in which they are tried.
+
+    altitudes: groups of parameters that are set to the same height, m, with their present values, which they keep if
+        these are greater; the heights that are tried begin at the first one's present value.
+    others: values by name, tried without and with such a height.
+    text: names of all of them, in messages.
+    """
+
+    altitudes: tuple[Mapping[str, float], ...] = ()
+    others: tuple[Mapping[str, float], ...] = ()
+    text: str = ""
+
+
+NO_TRIALS = ReturnTrials()
+
+
+def _no_causes(mission: ReturnMission) -> tuple[Cause, ...]:
+    return ()
+
+
+def _no_text(mission: ReturnMission) -> str:
+    return ""
+
+
+def _no_texts(mission: ReturnMission) -> tuple[str, ...]:
+    return ()
+
+
 @dataclass(frozen=True)
 class ReturnBehaviour:
     """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
 
     rules: rules of the RTL's target, altitude, turn and loiter.
     parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
+    after_link_loss: returns the reactions to the loss of a radio link, in order of time.  If the mission continues, it
+        is the reaction "on" alone, or () for an autopilot without parameters.
+    fly: simulates RTLs; None for an autopilot without an RTL, for which ArduPlane returns.
+    flies_without_engine: True if ``fly`` also simulates RTLs after an engine failure.
+    causes: returns the events that can end a mission, with the autopilot's reaction to each.
+    unsimulated_text: returns the reason why no RTL of a mission is simulated; "" if RTLs are simulated.
+    unjudged_texts: returns the parts of RTLs that are not simulated, although the rest of them is.
+    path_text: sentence on the path of an RTL; "" if there is nothing to say.
+    trials: changes of parameters that may make RTLs safe.
     """
 
     rules: ReturnRules = DEFAULT_RETURN_RULES
     parameters_of: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
+    after_link_loss: Callable[[LinkUse], tuple[LinkLossReaction, ...]] = _continue_mission
+    fly: FlyReturns | None = None
+    flies_without_engine: bool = False
+    causes: Callable[[ReturnMission], tuple[Cause, ...]] = _no_causes
+    unsimulated_text: Callable[[ReturnMission], str] = _no_text
+    unjudged_texts: Callable[[ReturnMission], tuple[str, ...]] = _no_texts
+    path_text: str = ""
+    trials: ReturnTrials = NO_TRIALS
 
 
 # ----------------------------------------------------------------------

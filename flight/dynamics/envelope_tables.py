@@ -66,6 +66,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         power_sd=0.0 if uncertainty is None else uncertainty.power_sd,
         battery_guessed=uncertainty is not None and uncertainty.battery_guessed,
         climb_guessed=uncertainty is not None and uncertainty.climb_guessed,
+        bank_guessed=uncertainty is not None and uncertainty.bank_guessed,
         aircraft=aircraft.name,
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,

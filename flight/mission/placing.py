@@ -213,7 +213,11 @@ def _landing_starts(
         start = _landing_stop(first_item, origin, heights)
         next_stops = _stops_to_landing(mission.items[index + 1 :], origin, heights)[1:]
         mark_position = _item_position(mark, origin, heights) if mark.has_position else start.position
-        yield index, start._replace(reference_position=mark_position, next_stops=next_stops)
+        touchdown = next((item for item in mission.items[index + 1 :] if item.command in LANDINGS), None)
+        landing = (
+            None if touchdown is None or not touchdown.has_position else _item_position(touchdown, origin, heights)
+        )
+        yield index, start._replace(reference_position=mark_position, next_stops=next_stops, landing=landing)
 
 
 def _place_landings(
@@ -292,12 +296,15 @@ def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConv
 def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> LandingStart:
     """Return a landing sequence that starts at an item, measured to the item's position and without next stops."""
     position, loiter = _item_position(item, origin, heights), stated_loiter(item)
-    radius = (loiter or Loiter(0.0)).radius
+    stated = loiter or Loiter(0.0)
     return LandingStart(
-        *(item.seq, position, position, loiter is not None, radius),
+        *(item.seq, position, position, loiter is not None, stated.radius),
         is_landing=item.command in LANDINGS,
         pass_by=pass_by_distance(item),
         home_up=heights.known_home_altitude(),
+        to_altitude=stated.to_altitude,
+        exits_on_course=stated.exits_on_course,
+        exits_on_tangent=stated.exits_on_tangent,
     )
 
 

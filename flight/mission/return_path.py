@@ -11,7 +11,7 @@ ArduPlane/altitude.cpp), and messages use ArduPlane's parameter names.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S, Position, RoutePoint
@@ -70,6 +70,9 @@ class LandingStart(NamedTuple):
     next_stops: the next items up to the landing; their own ``next_stops`` is empty.
     pass_by: distance that ArduPlane flies past the item, m.
     home_up: altitude of home, m AMSL, NaN if unknown.
+    to_altitude: True if the item is a loiter to an altitude.
+    exits_on_course, exits_on_tangent: True if the loiter's item states such an exit to the next item.
+    landing: east, north, up of the landing to which the sequence leads, m AMSL; None if it leads to none.
     """
 
     item: int
@@ -81,6 +84,10 @@ class LandingStart(NamedTuple):
     next_stops: tuple["LandingStart", ...] = ()
     pass_by: float = 0.0
     home_up: float = math.nan
+    to_altitude: bool = False
+    exits_on_course: bool = False
+    exits_on_tangent: bool = False
+    landing: Position | None = None
 
 
 def nearest_landing_sequence(position: Position, landings: Sequence[LandingStart]) -> LandingStart | None:
@@ -118,12 +125,15 @@ class ReturnRules:
     max_sink_rate: m/s.
     min_slope_height: altitude difference below which a descent is a step instead of a slope, m.
     rally_limit: maximum distance to the nearest rally point, m, beyond which the RTL goes home; 0 for no limit.
-    includes_home: True if home is chosen when it is nearer than any rally point.
+    includes_home: True if home is chosen when it is nearer than any rally point, or the landing.
     slope_to_stated_height: True if the slope down to a rally point treats its height above home as an altitude AMSL,
         and is never higher than its start. ArduPlane 4.6-dev does that: it holds its altitude first, and
         descends later than on a straight slope to the point.
+    transit_height: height above its target to which an RTL that holds its altitude climbs first, m; it then ends no
+        higher than it flew.
     rally_height: height above a rally point's own altitude at the end of the RTL, m.
-    may_use_landing: True if the RTL may go to a mission's landing, which is noted and not simulated.
+    may_use_landing: True if the RTL may go to a mission's landing, as PX4's may; an RTL that is an item of the mission
+        is simulated without it, which is noted.
     deviation_note: note on rules of the autopilot that are simulated differently; "" for none.
     landing_join: "circle" if the RTL continues to a landing sequence from a loiter at home or a rally point, "straight"
         if it flies to the sequence directly, "" if it stays in its loiter.
@@ -144,14 +154,13 @@ class ReturnRules:
     includes_home: bool = False
     slope_to_stated_height: bool = False
     holds_height: bool = False
+    transit_height: float = 0.0
     rally_height: float = 0.0
     may_use_landing: bool = False
     deviation_note: str = ""
     landing_join: Literal["", "circle", "straight"] = ""
 
 
-# Slope base that puts the target of a slope far below the ground, m, so that the slope is level.
-_LEVEL_SLOPE_BASE_M = 1e6
 # Rules for an autopilot without RTL rules: planfly's guidance flies an RTL like ArduPlane with its default parameters.
 DEFAULT_RETURN_RULES = ReturnRules()
 
@@ -166,6 +175,7 @@ class ReturnTarget(NamedTuple):
     slope_base: see `ReturnCircle`.
     landing: landing sequence to which the RTL continues, or None.
     straight: True if the RTL flies there directly, and ``position`` is the start of the sequence.
+    transit_altitude: altitude at which an RTL that holds its altitude flies there, m AMSL; NaN for a slope.
     """
 
     position: Position
@@ -175,6 +185,7 @@ class ReturnTarget(NamedTuple):
     slope_base: float = 0.0
     landing: LandingStart | None = None
     straight: bool = False
+    transit_altitude: float = math.nan
 
 
 class ReturnAbility(NamedTuple):
@@ -197,12 +208,20 @@ class ReturnAbility(NamedTuple):
     loiter_radius_scale: float = 1.0
 
 
-def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally: Sequence[ReturnPoint]) -> ReturnTarget:
+def choose_target(
+    rules: ReturnRules,
+    start: Position,
+    home: ReturnPoint,
+    rally: Sequence[ReturnPoint],
+    landings: Sequence[LandingStart] = (),
+) -> ReturnTarget:
     """Choose the destination of an RTL: the nearest rally point, or home.
 
-    If the nearest rally point is beyond the distance limit, the RTL goes home, at any distance.
+    If the nearest rally point is beyond the distance limit, the RTL goes home, at any distance.  An autopilot that may
+    return to a mission's landing chooses the first landing if that is nearer.
 
     start: east, north, up at the start of the RTL, m AMSL.
+    landings: the mission's landing sequences; only those that lead to a landing count.
 
     >>> home, near, far = (ReturnPoint(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
     >>> choose_target(ReturnRules(), (0.0, 0.0, 700.0), home, [far, near])[:3]
@@ -210,16 +229,10 @@ def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally:
     >>> choose_target(ReturnRules(rally_limit=900.0), (0.0, 0.0, 700.0), home, [near])[:2]
     ((300.0, 0.0, 500.0), 'home')
     """
-    home_target_altitude = start[2] if math.isnan(rules.height) else home.up + rules.height
-    home_distance = _distance(start, home)
-    level_slope_base = _LEVEL_SLOPE_BASE_M if rules.holds_height else 0.0
-    home_target = ReturnTarget(
-        (home.east, home.north, home_target_altitude),
-        "home",
-        "",
-        home_distance,
-        level_slope_base,
-    )
+    landing = next((one for one in landings if one.landing is not None), None) if rules.may_use_landing else None
+    home_target = _home_target(rules, start, home)
+    if landing is not None:
+        return _nearest_with_landing(rules, start, home_target, rally, landing)
     if not rally:
         return home_target
     index = min(range(len(rally)), key=lambda k: _distance(start, rally[k]))
@@ -231,21 +244,82 @@ def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally:
             f" beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
         )
         return home_target._replace(reason=reason)
-    if rules.includes_home and home_distance <= distance:
+    if rules.includes_home and home_target.distance <= distance:
         parameter_text = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
         return home_target._replace(
             reason=f"nearer than {name}, which is {_distance_text(distance)} away{parameter_text}"
         )
     rally_text = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
-    point = rally[index]
-    slope_base = point.base if rules.slope_to_stated_height else level_slope_base
+    return rally_target(rules, start, rally[index])._replace(name=name, reason=f"the nearest {rally_text}")
+
+
+def _home_target(rules: ReturnRules, start: Position, home: ReturnPoint) -> ReturnTarget:
+    """Return home as the destination of an RTL from a start."""
+    transit, end = _altitudes(rules, start, home.up, rules.height)
+    return ReturnTarget((home.east, home.north, end), "home", "", _distance(start, home), transit_altitude=transit)
+
+
+def rally_target(rules: ReturnRules, start: Position, point: ReturnPoint) -> ReturnTarget:
+    """Return a rally point as the destination of an RTL from a start, whatever the autopilot would choose.
+
+    >>> rules = ReturnRules(holds_height=True, transit_height=300.0, rally_height=100.0)
+    >>> target = rally_target(rules, (0.0, 0.0, 700.0), ReturnPoint(1000.0, 0.0, 500.0))
+    >>> target.position, target.transit_altitude
+    ((1000.0, 0.0, 600.0), 800.0)
+    """
+    transit, end = _altitudes(rules, start, point.up, rules.rally_height)
+    slope_base = point.base if rules.slope_to_stated_height else 0.0
     return ReturnTarget(
-        (point.east, point.north, point.up + rules.rally_height),
-        name,
-        f"the nearest {rally_text}",
-        distance,
-        slope_base,
+        (point.east, point.north, end), "", "", _distance(start, point), slope_base, transit_altitude=transit
     )
+
+
+def _altitudes(rules: ReturnRules, start: Position, base: float, height: float) -> tuple[float, float]:
+    """Return the altitudes of an RTL on the way to a destination and at its end, m AMSL; NaN and the end for a slope.
+
+    base: altitude of the destination, m AMSL.
+    height: height above it at the end, m; NaN to keep the altitude of the start.
+    """
+    end = start[2] if math.isnan(height) else base + height
+    if not rules.holds_height:
+        return math.nan, end
+    # The aircraft never descends before it is over its destination (PX4's `rtl.cpp` and `rtl_direct.cpp`).
+    transit = max(start[2], base + rules.transit_height)
+    return transit, min(end, transit)
+
+
+def _nearest_with_landing(
+    rules: ReturnRules,
+    start: Position,
+    home_target: ReturnTarget,
+    rally: Sequence[ReturnPoint],
+    landing: LandingStart,
+) -> ReturnTarget:
+    """Return the nearest of the mission's landing, the rally points and, if the rules include it, home.
+
+    The distance to the landing is that to its landing point (`RTL::findRtlDestination` in PX4's `rtl.cpp`).
+    """
+    point = ReturnPoint(*(landing.landing or landing.position))
+    transit, _ = _altitudes(rules, start, point.up, 0.0)
+    name = f"the landing sequence at item {landing.item}"
+    targets = [
+        ReturnTarget(
+            landing.position,
+            name,
+            "",
+            _distance(start, point),
+            landing=landing,
+            straight=True,
+            transit_altitude=transit,
+        ),
+        *([home_target] if rules.includes_home else []),
+        *(
+            rally_target(rules, start, place)._replace(name=f"rally point {place.number or k}")
+            for k, place in enumerate(rally, 1)
+        ),
+    ]
+    nearest = min(targets, key=lambda target: target.distance)
+    return nearest._replace(reason=f"the nearest of {len(targets)} places") if len(targets) > 1 else nearest
 
 
 def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
@@ -267,10 +341,8 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     if -altitude_gain >= 1.0 and abs(target.slope_base - altitude_gain) < rules.min_slope_height:
         altitude_text = f"sinking {-altitude_gain:.0f} m at once to"
     if rules.holds_height:
-        altitude_text = f"climbing {altitude_gain:.0f} m first, to"
-        if altitude_gain < 0.0:
-            altitude_text = f"level, and sinking {-altitude_gain:.0f} m in circles there, to"
-    if abs(altitude_gain) < 1.0:
+        altitude_text = _held_altitude_text(target, start_altitude)
+    elif abs(altitude_gain) < 1.0:
         altitude_text = "at"
     climb_text = ""
     if rules.initial_climb > 0.0 and not (math.isinf(rules.initial_climb) and altitude_gain < -1.0):
@@ -292,6 +364,16 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     )
 
 
+def _held_altitude_text(target: ReturnTarget, start_altitude: float) -> str:
+    """Describe the altitudes of an RTL that holds its altitude, up to the word before the altitude of its end."""
+    first_climb, sink = target.transit_altitude - start_altitude, target.transit_altitude - target.position[2]
+    sink_text = f"sinking {sink:.0f} m in circles there, to"
+    if first_climb < 1.0:
+        return f"level, and {sink_text}" if sink >= 1.0 else "at"
+    climb_text = f"climbing {first_climb:.0f} m first, to"
+    return f"{climb_text} {target.transit_altitude:.0f} m AMSL, and {sink_text}" if sink >= 1.0 else climb_text
+
+
 def rtl_waypoints(
     previous_points: Sequence[RoutePoint],
     stop: RoutePoint,
@@ -311,7 +393,7 @@ def rtl_waypoints(
     but is no steeper than the aircraft can fly; a climb or a small descent begins at once. The aircraft covers the
     remaining altitude difference in the loiter, which then lasts
     `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. A climb before the turn does not depend on the altitude of the
-    target.
+    target. An RTL that holds its altitude descends in the loiter only.
     """
     start = previous_points[-1].map_position
     course = (
@@ -322,8 +404,11 @@ def rtl_waypoints(
     stated_radius = ability.loiter_radius_scale * abs(rules.radius)
     radius = math.copysign(max(stated_radius, ability.min_loiter_radius), rules.radius)
     circle = Node(stop, *target.position, radius)
+    transit_circle = replace(circle, up=target.transit_altitude) if rules.holds_height else circle
     dive = min(ability.dive_slope, rules.max_sink_rate / ability.airspeed)
-    builder = _ReturnBuilder(circle, target.slope_base, rules.min_slope_height, ability, dive, start, next_position)
+    builder = _ReturnBuilder(
+        transit_circle, circle.up, target.slope_base, rules.min_slope_height, ability, dive, start, next_position
+    )
     if _distance(start, target.position) <= abs(radius) + _MIN_TANGENT_M:
         # The RTL starts inside its loiter: fly straight on to the circle.
         builder.add_loiter(*_rim_point_ahead(start, course, circle))
@@ -339,6 +424,7 @@ class _ReturnBuilder:
     def __init__(
         self,
         circle: Node,
+        end_altitude: float,
         slope_base: float,
         min_slope_height: float,
         ability: ReturnAbility,
@@ -348,6 +434,7 @@ class _ReturnBuilder:
     ) -> None:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
+        self._end_altitude = end_altitude
         self._min_slope_height, self._ability, self._dive_slope, self._next_position = (
             min_slope_height,
             ability,
@@ -444,6 +531,7 @@ class _ReturnBuilder:
         """Add the leg to a point on the circle, and the loiter until its altitude is reached and its time is over."""
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
+        self._circle = replace(self._circle, up=self._end_altitude)
         radius = abs(self._circle.signed_radius)
         altitude_change = self._altitude_difference
         spiral_angle = (

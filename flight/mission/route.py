@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
@@ -194,6 +194,15 @@ class Route:
         All legs around a loiter have the number of the leg to the loiter.
         """
         return np.maximum(self.stops[1:] - 1, 0)
+
+    def leg_numbers_of(self, legs: NDArray[np.integer[Any]]) -> Ints:
+        """Return the numbers in messages of legs by their indices, (n,); an index beyond the route is its last leg's.
+
+        >>> route_of_loiter = Route(route_points(np.eye(3)[[0, 1, 2, 0]], 25.0, item=[1, 2, 2, 3]), "")
+        >>> route_of_loiter.leg_numbers_of(np.array([0, 1, 2, 3])).tolist()
+        [0, 0, 1, 1]
+        """
+        return self.leg_numbers[np.clip(legs, 0, self.legs - 1)]
 
     @property
     def rtl_end(self) -> int:

@@ -151,11 +151,11 @@ class FlightEvents:
 
     def _leg_text(self, leg: int) -> str:
         """Return the text of a leg's event: leg, waypoint to which it leads, and that waypoint's mission item."""
-        items = self._route.items
-        waypoint = leg + 1
-        if not 0 <= waypoint < len(items):
+        route, waypoint = self._route, leg + 1
+        if not 0 <= waypoint < len(route.items):
             return f"leg {leg}"
-        return f"leg {leg}, to waypoint {waypoint}" + (f" (item {items[waypoint]})" if items[waypoint] >= 0 else "")
+        item_text = f" (item {route.items[waypoint]})" if route.items[waypoint] >= 0 else ""
+        return f"leg {route.leg_numbers[leg]}, to waypoint {route.stops[waypoint]}{item_text}"
 
     def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
         """Make the record of the event that the aircraft enters or leaves the range of a threat."""

@@ -229,6 +229,7 @@ class EnvelopeTable(SetupModel):
     power_sd: Annotated[Finite, Field(ge=0.0)] = 0.0
     battery_guessed: bool = False
     climb_guessed: bool = False
+    bank_guessed: bool = False
 
     def envelope(self, file: str) -> Envelope:
         """Return the envelope of the table.

@@ -51,7 +51,7 @@ class Conditions(DocumentConfig):
     """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
     wind_mps: float | None
     wind_from_deg: float | None
-    """Both fields of the wind are null if the wind is the result; in a forecast, they are its mean at the start."""
+    """Both fields of the wind are null if the wind is the result; in a forecast, they are those of the start."""
     turbulence: Turbulence | None
     """Null if the flight was not simulated, as is navigation."""
     navigation: Navigation | None
@@ -81,6 +81,8 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
     # The aircraft of a log may not be on this machine.
     with suppress(FlightError):
         mass = find_logged_aircraft(aircraft, flight_table.aircraft).mass
+    east, north = scenario.wind_velocity(scenario.start.tolist())
+    has_field = wind.field is not None
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,
@@ -88,8 +90,10 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         airspeed_mps=airspeed,
         airspeed_kind="equivalent" if autopilot.speeds.equivalent else "true",
         airspeed_source=_airspeed_source(scenario, autopilot),
-        wind_mps=wind.speed,
-        wind_from_deg=round(math.degrees(wind.from_course) % 360.0, 9),
+        wind_mps=math.hypot(east, north) if has_field else wind.speed,
+        wind_from_deg=round(
+            math.degrees(math.atan2(-east, -north) if has_field else wind.from_course) % 360.0, 3 if has_field else 9
+        ),
         turbulence=wind.turbulence,
         navigation=flight_table.steering.nav,
         autopilot=autopilot.describe(aircraft) + _autopilot_source(flight_table),
@@ -219,8 +223,9 @@ def corridor_line(setup: FlightSetup) -> str:
     if closest_legs is None or closest_legs[0] >= half_width:
         return line
     spacing, leg = closest_legs
+    first, second = setup.route.leg_numbers[leg], setup.route.leg_numbers[leg + 2]
     return (
-        f"{line}; the corridor is wider than the {spacing:.0f} m between legs {leg} and {leg + 2}, so a flight within"
+        f"{line}; the corridor is wider than the {spacing:.0f} m between legs {first} and {second}, so a flight within"
         " the corridor may not have followed the lines"
     )
 

@@ -102,6 +102,14 @@ class Finding:
         return min(errors, key=lambda value: errors[value])
 
     @property
+    def nearest(self) -> float | None:
+        """Distance outside the nearest missile's sphere or zone of a fence, m, negative inside; None if not known.
+
+        It is a fact of the rules threat and fence, whose margins are no distances, or those to the zone's edge.
+        """
+        return next((fact.value for fact in self.facts if fact.what == "nearest"), None)
+
+    @property
     def limit_text(self) -> str:
         """Text of the values that pass; "" without a limit.
 

@@ -4,13 +4,13 @@ Data that guidance recorded about itself (leg, cross-track, height error, cleara
 read.
 """
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.conditions import judging_conditions
-from logs.verdict.findings import Finding, undecided_findings
+from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
     blocking_item_findings,
@@ -25,7 +25,8 @@ from logs.verdict.judge_geometry import (
 )
 from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Place, ReferenceFlights
+from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
+from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.summary import headline, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 
@@ -119,9 +120,7 @@ def _level_answers(
         geometric = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flight_findings))
         has_failed = any(finding.ok is False for finding in geometric)
         passes = not has_failed and not undecided_findings(geometric)
-        disagreements = _disagreements(
-            "geometry", {(finding.rule, finding.place): finding.ok for finding in geometric}, flight_findings
-        )
+        disagreements = _disagreements("geometry", geometric, flight_findings)
         headline_text = headline(geometric, passes, source)
         levels.append(
             LevelAnswer("geometry", passes, headline_text, disagreements, undecided=not passes and not has_failed)
@@ -137,28 +136,42 @@ def _level_answers(
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
     """Return the airframe's answer, by the reference flight, with its disagreements with the flight."""
-    failed = frozenset(airframe.failed)
-    passes_by_place = {
-        (finding.rule, finding.place): (finding.rule, finding.place) not in failed for finding in flight_findings
-    }
-    disagreements = _disagreements("airframe", passes_by_place, flight_findings)
+    failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
+    airframe_findings = [
+        replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed) for finding in flight_findings
+    ]
+    disagreements = _disagreements("airframe", airframe_findings, flight_findings)
     # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
     is_undecided = not airframe.flyable and not airframe.failed
     return LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
 
 
 def _disagreements(
-    level: str, outcomes: Mapping[tuple[str, Place], bool | None], flight_findings: tuple[Finding, ...]
+    level: str, level_findings: Sequence[Finding], flight_findings: Sequence[Finding]
 ) -> tuple[Disagreement, ...]:
     """Return the findings that a level and the flight judge differently, in the order of the level's findings.
 
     level: name of the level.
-    outcomes: by rule and place, True if the level's finding passes, None if it is not judged.
     """
-    flight_outcomes = {(finding.rule, finding.place): finding.ok for finding in flight_findings}
-    disagreements = []
-    for (rule, place), passes_at_level in outcomes.items():
-        passes_in_flight = flight_outcomes.get((rule, place))
-        if passes_at_level is not None and passes_in_flight is not None and passes_at_level != passes_in_flight:
-            disagreements.append(Disagreement(rule, place, level, passes_at_level, passes_in_flight))
-    return tuple(disagreements)
+    level_outcomes, flight_outcomes = _worst_outcomes(level_findings), _worst_outcomes(flight_findings)
+    return tuple(
+        Disagreement(worst.rule, worst.place, level, bool(worst.ok), bool(flight_outcomes[key].ok))
+        for key, worst in level_outcomes.items()
+        if key in flight_outcomes and worst.ok != flight_outcomes[key].ok
+    )
+
+
+def _worst_outcomes(findings: Sequence[Finding]) -> dict[tuple[object, ...], Finding]:
+    """Return each rule's worst judged finding at each place, and the worst on each kind of overlap, by a common key.
+
+    Levels may measure a different corner of a loiter, or another photo line, as the worst.
+    """
+    outcomes: dict[tuple[object, ...], Finding] = {}
+    for finding in findings:
+        if finding.ok is None:
+            continue
+        is_overlap = finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
+        key = finding.rule, finding.check if is_overlap else numbered_place(finding.place)
+        if key not in outcomes or worst_first_key(finding) < worst_first_key(outcomes[key]):
+            outcomes[key] = finding
+    return outcomes

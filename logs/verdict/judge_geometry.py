@@ -347,11 +347,12 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
     findings = []
     for rule, margin, violation, unit, factor in margins:
         count = int(plan.violations[violation])
-        is_exceeded = bool(count) or margin < 0.0
-        if rule == "turn":
-            is_exceeded = is_exceeded or plan.certificate.available_length < 0.0
+        missing_length = max(0.0, -plan.certificate.available_length) if rule == "turn" else 0.0
+        is_exceeded = bool(count) or margin < 0.0 or missing_length > 0.0
         is_known = math.isfinite(margin)
         reason = f"smallest margin {margin * factor:.2f} {unit}" if is_known else "no margin is known"
+        if missing_length > 0.0 and margin >= 0.0:
+            reason = f"a leg is {missing_length:.0f} m too short for its turns"
         if is_exceeded:
             reason = f"the plan's {rule} limit is exceeded, {reason}" + (f", {count} violations" if count else "")
         findings.append(

@@ -1,6 +1,6 @@
 """Define the places of findings, changes of a plan, and the three levels of a verdict, as data."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from world.json_schema import DocumentConfig
@@ -21,7 +21,7 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 #   "duration" of the flight.
 # - Changes by a factor: "battery" or "tank".
 # - Knowledge about the aircraft instead of changes of the plan: duration of a flight at "full throttle" or with "no
-#   throttle" that measures its ability, and a "stated climb" that the user should state.
+#   throttle" that measures its ability, and a "stated climb" or a "stated bank" that the user should state.
 Quantity = Literal[
     "length",
     "rise",
@@ -41,6 +41,7 @@ Quantity = Literal[
     "full throttle",
     "no throttle",
     "stated climb",
+    "stated bank",
 ]
 
 
@@ -62,6 +63,15 @@ class Place(DocumentConfig):
     """Mission item to which a leg leads; several legs may lead to one item."""
     number: int | None = field(default=None, compare=False)
     """Number of a leg or waypoint in the texts, where all corners of one loiter are one stop."""
+
+
+def numbered_place(place: Place) -> Place:
+    """Return a place with its number in the texts as its index: all corners of one loiter are then the same place.
+
+    >>> numbered_place(Place("waypoint", 11, item=4, number=3)).index
+    3
+    """
+    return place if place.number is None else replace(place, index=place.number)
 
 
 FLIGHT = Place("flight")

@@ -34,7 +34,7 @@ ItemsJudge = Callable[[FlightSetup], list[Finding]]
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
 # Function that judges all stretches of an imported flight together, and whether planfly's own log is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
-# Function that replaces findings of other rules with findings of its own rule, after all rules have judged.
+# Function that replaces findings of other rules, or adds to their reasons, after all rules have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]
 # Function that suggests changes that would make a failed finding pass, the smallest change first.
 Suggest = Callable[[RouteRequirements, AlignedTrack | None, Finding], tuple[Suggestion, ...]]

@@ -17,7 +17,7 @@ from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     available_lengths,
-    performance_tables,
+    leg_performance,
     slope_limit,
     steep_arc,
     tighter_turn_limit,
@@ -217,6 +217,8 @@ def suggest_gentler_turn(
     corner = finding.place.index
     if corner is None:
         return ()
+    if finding.check == UNKNOWN_AIRCRAFT:
+        return suggest_stating_bank(requirements, _aligned, finding)
     limit, source = turn_limit(requirements, corner)
     planned_turn = abs(float(requirements.turns[corner]))
     if planned_turn <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
@@ -236,6 +238,16 @@ def suggest_gentler_turn(
         change = Change("turn", place, math.degrees(planned_turn), degrees, "deg")
         alternatives.append((1.0 - max_turn / planned_turn, (change,)))
     return _smallest_first(alternatives)
+
+
+def suggest_stating_bank(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest that the user state the bank limit of an aircraft for which it is a guess; return () otherwise."""
+    if finding.check != UNKNOWN_AIRCRAFT:
+        return ()
+    current, wanted = (math.degrees(bank) for bank in (requirements.setup.max_bank, requirements.possible_bank))
+    return ((Change("stated bank", finding.place, current, wanted, "deg"),),)
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
@@ -271,7 +283,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
     first_point, end_point = max(0, corner - 2), min(len(requirements.points), corner + 3)
     route = requirements.route
     nearby_route = replace(route, points=route.points[first_point:end_point])
-    tables, local_corner = performance_tables(nearby_route, requirements.limits), corner - first_point
+    tables, local_corner = leg_performance(requirements.limits), corner - first_point
     for _ in range(SUGGESTION_TRIAL_COUNT):
         degrees = math.floor(10.0 * math.degrees(max_turn)) / 10.0
         if degrees <= 0.0:

@@ -87,18 +87,29 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     )
 
 
+# Subjects of a sentence on an insufficiently known aircraft, with the places that are counted, by rule.
+_PLACED_SUBJECTS = {
+    "slope": ("slope", "on", "leg"),
+    "speed": ("airspeed", "on", "leg"),
+    "turn": ("turn", "at", "waypoint"),
+    "loiter": ("loiter", "at", "waypoint"),
+}
+
+
 def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
     """Describe the findings on an insufficiently known aircraft; return "" if there are none."""
     slopes = [finding for finding in open_findings if finding.rule == "slope"]
     if len(slopes) < len(open_findings):
-        speed_count = sum(finding.rule == "speed" for finding in open_findings)
+        counts = {rule: sum(finding.rule == rule for finding in open_findings) for rule in _PLACED_SUBJECTS}
         subjects = [
-            f"{name}{'s' if count > 1 or name == 'slope' else ''} on {count} leg{'s' if count > 1 else ''}"
-            for name, count in (("slope", len(slopes)), ("airspeed", speed_count))
+            f"{noun}{'s' if count > 1 or rule == 'slope' else ''} {place_preposition} {count_text(count, place)}"
+            for (rule, count), (noun, place_preposition, place) in zip(
+                counts.items(), _PLACED_SUBJECTS.values(), strict=True
+            )
             if count
         ]
-        subjects += ["energy"] if len(slopes) + speed_count < len(open_findings) else []
-        is_singular = len(subjects) == 1 and (subjects == ["energy"] or speed_count == 1)
+        subjects += ["energy"] if sum(counts.values()) < len(open_findings) else []
+        is_singular = len(subjects) == 1 and not slopes and max(counts.values()) <= 1
         verb = "is" if is_singular else "are"
         subject_text = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
         return f"{subject_text} {verb} too close to the limit to judge with what is known of the aircraft"
@@ -208,11 +219,7 @@ def summary_lines(
     lines += [*condition_lines(conditions), autopilot_line(conditions, is_flown=level == "flown")]
     lines += _parameter_lines(setup, is_flown=level == "flown")
     lines += _ignored_settings_lines(setup)
-    reasons: dict[str, str] = {}
-    for finding in findings:
-        if finding.ok is None and RULE_WORDS[finding.rule].explains_unjudged:
-            reasons.setdefault(finding.rule, finding.reason)
-    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
+    lines += _unjudged_lines(findings)
     if reason := unjudged_return_text(setup):
         lines.append(f"Not judged: {RULE_WORDS['return'].title} ({reason})")
     # These are limits of PX4 and not of the aircraft, so they decide nothing for another autopilot.
@@ -244,6 +251,22 @@ def summary_lines(
         agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
         lines.append(f"{_LEVEL_TITLES[answer.name]}: {answer.headline}{agreement}")
     return tuple(lines)
+
+
+def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
+    """Return a line for each rule with unjudged findings that the summary explains: the places and the first reason."""
+    lines = []
+    for rule in RULE_WORDS.values():
+        rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
+        unjudged = [finding for finding in rule_findings if finding.ok is None]
+        if not unjudged:
+            continue
+        places = [place_text(finding.place) for finding in unjudged if finding.place.kind in ("leg", "waypoint")]
+        rest = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
+        is_part = len(places) == len(unjudged) < len(rule_findings)
+        place = f" on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{rest}" if is_part else ""
+        lines.append(f"Not judged: {rule.title}{place} ({unjudged[0].reason})")
+    return lines
 
 
 def _airframe_or_autopilot_lines(

@@ -27,6 +27,9 @@ HOME_ERROR_M = 50.0
 HEIGHT_TOLERANCE_M = 0.1
 # m.  A loiter's radius may be this much smaller than the radius at the bank limit: 1e-7 degrees at its center.
 LOITER_RADIUS_TOLERANCE_M = 0.02
+# Laps.  A loiter by an autopilot that steers to its center may be flown by this much less than drawn, because the
+# aircraft joins and leaves the circle on other courses; half a lap is the difference of joining on the other side.
+LOITER_LAPS_TOLERANCE = 0.5
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
@@ -39,6 +42,9 @@ LOITER_WIDENING_FRACTION = 0.25
 LOITER_SWING_RADII = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5
+# rad.  A bank limit that is only guessed may be up to this, the steepest that a data sheet or a scenario may state, or
+# up to the limit of autopilot or scenario if that is lower: what passes with it is undecided.
+POSSIBLE_BANK_RAD = math.radians(60.0)
 # rad.  A turn sharper than this has no useful tangent length; the tangent length of a U-turn is infinite.  Between legs
 # that are too short, guidance omits the arc of a turn beyond its own smaller limit, SHARPEST_FLY_BY in
 # flight/mission/route.py, which the turn rule imports from there.
@@ -356,11 +362,6 @@ SPHERE_STAY_TOLERANCE_S = 1e-6
 # Diagonals of a block of segments.  At this distance from a sphere's center the segments are joined to longer ones,
 # which changes the exposure by less than 0.1 %.
 SPHERE_FAR_DIAGONALS = 30.0
-
-# The link rule
-
-# s.  ArduPlane acts on a link that is lost for this long: the default of FS_LONG_TIMEOUT, which planfly does not read.
-LINK_LOSS_REACTION_S = 5.0
 
 # PX4's checks: constants of its `FeasibilityChecker` in addition to `flight.autopilots.parts.FeasibilityLimits`
 

@@ -148,7 +148,8 @@ class Verdict:
         """Return a `pandas.DataFrame` with a row for each finding, in the verdict's order, and NaN for missing numbers.
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
-        tolerance, margin, unit, limit_source, method, ok (None if not judged) and reason.
+        tolerance, margin, unit, limit_source, method, ok (None if not judged) and reason; and nearest, the distance
+        outside the nearest missile's sphere or the nearest zone of a fence, m, negative inside.
         Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         require_extra("tables", "to_pandas() needs")
@@ -158,11 +159,15 @@ class Verdict:
         numbers = ("planned", "flown", "limit", "tolerance", "margin")
         names = (*numbers, "unit", "limit_source", "method", "ok", "reason")
         rows = [
-            [finding.rule, finding.place.kind, finding.place.index, *(getattr(finding, name) for name in names)]
+            [
+                *(finding.rule, finding.place.kind, finding.place.index),
+                *(getattr(finding, name) for name in names),
+                finding.nearest,
+            ]
             for finding in self.findings
         ]
-        frame = pd.DataFrame(rows, columns=["rule", "place", "index", *names])
-        return frame.astype(dict.fromkeys(numbers, float))
+        frame = pd.DataFrame(rows, columns=["rule", "place", "index", *names, "nearest"])
+        return frame.astype(dict.fromkeys((*numbers, "nearest"), float))
 
     def __repr__(self) -> str:
         counts = f"{count_text(len(self.findings), 'finding')}, {len(self.failed)} failed"

@@ -122,6 +122,11 @@ def _other_change_text(change: Change) -> str:
             return f"fly {flight_text} and give its log to planfly aircraft --identify"
         case "stated climb":
             return "state the climb of the aircraft at full throttle: planfly aircraft --new ... --climb DEGREES"
+        case "stated bank":
+            return (
+                f"state the bank limit of the aircraft, of which {change.current:.0f}° are a guess: planfly aircraft"
+                " --new ... --bank DEGREES"
+            )
     return f"use a {change.what} {requested_value:.2f} times as large"
 
 

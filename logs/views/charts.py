@@ -210,7 +210,7 @@ def saturation_band(is_saturated: NDArray[np.bool_], along: Floats, span: tuple[
 def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
     """Return a mark at the start of each leg: its position along an axis, and the leg's name.
 
-    legs: number of each row's leg, (t,).
+    legs: number of each row's leg in messages, (t,).
     along: position of each row along the axis, (t,).
     """
     starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]

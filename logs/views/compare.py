@@ -137,7 +137,8 @@ def refly_charts(reflight: Reflight) -> dict[str, Chart]:
     ['refly-cross-track.png', 'refly-height.png']
     """
     along = reflight.distance / 1e3
-    marks = leg_marks(reflight.first + np.searchsorted(reflight.ends, reflight.distance, side="right"), along)
+    legs = np.searchsorted(reflight.ends, reflight.distance, side="right")
+    marks = leg_marks(reflight.setup.route.leg_numbers_of(legs), along)
     charts = {}
     for file, name, title, unit, factor, span in _REFLOWN:
         flown_values, simulated_values = factor * getattr(reflight.flown, name), factor * getattr(reflight.model, name)

@@ -190,4 +190,6 @@ def _wind_text(named_wind: NamedWind) -> str:
         text += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
     else:
         text += "no mean wind"
+    if wind.forecast is not None:
+        text += "\n(mean of the forecast)"
     return text + (f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else "")

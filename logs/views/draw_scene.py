@@ -16,7 +16,7 @@ from flight.simulation.track import Track
 from logs import theme
 from logs.views.charts import Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
 from logs.views.drawing import WIDTH, clean_style, draw_legend, legend_handle, new_figure, write_label
-from logs.views.failures import Failures, route_distance, route_samples
+from logs.views.failures import Failures, route_distance, route_samples, stop_rows
 from logs.views.labels import LabelPlacer
 from logs.views.scene import GroundGrid, SceneView, drawn_rows, exaggeration, ground_grid, scene_bounds
 from world.airspace.zones_on_map import zone_walls
@@ -378,7 +378,7 @@ def _draw_labels(
     setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer
 ) -> None:
     """Label start, destination, waypoints and threats, as far as the labels fit."""
-    corners = projection.project(route)
+    corners, stops = projection.project(route), setup.route.stops.tolist()
     last = len(route) - 1
 
     def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
@@ -386,12 +386,13 @@ def _draw_labels(
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
     # The same words as on the map.
-    write("0 start", corners[0], "end")
-    write(f"{last} destination", corners[last], "end")
-    step = max(1, -(-len(route) // _MAX_NUMBERS))
-    for k in range(1, last):
-        if k % step == 0 or k in failed.waypoints:
-            write(str(k), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
+    write(f"{stops[0]} start", corners[0], "end")
+    write(f"{stops[last]} destination", corners[last], "end")
+    stop_starts = stop_rows(stops)
+    step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
+    numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
+    for k in sorted(numbered_waypoints - {0, last}):
+        write(str(stops[k]), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
     threats = setup.scenario.threats
     failing_threats = failed.threat_names()
     labels = list(zip(threats.names, projection.project(threats.position), strict=True))

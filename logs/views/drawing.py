@@ -85,6 +85,11 @@ _JPEG_QUALITY = 80
 _MARKERS = {"circle": "o", "triangle": "^", "star": "*", "cross": "x"}
 # Largest number of waypoints or legs that an axis numbers.
 _MAX_TICKS = 45
+# Width of a digit of a tick label, in bold, and the gap between two labels, inches.
+_DIGIT_WIDTH_IN = 0.085
+_LABEL_GAP_IN = 0.06
+# Space on either side of the first and the last waypoint or leg, in legs.
+_PLACE_MARGIN = 0.8
 # Characters of a line of a panel's title beside its axis, if two such lines are enough.
 _PANEL_TITLE_WIDTH = 16
 # Lines of a panel's title that fit left of the tick labels.
@@ -372,16 +377,26 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
 
 
 def _set_place_ticks(axes: Any, panel: Panel) -> None:
-    """Label the horizontal axis by numbers of waypoints or legs, failing ones in the colour of failures."""
+    """Label the horizontal axis by numbers of waypoints or legs, failing ones in the colour of failures.
+
+    A label that would touch another one is left out, of the failing ones the later one.
+    """
     positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
-    label_interval = -(-len(positions) // _MAX_TICKS)
-    ticks = sorted({*positions[::label_interval].tolist(), *sorted(failing)[:_MAX_TICKS]})
+    digits = len(f"{positions[-1]:.0f}")
+    label_width = (_DIGIT_WIDTH_IN * digits + _LABEL_GAP_IN) / (WIDTH * axes.get_position().width)
+    min_distance = label_width * (float(np.ptp(positions)) + 2.0 * _PLACE_MARGIN)
+    label_interval = max(-(-len(positions) // _MAX_TICKS), math.ceil(min_distance))
+    ticks = list[float]()
+    for position in (*sorted(failing), *positions[::label_interval].tolist(), *positions.tolist()):
+        if all(abs(position - tick) >= min_distance for tick in ticks):
+            ticks.append(position)
+    ticks.sort()
     axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
     for text, tick in zip(axes.get_xticklabels(), ticks, strict=True):
         if tick in failing:
             text.set(color=theme.colour("fail"), fontweight="bold")
-    axes.set_xlim(positions[0] - 0.8, positions[-1] + 0.8)
+    axes.set_xlim(positions[0] - _PLACE_MARGIN, positions[-1] + _PLACE_MARGIN)
 
 
 # Layers.

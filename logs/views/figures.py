@@ -19,6 +19,7 @@ from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
 from logs.views.failures import failures
 from logs.views.glides import glide_chart
+from logs.views.link import DrawnLink, draw_scenario_link, link_chart, link_map
 from logs.views.map import MapChart, flight_map, map_json
 from logs.views.moments import waypoint_names
 from logs.views.profile import profile_chart
@@ -42,12 +43,14 @@ class Subject:
     setup: setup with the mission's fence among the zones.
     track: track of at least one row; None for a plan that was not flown.
     returns: judged returns; None if none were judged.
+    link: the scenario's radio link; None without a link, or if it cannot be computed.
     """
 
     setup: FlightSetup
     track: Track | None
     verdict: Verdict
     returns: DrawnReturns | None = None
+    link: DrawnLink | None = None
 
     @property
     def contents_text(self) -> str:
@@ -112,10 +115,10 @@ def _flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Ca
 
 # Builders of the figures on returns, by name.
 RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], View | None]] = {
-    "returns": lambda setup, drawn, _: returns_map(setup, drawn),
+    "returns": returns_map,
     "worst-returns": lambda setup, drawn, _: worst_returns_chart(setup, drawn),
     "return-heights": return_heights_chart,
-    "glide": lambda setup, drawn, _: glide_chart(setup, drawn),
+    "glide": glide_chart,
 }
 
 
@@ -138,9 +141,27 @@ def _returns_view(name: str) -> Callable[[Subject], View | None]:
     return view
 
 
+def _link_view(make_view: Callable[[FlightSetup, DrawnLink], View]) -> Callable[[Subject], View | None]:
+    """Make a function that builds a view of the radio link, and returns None without a link."""
+    return lambda subject: None if subject.link is None else make_view(subject.setup, subject.link)
+
+
+def _link_caption(subject: Subject) -> str:
+    """Return the caption of the map of the radio link: the finding, and an explanation of the areas."""
+    findings = [finding for finding in subject.verdict.findings if finding.rule == "link"]
+    heading = "".join(_as_sentence(finding.reason) for finding in findings)
+    height_text = "" if subject.link is None else f" at {subject.link.coverage.height.text}"
+    return f"{heading}Areas: the link of an aircraft{height_text}, the median of this flight."
+
+
 def _fixed_caption(text: str) -> Callable[[Subject], str]:
     """Make a caption function that returns the same text for every subject."""
     return lambda _: text
+
+
+def _returning_autopilot(subject: Subject) -> str:
+    """Return the autopilot whose returns are drawn, in a caption."""
+    return "the autopilot's" if subject.returns is None else f"the {subject.returns.returns.autopilot}"
 
 
 def _as_sentence(line: str) -> str:
@@ -227,9 +248,9 @@ FIGURES = (
         "The worst returns",
         _returns_view("worst-returns"),
         alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
-        caption=_fixed_caption(
-            "Simulated with the ArduPlane model on a point mass, in the mean wind, from the "
-            "point where each return begins."
+        caption=lambda subject: (
+            f"Simulated with {_returning_autopilot(subject)} model on a point mass, in the mean wind, from the point"
+            " where each return begins."
         ),
     ),
     FigureEntry(
@@ -275,6 +296,29 @@ FIGURES = (
         caption=_fixed_caption(
             "Broad: flown on the line, level, at its height above ground and with the camera on. "
             "Marked: lost. The axes have different scales."
+        ),
+    ),
+    FigureEntry(
+        "link-map",
+        "Radio link",
+        _link_view(link_map),
+        alternative=_fixed_caption(
+            "Map, north up: the path coloured by the margin of the radio link, the station, and the areas in which the "
+            "link is weak or lost at the height of the flight."
+        ),
+        caption=_link_caption,
+    ),
+    FigureEntry(
+        "link",
+        "Radio link over time",
+        _link_view(link_chart),
+        alternative=_fixed_caption(
+            "Plots over time: margin of the radio link, diffraction loss, Fresnel clearance, and distance of the "
+            "station."
+        ),
+        caption=_fixed_caption(
+            "Margin: what is left above the fade margin. Fresnel clearance: height of the line of sight above the "
+            "ground, in radii of the first Fresnel zone; below 0 the terrain hides the aircraft."
         ),
     ),
     FigureEntry(
@@ -341,7 +385,9 @@ def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
     """Return the subject of the figures; a track without rows is omitted."""
-    return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
+    track = track if track is not None and len(track) else None
+    setup = with_fence_zones(setup)
+    return Subject(setup, track, verdict, returns, draw_scenario_link(setup, track))
 
 
 def figure_views(subject: Subject) -> dict[str, View]:

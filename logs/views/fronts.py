@@ -67,7 +67,7 @@ def front_map(front: Front) -> MapChart:
         scenario,
         f"front of {count_text(len(paths), 'plan')} from above",
         layers,
-        [*labels, *end_labels(scenario, None)],
+        [*labels, *end_labels(scenario, None, ())],
         map_extent(scenario, None, paths),
         route=shortest,
         winds=(NamedWind(scenario.wind),),

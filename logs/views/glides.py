@@ -3,22 +3,25 @@
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text, site_text
 from logs.verdict.returns.judge_glides import REACHES, Glide, Reach
 from logs.views.charts import Label, Layer
 from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
-from logs.views.returns import path_layers
+from logs.views.returns import east_and_north, path_by_reach, path_layers
 
 # Role and name of the path by destination within reach without an engine.
 _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
 
 
-def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | None:
+def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart | None:
     """Return a map of the glide footprint, and of the path coloured by the destination in reach.
 
     Return None if glides were not judged.
+
+    track: the flown track; None for glides from the planned path.
     """
     glides, scenario, route = drawn_returns.glides, setup.scenario, setup.route.positions
     if not glides.each:
@@ -26,15 +29,11 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
     extent = map_extent(scenario, route, [sites, np.array([glide.start for glide in glides.each])])
     layers = footprint_layers(drawn_returns, extent)
-    layers += path_layers(
-        drawn_returns.segments_by_reach,
-        _LOOKS,
-        lambda glide: glide.start[:2],
-        lambda glide: _glide_text(glide, drawn_returns),
-    )
+    segments = path_by_reach(setup, drawn_returns, track)
+    layers += path_layers(segments, _LOOKS, east_and_north, lambda point: _glide_text(point.element, drawn_returns))
     impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
     if len(impacts):
-        name = "where ArduPlane's own return comes down"
+        name = f"where {glides.autopilot}'s own return comes down"
         layers.append(Layer("dots", name, "comes-down", impacts[:, 0], impacts[:, 1], quiet=True))
     names = tuple(site_text(site) for site in glides.sites)
     layers.append(
@@ -47,7 +46,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
         scenario,
         "without its engine",
         layers,
-        [*labels, *end_labels(scenario, route)],
+        [*labels, *end_labels(scenario, route, setup.route.stops.tolist())],
         extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

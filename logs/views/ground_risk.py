@@ -58,7 +58,7 @@ def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], populatio
         scenario,
         "ground risk",
         layers,
-        [*labels, *end_labels(scenario, route)],
+        [*labels, *end_labels(scenario, route, setup.route.stops.tolist())],
         extent,
         route=route,
         winds=(NamedWind(scenario.wind),),

@@ -1,20 +1,30 @@
-"""Chart a radio link: margin, terrain loss and distance over time, and the path by the quality of the link."""
+"""Chart a radio link: over time, and on a map of the path and of the coverage by the quality of the link."""
 
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal
 
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.link_outages import LinkAlongPath
+from flight.simulation.track import Track
+from logs.verdict.measures.link_coverage import LinkCoverage, flight_height, link_coverage
+from logs.verdict.measures.link_outages import LinkAlongPath, link_along_path, station_antenna
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.returns.glide_footprint import cell_outlines
 from logs.views.charts import Chart, Label, Layer, Panel, series, shorten
-from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
+from logs.views.glides import area_layer
+from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, scenario_map
 from logs.views.returns import path_layers
 from world.arrays import Floats
 
 # Margin above the fade margin below which the map calls the link weak, dB.
 WEAK_MARGIN_DB = 6.0
 LinkQuality = Literal["kept", "weak", "lost", "unknown"]
+# Fraction of the first Fresnel zone that is free of ground for a loss close to that of free space.
+_CLEAR_FRACTION = 0.6
+# Largest clearance, in radii of the first Fresnel zone, that the chart shows: more makes no difference.
+_MAX_SHOWN_CLEARANCE = 3.0
 # Role and name of the path by the quality of the link; the first is drawn lowest.
 _LOOKS: dict[LinkQuality, tuple[str, str]] = {
     "kept": ("return-safe", "link kept"),
@@ -35,32 +45,89 @@ def link_quality(margin: float) -> LinkQuality:
     return "lost" if margin < 0.0 else "weak" if margin < WEAK_MARGIN_DB else "kept"
 
 
-def link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
-    """Chart the margin above the fade margin, the terrain loss and the distance over time."""
-    points = along.points
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnLink:
+    """Data of the pictures of a radio link.
 
-    def panel(title: str, unit: str, values: Floats, limits: tuple[tuple[str, float], ...] = ()) -> Panel:
+    along: the link along the path.
+    antenna: position of the station's antenna, m, (3,).
+    coverage: the link at the path's height, over the map.
+    extent: range of the map.
+    is_flown: True if the path was flown, False for the planned path.
+    """
+
+    along: LinkAlongPath
+    antenna: Floats
+    coverage: LinkCoverage
+    extent: Extent
+    is_flown: bool
+
+
+def draw_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
+    """Compute the data of the pictures of a radio link; None without a link, a terrain, or a point of the path.
+
+    along: the link along the path.
+    antenna: position of the station's antenna, m, (3,).
+    is_flown: True if the path was flown.
+    """
+    link, terrain = setup.scenario.link, setup.scenario.terrain
+    if link is None or terrain is None or not len(along.positions):
+        return None
+    extent = map_extent(setup.scenario, setup.route.positions, [along.positions, antenna[None, :]])
+    coverage = link_coverage(link, terrain, antenna, flight_height(terrain, along.positions), extent)
+    return DrawnLink(along, antenna, coverage, extent, is_flown)
+
+
+def draw_scenario_link(setup: FlightSetup, track: Track | None) -> DrawnLink | None:
+    """Compute the data of the pictures of the scenario's radio link along a flight.
+
+    Return None without a link, a terrain, or a known position of the station.
+
+    track: None for the planned path.
+    """
+    link, terrain = setup.scenario.link, setup.scenario.terrain
+    antenna = None if link is None or terrain is None else station_antenna(setup, link, terrain)
+    if link is None or terrain is None or antenna is None:
+        return None
+    if track is None:
+        path = route_requirements(setup).path
+        along = link_along_path(link, terrain, antenna, path.times, path.points)
+    else:
+        along = link_along_path(link, terrain, antenna, track.time, track.position)
+    return draw_link(setup, along, antenna, is_flown=track is not None)
+
+
+def link_chart(setup: FlightSetup, drawn: DrawnLink) -> Chart:
+    """Chart the link's margin, diffraction loss, Fresnel clearance and distance over time."""
+    along, points = drawn.along, drawn.along.points
+    name, role = ("flown", "flown") if drawn.is_flown else ("planned path", "planned")
+
+    def panel(
+        title: str, unit: str, values: Floats, limits: tuple[tuple[str, float], ...] = (), note: str = ""
+    ) -> Panel:
         """Return a panel of values over time.
 
         limits: names and values of the limit lines.
+        note: note on values that are not shown.
         """
-        return Panel(title, unit, (series("flown", "flown", along.time, values),), limits=limits)
+        return Panel(title, unit, (series(name, role, along.time, values),), limits=limits, note=note)
 
+    clearance = np.clip(points.fresnel_clearance, -_MAX_SHOWN_CLEARANCE, _MAX_SHOWN_CLEARANCE)
+    zone_limits = (("line of sight", 0.0), (f"{100.0 * _CLEAR_FRACTION:.0f} % of the first zone", _CLEAR_FRACTION))
     panels = (
         panel("link margin", "dB", points.margin, (("required", 0.0),)),
-        panel("terrain loss", "dB", points.diffraction_loss),
+        panel("diffraction loss", "dB", points.diffraction_loss),
+        panel("Fresnel clearance", "radii", clearance, zone_limits, f"limited to {_MAX_SHOWN_CLEARANCE:.0f} radii"),
         panel("distance", "km", points.distance / 1000.0),
     )
     title = f"{shorten(setup.scenario.name, 60)}: the radio link over time"
-    return Chart(title, "time since the start", "s", panels, timed=True)
+    return Chart(title, "time since the start", "s", panels, timed=drawn.is_flown)
 
 
-def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapChart:
-    """Return a map of the path, coloured by the quality of the link, and of the station.
-
-    antenna: position of the station's antenna, m, (3,).
-    """
-    scenario, route, points = setup.scenario, setup.route.positions, along.points
+def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
+    """Return a map of the path and of the coverage, coloured by the quality of the link, and of the station."""
+    scenario, route, along = setup.scenario, setup.route.positions, drawn.along
+    points, antenna = along.points, drawn.antenna
     qualities = [link_quality(float(margin)) for margin in points.margin]
     segments = []
     for quality, group in groupby(range(len(qualities)), lambda k: qualities[k]):
@@ -76,15 +143,31 @@ def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapCh
         """Describe the link margin at point k."""
         return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB above the fade margin"
 
-    layers = path_layers(segments, _LOOKS, position, point_text)
+    layers = [*_coverage_layers(drawn.coverage), *path_layers(segments, _LOOKS, position, point_text)]
     layers.append(Layer("dots", "station", "waypoint", antenna[:1], antenna[1:2], hover_texts=("station",)))
     label = Label("station", float(antenna[0]), float(antenna[1]), "end", "waypoint", (1, 1))
     return scenario_map(
         scenario,
-        "the radio link along the flight",
+        f"the radio link along the path, and at {drawn.coverage.height.text}",
         layers,
-        [label, *end_labels(scenario, route)],
-        map_extent(scenario, route, [along.positions, antenna[None, :]]),
+        [label, *end_labels(scenario, route, setup.route.stops.tolist())],
+        drawn.extent,
         route=route,
         winds=(NamedWind(scenario.wind),),
     )
+
+
+def _coverage_layers(coverage: LinkCoverage) -> list[Layer]:
+    """Return layers of the areas in which the link is weak or lost at the flight's height, or is in the ground."""
+    is_weak = (coverage.margin >= 0.0) & (coverage.margin < WEAK_MARGIN_DB)
+    height_text = coverage.height.text
+    areas = (
+        (f"at {height_text}: less than {WEAK_MARGIN_DB:.0f} dB left", "coverage-weak", is_weak),
+        (f"at {height_text}: below the fade margin", "coverage-lost", coverage.margin < 0.0),
+        (f"ground above {height_text}", "coverage-ground", coverage.is_in_ground),
+    )
+    return [
+        area_layer(name, role, parts)
+        for name, role, is_chosen in areas
+        if (parts := cell_outlines(coverage.west, coverage.south, coverage.side, is_chosen))
+    ]

@@ -140,7 +140,7 @@ def map_chart(
         layers += _waypoint_layers(route, stops, failed, waypoint_texts)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
-    labels += end_labels(scenario, route, None if route is None else stops)
+    labels += end_labels(scenario, route, stops)
     labels += [] if route is None else _waypoint_labels(scenario, route, stops, failed)
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
     return scenario_map(
@@ -288,17 +288,19 @@ def _end_markers(scenario: Scenario) -> list[Layer]:
     ]
 
 
-def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | None = None) -> list[Label]:
+def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -> list[Label]:
     """Return the labels of start and destination, one label if they coincide.
 
     If the first or last waypoint coincides with them, its number is part of the label.
+
+    stops: number of each waypoint of the route.
     """
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
         is_at_waypoint = route is not None and _are_close(route[row], point)
         text = name
         if is_at_waypoint and route is not None:
-            text = f"{row % len(route) if stops is None else stops[row]} {name}"
+            text = f"{stops[row]} {name}"
         labels.append(Label(text, float(point[0]), float(point[1]), "end"))
     start, destination = labels
     if not _are_close(scenario.start, scenario.destination):

@@ -1,15 +1,16 @@
 """Chart returns to launch: path by outcome, profiles of the worst returns, and minimum start heights."""
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn
-from logs.verdict.returns.judge_glides import Glides
+from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn, group_segments
+from logs.verdict.returns.judge_glides import Glide, Glides, Reach
 from logs.verdict.returns.judge_returns import KINDS, Kind, SimulatedReturn
+from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import outcome_text, segment_text
 from logs.views.charts import Chart, Label, Layer, Panel, join_with_gaps, series, shorten
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
@@ -22,11 +23,50 @@ from world.scenario import Scenario
 _LOOKS: dict[Kind, tuple[str, str]] = {kind: (f"return-{kind}", segment_text(kind)) for kind in reversed(KINDS)}
 # Smallest range of altitudes that a profile shows, m.
 _MIN_SPAN = 100.0
-# Number of ground samples under a flight.
-_GROUND_POINTS = 1200
+# Number of points of a path, and of ground samples under it.
+_PATH_POINTS = 1200
+# Smallest interval of the points of a planned path, s.
+_MIN_STEP_S = 0.2
 
 Key = TypeVar("Key", bound=str)
 Element = TypeVar("Element")
+
+
+class PathPoint(NamedTuple, Generic[Element]):
+    """Point of the flown or planned path, with the nearest element that was judged, such as a return.
+
+    time: s.
+    position: m, (3,).
+    """
+
+    time: float
+    position: Floats
+    element: Element
+
+
+def judged_path(
+    setup: FlightSetup,
+    track: Track | None,
+    elements: Sequence[Element],
+    time_of: Callable[[Element], float],
+    key_of: Callable[[Element], Key],
+) -> list[tuple[Key, list[PathPoint[Element]]]]:
+    """Return the path in segments with the same key of the element that is nearest in time.
+
+    track: the flown track; None for the planned path.
+    elements: judged elements, in order of time; each time has one element.
+    time_of: time of an element, s.
+    key_of: key of an element.
+    """
+    if not elements:
+        return []
+    times = np.array([time_of(element) for element in elements])
+    # The first and the last element stand for the path beyond them, too, as far as the others do.
+    margin = 0.5 * float(np.diff(times).max(initial=0.0))
+    path_times, positions = _path_positions(setup, track, float(times[0]) - margin, float(times[-1]) + margin)
+    nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), path_times)
+    points = [PathPoint(float(path_times[k]), positions[k], elements[nearest[k]]) for k in range(len(path_times))]
+    return group_segments(points, lambda point: key_of(point.element))
 
 
 def path_layers(
@@ -53,8 +93,11 @@ def path_layers(
     return [layer for layer in layers if layer.x.size]
 
 
-def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
-    """Return a map of the path, coloured by the outcome of a return from there, and of the worst returns."""
+def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart:
+    """Return a map of the path, coloured by the outcome of a return from there, and of the worst returns.
+
+    track: the flown track; None for returns from the planned path.
+    """
     scenario, route = setup.scenario, setup.route.positions
     limit = drawn_returns.returns.limit
 
@@ -62,7 +105,8 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
         """Return the hover text of a return: start, target and outcome."""
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
-    layers = path_layers(drawn_returns.segments_by_outcome, _LOOKS, lambda ret: ret.start[:2], return_text)
+    segments = path_by_outcome(setup, drawn_returns, track)
+    layers = path_layers(segments, _LOOKS, east_and_north, lambda point: return_text(point.element))
     for worst in drawn_returns.worst:
         name = "path of one of the worst returns, numbered"
         layers.append(
@@ -96,11 +140,33 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
         scenario,
         "returns to launch from points along the route",
         layers,
-        [*labels, *end_labels(scenario, route)],
+        [*labels, *end_labels(scenario, route, setup.route.stops.tolist())],
         extent,
         route=route,
         winds=(NamedWind(scenario.wind),),
     )
+
+
+def east_and_north(point: PathPoint[Any]) -> tuple[float, float]:
+    """Return the coordinates of a point of the path on a map, m."""
+    return float(point.position[0]), float(point.position[1])
+
+
+def path_by_outcome(
+    setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
+) -> list[tuple[Kind, list[PathPoint[SimulatedReturn]]]]:
+    """Return the path in segments with the same outcome of the nearest return."""
+    flown_track = track if drawn_returns.returns.flown else None
+    return judged_path(setup, flown_track, drawn_returns.worst_by_start, lambda ret: ret.time, lambda ret: ret.kind)
+
+
+def path_by_reach(
+    setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
+) -> list[tuple[Reach, list[PathPoint[Glide]]]]:
+    """Return the path in segments with the same best destination of the nearest glide."""
+    flown_track = track if drawn_returns.returns.flown else None
+    glides = drawn_returns.glides.each
+    return judged_path(setup, flown_track, glides, lambda glide: glide.time, lambda glide: glide.reach)
 
 
 def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
@@ -178,7 +244,9 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     if not drawn_returns.returns.each:
         return None
     scenario, limit = setup.scenario, drawn_returns.returns.limit
-    time, positions = _path_positions(drawn_returns, track)
+    segments = path_by_outcome(setup, drawn_returns, track)
+    points = [point for _, segment in segments for point in segment]
+    time, positions = np.array([point.time for point in points]), np.array([point.position for point in points])
     ground, safe_altitudes = terrain_altitudes(scenario, positions), drawn_returns.min_safe_altitudes
     altitudes = np.concatenate([positions[:, 2], safe_altitudes.altitude, np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
@@ -188,10 +256,10 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     layers = [
         *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
-            drawn_returns.segments_by_outcome,
+            segments,
             _LOOKS,
-            lambda ret: (ret.time, ret.start[2]),
-            lambda ret: outcome_text(ret, limit),
+            lambda point: (point.time, float(point.position[2])),
+            lambda point: outcome_text(point.element, limit),
         ),
         Layer("line", name, "limit", safe_altitudes.time, safe_altitudes.altitude),
     ]
@@ -210,20 +278,20 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     )
 
 
-def _path_positions(drawn_returns: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
-    """Return the times, s, (t,), and positions, m, (t, 3), of the path on which returns were judged.
+def _path_positions(setup: FlightSetup, track: Track | None, first: float, last: float) -> tuple[Floats, Floats]:
+    """Return times, s, (t,), and positions, m, (t, 3), of the flown or planned path from one time to another.
 
-    They are the rows of the track, thinned, or the starts of the returns if the flight was not flown.
+    track: the flown track, whose rows are thinned; None for the planned path.
     """
-    first, last = drawn_returns.returns.each[0].time, max(ret.time for ret in drawn_returns.returns.each)
-    if track is not None and drawn_returns.returns.flown:
-        is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
-        rows = np.flatnonzero(is_shown)
-        rows = rows[:: max(1, len(rows) // _GROUND_POINTS)]
-        if rows.size:
-            return track.time[rows], track.position[rows]
-    judged_returns = [ret for _, group in drawn_returns.segments_by_outcome for ret in group]
-    return np.array([ret.time for ret in judged_returns]), np.array([ret.start for ret in judged_returns])
+    if track is None:
+        starts = planned_starts(setup, max(_MIN_STEP_S, (last - first) / _PATH_POINTS))
+        is_shown = (starts.time >= first) & (starts.time <= last)
+        positions = np.column_stack([starts.rows[name] for name in ("east", "north", "up")])
+        return starts.time[is_shown], positions[is_shown]
+    is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
+    rows = np.flatnonzero(is_shown)
+    rows = rows[:: max(1, len(rows) // _PATH_POINTS)]
+    return track.time[rows], track.position[rows]
 
 
 def _glide_margin_panel(glides: Glides) -> Panel:
@@ -235,10 +303,16 @@ def _glide_margin_panel(glides: Glides) -> Panel:
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
 
-    layers = [line("to spare for home", "left-home", [glide.home_altitude_left for glide in glides.each])]
+    # The wider line is below, so that both are seen where they coincide.
+    home_margins, home_name, layers = [glide.home_altitude_left for glide in glides.each], "to spare for home", []
     if len(glides.sites) > 1:
         site_margins = [glide.site_altitude_left for glide in glides.each]
-        layers.append(line("to spare for a rally point or landing place", "left-site", site_margins))
+        site_name = "to spare for a rally point or landing place"
+        if np.array_equal(site_margins, home_margins, equal_nan=True):
+            home_name = "to spare for home, and for a rally point or landing place there"
+        else:
+            layers.append(line(site_name, "left-site", site_margins))
+    layers.append(line(home_name, "left-home", home_margins))
     layers.append(line("to spare for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each]))
     limits = (("nothing to spare", 0.0),)
     return Panel("altitude to spare without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

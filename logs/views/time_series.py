@@ -26,7 +26,7 @@ def to_float64(values: NDArray[np.float32]) -> Floats:
 def chart_over_time(setup: FlightSetup, subject: str, panels: list[Panel], track: Track) -> Chart:
     """Return a chart over time since the start, with a mark at the start of each leg."""
     title = f"{shorten(setup.scenario.name, 60)}: {subject}"
-    marks = leg_marks(track.leg, track.time)
+    marks = leg_marks(setup.route.leg_numbers_of(track.leg), track.time)
     return Chart(title, "time since the start", "s", tuple(panels), marks=marks, timed=True)
 
 
@@ -198,5 +198,5 @@ def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
     if not panels:
         return None
     title = f"{shorten(setup.scenario.name, 60)}: exposure along the flown track"
-    marks = leg_marks(track.leg[rows], kilometres)
+    marks = leg_marks(setup.route.leg_numbers_of(track.leg[rows]), kilometres)
     return Chart(title, "distance flown over the ground", "km", tuple(panels), marks=marks)

@@ -46,7 +46,8 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
                 math.nan if value is None else value
                 for value in (finding.planned, finding.flown, finding.effective_limit)
             )
-            place_rows.append(PlaceValue(place.index, planned_value, flown_value, limit_value, finding.ok))
+            number = place.index if place.number is None else place.number
+            place_rows.append(PlaceValue(number, planned_value, flown_value, limit_value, finding.ok))
     return sorted(place_rows, key=lambda value: value.number)
 
 

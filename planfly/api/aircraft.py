@@ -119,8 +119,8 @@ def new_aircraft(
     prop: diameter and pitch in inches, such as "12x6".
     layout: "tail" (default), "wing" for a flying wing with elevons, "vtail" for a V-tail.
     fuel: fuel carried by an aircraft without a battery, kg.
-    params: a file of ArduPlane parameters.  Missing values of cruise, stall, bank, climb and drag are taken from this
-    file if they differ from ArduPlane's defaults.
+    params: a file of ArduPlane's or PX4's parameters.  Missing values of cruise, stall, bank, climb and drag are taken
+    from this file if they differ from the autopilot's defaults.
     Raises a `planfly.PlanflyError` for bad input; then nothing is made.
 
     >>> import planfly, tempfile

@@ -16,13 +16,14 @@ from planner.plan import Plan
 from world.extras import requires_extra
 from world.files import write_atomically
 from world.population import PopulationUnit
+from world.scenario import Scenario
 
 
 @requires_extra("campaigns")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def ground_risk(
-    target: Plan | str | Path,
+    target: Plan | Scenario | str | Path,
     *,
     population: str | Path | None = None,
     population_unit: PopulationUnit = "per-cell",
@@ -40,7 +41,8 @@ def ground_risk(
     The flights vary as in `planfly.campaign`.  From each flight, returns to launch and falls to the ground are
     simulated.
 
-    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
+    .plan file.
     population: a GeoTIFF of the population, such as GHS-POP or WorldPop; None leaves the class open.
     population_unit: unit of its numbers, people "per-cell" or "per-km2".
     controlled: True for a controlled ground area, where only involved people are.

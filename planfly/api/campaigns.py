@@ -22,7 +22,14 @@ from planfly.campaigns.find_winds import (
 )
 from planfly.campaigns.flight_row import FlightRow
 from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
-from planfly.campaigns.report import OutputDirectory, campaign_folder, finish_campaign, fly_row_again, write_winds
+from planfly.campaigns.report import (
+    SCENARIO_FILE,
+    OutputDirectory,
+    campaign_folder,
+    finish_campaign,
+    fly_row_again,
+    write_winds,
+)
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.summary import summarise_campaign
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_stored_settings, read_table
@@ -39,11 +46,13 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.process_setup import end_repeated_call
 from planfly.runtime.stages import report_line, stage
 from planner.plan import Plan
 from world.argument_types import checks_types
-from world.errors import PlanflyError
+from world.errors import ArgumentError, PlanflyError
 from world.extras import require_extra, requires_extra
+from world.scenario import Scenario
 from world.wording import count_text
 
 
@@ -62,7 +71,7 @@ class CampaignFlight:
 
 
 def _open_base(
-    target: Plan | str | Path, options: MissionOptions, dispersions: Dispersions, folder: OutputDirectory
+    target: Plan | Scenario | str | Path, options: MissionOptions, dispersions: Dispersions, folder: OutputDirectory
 ) -> CampaignBase:
     """Open the mission of a campaign, and prepare the campaign's folder.
 
@@ -70,7 +79,7 @@ def _open_base(
     for bad input; then the folder is not changed.
     """
     campaign_target, flight_options = (
-        target if isinstance(target, Plan) else str(target),
+        str(target) if isinstance(target, str | Path) else target,
         select_mission_options(options),
     )
     is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
@@ -88,18 +97,38 @@ def _open_base(
     return base
 
 
-def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
+def _command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
     """Return the target as it stands in the command line that repeats a campaign.
 
-    A `Plan` is named by its file in `folder`.
+    A `Plan` is named by its file in `folder`, and a `Scenario` by a file that is written there.
     """
-    return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
+    if isinstance(target, Plan):
+        return str(folder / "plan.json")
+    return _scenario_file(target, folder) if isinstance(target, Scenario) else str(target)
 
 
-def _command_line_options(base: CampaignBase, options: MissionOptions, spread: str | Path | None) -> dict[str, object]:
-    """Return the options of the command line that repeats a campaign, by name."""
+def _scenario_file(scenario: Scenario, folder: Path) -> str:
+    """Write a scenario into the folder of a campaign, for the command line that repeats it; return the file's path.
+
+    A scenario made around a mission is no file; its name is returned.
+    """
+    if scenario.external:
+        return scenario.name
+    scenario.to_toml(folder / SCENARIO_FILE)
+    return str(folder / SCENARIO_FILE)
+
+
+def _command_line_options(
+    base: CampaignBase, options: MissionOptions, spread: str | Path | None, folder: Path
+) -> dict[str, object]:
+    """Return the options of the command line that repeats a campaign, by name.
+
+    A `Scenario` is named by a file that is written into `folder`.
+    """
+    named_scenario = options.get("scenario")
     return {"seed": base.seed, "spread": spread} | {
         **select_mission_options(options),
+        "scenario": _scenario_file(named_scenario, folder) if isinstance(named_scenario, Scenario) else named_scenario,
         "fence": fence_file_names(options),
     }
 
@@ -111,6 +140,7 @@ def make_workers(count: int | None, scheduler: str | None, seed: int | None) -> 
 
     count: number of processes on this machine; None for one per core.
     """
+    end_repeated_call()
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
         check_scheduler_address(scheduler)
@@ -151,7 +181,7 @@ def _report_flight_count(goal: Goal, folder: Path) -> None:
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign(
-    target: Plan | str | Path,
+    target: Plan | Scenario | str | Path,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -162,7 +192,8 @@ def campaign(
 ) -> CampaignResult:
     """Fly a mission many times, like `planfly.fly`, with variations of wind, aircraft, terrain and start.
 
-    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
+    .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights; None takes 300, or, with ``prove``, at most 5,000; for a resumed campaign its earlier
     number.  Without flights, ``prove`` and ``at_least``, a resumed campaign keeps its earlier goal.
@@ -192,7 +223,9 @@ def campaign(
                 _report_flight_count(goal, directory.folder)
         base = _open_base(target, options, _read_spread(spread), directory)
         command_line = campaign_command_line(
-            _command_line_target(target, directory.folder), goal, _command_line_options(base, options, spread)
+            _command_line_target(target, directory.folder),
+            goal,
+            _command_line_options(base, options, spread, directory.folder),
         )
         return _fly_and_summarise(base, goal, workers_used, directory, command_line, keep=out is not None)
 
@@ -221,7 +254,7 @@ def _fly_and_summarise(
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign_flight(
-    target: Plan | str | Path,
+    target: Plan | Scenario | str | Path,
     index: int,
     out: str | Path,
     **options: Unpack[CampaignOptions],
@@ -290,7 +323,7 @@ def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparis
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def winds(
-    target: Plan | str | Path,
+    target: Plan | Scenario | str | Path,
     *,
     prove: float = 0.99,
     directions: int = 16,
@@ -302,7 +335,8 @@ def winds(
 ) -> WindsResult:
     """Find the strongest wind from each direction in which a mission is flyable with a given probability.
 
-    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
+    .plan file.
     prove: the probability.
     directions: number of directions, 4 to 72.
     most: maximum wind to search, m/s.
@@ -327,11 +361,14 @@ def winds(
         folder = directory.folder
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
         base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
+        if base.scenario.wind.forecast is not None:
+            allowed = "not in this search, which replaces the wind: planfly window finds departures in a forecast"
+            raise ArgumentError.of_argument("forecast", options["forecast"], allowed, shown="")
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
             command_line = winds_command_line(
-                _command_line_target(target, folder), goal, _command_line_options(base, options, spread)
+                _command_line_target(target, folder), goal, _command_line_options(base, options, spread, folder)
             )
             write_winds(folder, base, winds_found, command_line)
     return winds_found
@@ -341,23 +378,24 @@ def winds(
 # Find the smallest battery for a mission and its returns.
 
 
-def open_sample(target: Plan | str | Path, options: SampleOptions) -> CampaignBase:
+def open_sample(target: Plan | Scenario | str | Path, options: SampleOptions) -> CampaignBase:
     """Open the mission of varied flights that are not stored; for a scenario a path is planned.
 
     Raises PlanflyError for bad input.
     """
     dispersions, mission_options = _read_spread(options["spread"]), select_mission_options(options)
-    if isinstance(target, Plan) or is_mission_file(str(target)):
-        return open_campaign(target if isinstance(target, Plan) else str(target), dispersions, mission_options)
+    campaign_target = str(target) if isinstance(target, str | Path) else target
+    if isinstance(campaign_target, Plan) or is_mission_file(campaign_target):
+        return open_campaign(campaign_target, dispersions, mission_options)
     with stage("planning") as advance:
-        return open_campaign(str(target), dispersions, mission_options, advance=advance)
+        return open_campaign(campaign_target, dispersions, mission_options, advance=advance)
 
 
 @requires_extra("campaigns")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def battery(
-    target: Plan | str | Path,
+    target: Plan | Scenario | str | Path,
     *,
     probability: float = 0.95,
     reserve: float = ENERGY_RESERVE_FRACTION,
@@ -370,7 +408,8 @@ def battery(
     The flights vary as in `planfly.campaign`.  From each flight, returns to launch are simulated as in
     `planfly.returns`.
 
-    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
+    .plan file.
     probability: the probability.
     reserve: fraction of the battery that is to be left.
     specific_energy: energy per battery mass, Wh/kg, with which the aircraft's mass changes with the battery; None

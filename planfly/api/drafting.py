@@ -1,18 +1,17 @@
 """Write a first version of a new scenario."""
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from aircraft.catalog import find_aircraft
-from planfly.arguments import check_arguments, is_valid_position
+from planfly.arguments import check_arguments, parse_position
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file
 from world.argument_types import checks_types
 from world.elevation_formats import EMBEDDED
-from world.errors import ArgumentError, PlanflyError
+from world.errors import PlanflyError
 from world.files import absolute_path, write_atomically
 from world.raster import open_raster
 from world.scenario import scenario_from_spec
@@ -53,7 +52,7 @@ def new_scenario(
     ('ridge.toml', True)
     """
     check_arguments(height=height, autopilot=autopilot)
-    endpoints = _parse_position("start", start), _parse_position("destination", destination)
+    endpoints = GeoPosition(*parse_position("start", start)), GeoPosition(*parse_position("destination", destination))
     target = Path(folder)
     name = Path(absolute_path(target)).name if ".." in target.parts else target.absolute().name
     file = _scenario_file(target, name, overwrite=overwrite)
@@ -101,20 +100,6 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     elif not folder.absolute().parent.is_dir():
         raise PlanflyError(f"{folder}: the parent folder {folder.parent} does not exist", file=folder)
     return file
-
-
-def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
-    """Convert latitude and longitude to a position.  Raises ArgumentError for invalid coordinates.
-
-    keyword: name of the argument, for the message.
-    """
-    try:
-        lat, lon = (float(value) for value in coordinates)
-    except (TypeError, ValueError):
-        lat = lon = math.nan
-    if not is_valid_position(lat, lon):
-        raise ArgumentError.of_argument(keyword, coordinates, "expected latitude -89..89 and longitude -180..180")
-    return GeoPosition(lat, lon)
 
 
 def _absolute_path(path: str | Path, *, is_name: bool) -> str:

@@ -118,7 +118,7 @@ def export(
     fence: FencePaths = (),
     at: str | None = None,
     autopilot: str | None = None,
-    scenario: str | Path | None = None,
+    scenario: Scenario | str | Path | None = None,
     params: str | Path | None = None,
     aircraft: str | Path | None = None,
     overwrite: bool = False,
@@ -293,7 +293,9 @@ def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | Non
         drawn_returns = return_summary(setup, track).data_for_pictures()
     if drawn_returns is None:
         return source
-    return replace(source, returns=return_lines(setup, drawn_returns), footprint=glide_shapes(setup, drawn_returns))
+    return replace(
+        source, returns=return_lines(setup, drawn_returns, track), footprint=glide_shapes(setup, drawn_returns)
+    )
 
 
 def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:

@@ -175,7 +175,7 @@ def fly(
     overwrite: True replaces an existing file.
 
     The world of the flight (None keeps the value of the plan or the scenario):
-    scenario: a name or a TOML file; None for the plan's own scenario, or one made around the mission.
+    scenario: a name, a TOML file or a `Scenario`; None for the plan's own, or one made around the mission.
     terrain: an elevation file that replaces the terrain of the scenario.
     fence: files of fences and zones in addition to those of the mission.
     seed: seed of the turbulence; None takes the seed of the plan or of the scenario, or 1.

@@ -126,9 +126,9 @@ def identify_aircraft(
     if not paths:
         raise PlanflyError.of_argument("logs", "", "expected at least one log", shown="")
     prior = _load_base(base)
-    area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
-    stated_numbers = {"mass": mass, "span": span, "area": area}
+    stated_numbers = {"mass": mass, "span": span, **({} if area is None else {"area": area})}
     _check_stated_numbers(stated_numbers, prior)
+    stated_numbers.setdefault("area", prior.wing_area * (span / prior.wing_span) ** 2)
     volts, energy = _find_battery(prior, battery)
     base_numbers = scale_base_model(base_model(prior), **stated_numbers, volts=volts)
     check_base(prior)
@@ -210,7 +210,7 @@ def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> 
     """
     for name, value in stated_numbers.items():
         min_value, max_value, unit = _RANGES[name]
-        if isinstance(value, bool) or not min_value <= value <= max_value:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not min_value <= value <= max_value:
             raise FlightError.of_argument(
                 name, value, f"allowed {min_value:g}..{max_value:g} {unit}", shown=f"{value} {unit}"
             )

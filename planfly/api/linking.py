@@ -2,20 +2,27 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import NamedTuple, Unpack
+
+import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
 from logs.verdict.findings import Finding
-from logs.verdict.measures.link_outages import LinkAlongPath, link_along_path, station_antenna
+from logs.verdict.measures.flown_phases import flown_phases
+from logs.verdict.measures.link_outages import LinkAlongPath
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.rules.link_rule import link_findings
+from logs.verdict.returns.judge_returns import Returns
+from logs.verdict.returns.returns_text import range_text
+from logs.verdict.rules.link_rule import duration_text, judge_link, period_text
+from logs.verdict.wording import place_text
 from planfly.api.flying import FlownMission, judge
-from planfly.arguments import check_arguments
-from planfly.flight_options import LogOptions, takes_options
+from planfly.arguments import check_arguments, parse_position
+from planfly.flight_options import LinkOptions, select_log_and_mission_options, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
+from planfly.rtl.jsbsim_returns import fly_return
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import LINK_FILES, check_output_folder, clean_folder
@@ -23,10 +30,36 @@ from planner.plan import Plan
 from world.arrays import Floats
 from world.errors import ArgumentError
 from world.files import write_atomically
+from world.frames import to_geo
 from world.scenario import with_link
 
-# Entries of [link] that a scenario without this table needs.
+# Entry of [link] that each option replaces; `station` replaces the position.
+_ENTRIES = {
+    "frequency": "frequency_mhz",
+    "power": "power_dbm",
+    "sensitivity": "sensitivity_dbm",
+    "antenna": "antenna_m",
+    "station_gain": "station_gain_dbi",
+    "aircraft_gain": "aircraft_gain_dbi",
+    "cable_loss": "cable_loss_db",
+    "fade_margin": "fade_margin_db",
+    "max_outage": "max_outage_s",
+    "use": "use",
+}
+# Options without which a scenario without [link] has no link.
 _NEEDED = ("frequency", "power", "sensitivity")
+
+
+class WorstPoint(NamedTuple):
+    """Point of an outage with the smallest margin.
+
+    margin: dB above the fade margin, negative.
+    lat_deg, lon_deg: position.
+    """
+
+    margin: float
+    lat_deg: float
+    lon_deg: float
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
@@ -37,6 +70,8 @@ class LinkResult:
     finding: the verdict's finding on the link.
     along: the link once a second along the flight; None if it cannot be computed.
     antenna: position of the station's antenna, (3,) m; None without `along`.
+    where: leg with the least margin; "" if no margin is known.
+    returns: the autopilot's returns from the outages, as `planfly.returns` judges them; None without such a return.
     files: files written; empty if no folder was named.
     """
 
@@ -44,22 +79,43 @@ class LinkResult:
     finding: Finding
     along: LinkAlongPath | None = None
     antenna: Floats | None = None
+    where: str = ""
+    returns: Returns | None = None
     files: tuple[Path, ...] = ()
+
+    @property
+    def worst_points(self) -> tuple[WorstPoint, ...]:
+        """Worst point of each outage, in order of time."""
+        if self.along is None:
+            return ()
+        points = []
+        for outage in self.along.outages:
+            is_lost = (self.along.time >= outage.start) & (self.along.time <= outage.end)
+            margins = np.where(is_lost & np.isfinite(self.along.points.margin), self.along.points.margin, np.inf)
+            k = int(np.argmin(margins))
+            lat, lon = to_geo(self.setup.scenario.origin, *self.along.positions[k, :2].tolist())
+            points.append(WorstPoint(float(margins[k]), float(lat), float(lon)))
+        return tuple(points)
 
     @property
     def outage_lines(self) -> tuple[str, ...]:
         """One line for each outage of the link, in order of time."""
-        if self.along is None:
+        outages = () if self.along is None else self.along.outages
+        return tuple(
+            f"{period_text(outage)}: {duration_text(outage.duration)} below the fade margin, by up to"
+            f" {-worst.margin:.1f} dB at {worst.lat_deg:.6f}, {worst.lon_deg:.6f}"
+            for outage, worst in zip(outages, self.worst_points, strict=True)
+        )
+
+    @property
+    def return_lines(self) -> tuple[str, ...]:
+        """One line for each period of the outages whose returns have the same outcome, the worst first."""
+        if self.returns is None:
             return ()
-        lines = []
-        for outage in self.along.outages:
-            is_lost = (self.along.time >= outage.start) & (self.along.time <= outage.end)
-            margin = self.along.points.margin[is_lost]
-            worst_text = f", at worst {-float(margin.min()):.1f} dB" if margin.size else ""
-            lines.append(
-                f"{outage.start:.0f} to {outage.end:.0f} s: {outage.duration:.0f} s below the fade margin{worst_text}"
-            )
-        return tuple(lines)
+        return tuple(
+            f"return from {range_text(return_range, self.returns, self.setup.scenario)}"
+            for return_range in self.returns.ranges
+        )
 
     def __repr__(self) -> str:
         return f"<LinkResult {self.setup.scenario.name}: {self.finding.reason}>"
@@ -70,30 +126,21 @@ class LinkResult:
 def link(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,
-    frequency: float | None = None,
-    power: float | None = None,
-    sensitivity: float | None = None,
-    station: tuple[float, float] | None = None,
-    antenna: float | None = None,
-    fade_margin: float | None = None,
     out: str | Path | None = None,
     overwrite: bool = True,
-    **options: Unpack[LogOptions],
+    **options: Unpack[LinkOptions],
 ) -> LinkResult:
     """Judge the radio link to the ground station along a flight; a plan or a mission is flown first.
 
     what: a `Plan`, or the path of a plan.json, .waypoints or .plan; or a flight, which is a result of `planfly.fly`, a
     flight log or its path, or an autopilot's log.
-    A scenario's [link] describes the link; these replace its entries, None keeps them:
-    frequency: MHz.
-    power: output power of the transmitter, dBm.
-    sensitivity: sensitivity of the receiver, dBm.
-    station: latitude and longitude of the station's antenna, degrees; by default the antenna stands at the mission's
-    home.
-    antenna: height of the station's antenna above ground, m.
-    fade_margin: required power above the sensitivity, dB.
-    out: folder for pictures of the link over time and on the map; None writes none.  overwrite: True replaces them.
-    options: see `planfly.judge`.
+    out: folder for pictures of the link over time and on the map, and for the map's coverage as a GeoTIFF; None writes
+    none.  overwrite: True replaces them.
+    options: see `planfly.judge`; of the link, each replaces an entry of the scenario's [link]:
+    frequency, MHz; power of the transmitter and sensitivity of the receiver, dBm; station, latitude and longitude of
+    its antenna, by default the mission's home; antenna, its height above ground, m; station_gain and aircraft_gain,
+    dBi; cable_loss and fade_margin, dB; max_outage, the longest accepted time below the fade margin, s; and use,
+    "telemetry" or "control" (the remote control).
     Raises a `planfly.PlanflyError` for bad input, and for a scenario without [link] if frequency, power or sensitivity
     is missing.
 
@@ -103,64 +150,63 @@ def link(
     >>> found.finding.ok
     False
     """
-    entries: dict[str, Any] = {
-        "frequency_mhz": frequency,
-        "power_dbm": power,
-        "sensitivity_dbm": sensitivity,
-        "lat_deg": None if station is None else station[0],
-        "lon_deg": None if station is None else station[1],
-        "antenna_m": antenna,
-        "fade_margin_db": fade_margin,
-    }
-    check_arguments(frequency=frequency, power=power, sensitivity=sensitivity, antenna=antenna, fade_margin=fade_margin)
+    station = options["station"]
+    given = {name: value for name, value in options.items() if name in _ENTRIES}
+    check_arguments(**given)
     if out is not None:
         check_output_folder(Path(out), overwrite)
-    judged = judge(what, **options)
+    judged = judge(what, **select_log_and_mission_options(options))
     if judged.setup.scenario.link is None:
-        required_values = dict(zip(_NEEDED, (frequency, power, sensitivity), strict=True))
-        missing = next((name for name, value in required_values.items() if value is None), None)
+        missing = next((name for name in _NEEDED if given[name] is None), None)
         if missing is not None:
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
-    setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries))
+    lat, lon = (None, None) if station is None else parse_position("station", station)
+    entries = {_ENTRIES[name]: value for name, value in given.items()}
+    setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon))
     result = _judge_link(setup, judged.track)
     return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
 
 
 def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
-    """Write the pictures of a link into a folder, and return the result with their files."""
+    """Write the pictures and the coverage of a link into a folder, and return the result with their files."""
     if result.along is None or result.antenna is None:
         return result
     # Imported here: only pictures need matplotlib.
+    from logs.views.exports.coverage_file import coverage_geotiff
     from logs.views.figures import View, draw_pictures
-    from logs.views.link import link_chart, link_map
+    from logs.views.link import draw_link, link_chart, link_map
 
     setup = result.setup
     with stage("drawing", "drawing a link"):
-        views: dict[str, View] = {
-            "link": link_chart(setup, result.along),
-            "link-map": link_map(setup, result.along, result.antenna),
-        }
-        pictures = draw_pictures(views)
+        drawn = draw_link(setup, result.along, result.antenna, is_flown=True)
+        if drawn is None:
+            return result
+        views: dict[str, View] = {"link": link_chart(setup, drawn), "link-map": link_map(setup, drawn)}
+        files = draw_pictures(views)
+        files["link-coverage.tif"] = coverage_geotiff(drawn.coverage, setup.scenario.origin)
     clean_folder(folder, LINK_FILES, overwrite=overwrite)
     for name in LINK_FILES:
-        write_atomically(folder / name, pictures[name])
+        write_atomically(folder / name, files[name])
     return replace(result, files=tuple(folder / name for name in LINK_FILES))
 
 
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
-    """Judge the radio link of a scenario along a track.
+    """Judge the radio link of a scenario along a track, as the verdict does.
 
-    Without a track or terrain the finding is undecided, and the result has no link along the path.
+    Without a track, a terrain or a position of the station the finding is undecided, and the result has no link along
+    the path.
     """
+    link_of_scenario = setup.scenario.link
+    if link_of_scenario is None:
+        raise ValueError("the scenario has no link")
     with stage("computing the radio link"):
-        requirements = route_requirements(setup)
-        aligned = None if track is None else align_track(requirements, track)
-        (finding,) = link_findings(requirements, aligned)
-        link_of_scenario, terrain = setup.scenario.link, setup.scenario.terrain
-        antenna = None
-        if terrain is not None and link_of_scenario is not None:
-            antenna = station_antenna(setup, link_of_scenario, terrain)
-        if track is None or not len(track) or terrain is None or link_of_scenario is None or antenna is None:
-            return LinkResult(setup, finding)
-        along = link_along_path(link_of_scenario, terrain, antenna, track.time, track.position)
-        return LinkResult(setup, finding, along, antenna)
+        requirements, aligned = route_requirements(setup), None
+        if track is not None and len(track):
+            requirements, aligned = (
+                flown_phases(requirements, track)
+                if setup.source is None
+                else (requirements, align_track(requirements, track))
+            )
+        judged = judge_link(requirements, aligned, link_of_scenario, fly_again=fly_return)
+    where = "" if judged.leg is None else place_text(judged.leg)
+    return LinkResult(setup, judged.finding, judged.along, judged.antenna, where, judged.returns)

@@ -1,19 +1,15 @@
 """Make a scenario in Python, from another scenario with other threats and other values in its tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from planfly.flight_options import load_scenario_with_options
 from planfly.runtime.stages import report_line
+from planfly.threat_tables import GivenThreats, threat_tables
 from planner.search.algorithms import find_algorithm
 from world.argument_types import checks_types
-from world.errors import ArgumentError
 from world.scenario import Scenario, scenario_from_spec
-from world.scenario_tables import SCALE_RATIOS
 
 # Tables of a position, which replace another position as a whole.
 _POSITIONS = ("start", "destination", "home")
@@ -21,22 +17,19 @@ _POSITIONS = ("start", "destination", "home")
 _SOURCE_KEYS = ("kind", "path")
 # Tables from which the terrain is made.
 _TERRAIN_TABLES = frozenset(("terrain", "area", "origin"))
-# Keys of the columns of an array of threats.
-_ARRAY_COLUMNS = ("east_m", "north_m", "kill_radius_m", "detection_radius_m")
-_THREATS_EXPECTED = (
-    "expected a data frame or a mapping of columns named as the keys of [[threats]], a list of mappings with these"
-    " keys, or an array (n, 4) of east, north, kill radius and detection radius, m"
-)
 
 
 @checks_types
 def make_scenario(
     base: Scenario | str | Path,
     *,
-    threats: Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]] | ArrayLike | None = None,
+    threats: GivenThreats | None = None,
     **tables: Any,
 ) -> Scenario:
-    """Return a scenario with other threats and other values, for `planfly.plan`, `planfly.fly` and other functions.
+    """Return a scenario with other threats and other values.
+
+    It is a scenario for `planfly.plan`, for `scenario` of `planfly.fly` and other functions, and a target of
+    `planfly.campaign`; its method ``to_toml`` writes it to a file.
 
     base: a built-in scenario's name, a TOML file's path, or a `Scenario`.
     threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
@@ -45,7 +38,8 @@ def make_scenario(
     the kill radius and a third of the detection radius.
     tables: values of other tables, as mappings with the keys of a scenario file, and its name and description; other
     keys of a table stay, except for a position, and a table of another kind or file, which are replaced as a whole.
-    Another elevation file replaces the base's origin, too, unless an origin is given: its centre becomes the origin.
+    Another elevation file replaces the base's origin, too, unless an origin is given: the middle of its
+    latitudes and longitudes becomes the origin.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
 
     >>> import planfly
@@ -65,7 +59,7 @@ def make_scenario(
     if is_other_file and "origin" not in tables:
         spec.pop("origin", None)
     if threats is not None:
-        spec["threats"] = _threat_tables(threats)
+        spec["threats"] = threat_tables(threats)
     terrain = base_scenario.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
     scenario = scenario_from_spec(spec, "make_scenario", ground=terrain, external=base_scenario.external)
     find_algorithm(scenario.planner.algorithm, "make_scenario")
@@ -83,45 +77,3 @@ def _change_table(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str
     if any(key in changes and changes[key] != table.get(key) for key in _SOURCE_KEYS):
         table = {key: table[key] for key in ("kind",) if key in table}
     return table | dict(changes)
-
-
-def _threat_tables(threats: Any) -> list[dict[str, Any]]:
-    """Convert threats to tables of a scenario file.
-
-    Raises ArgumentError for values that are neither a data frame, columns, mappings nor an array (n, 4).
-    """
-    try:
-        if isinstance(threats, Mapping):
-            columns = {name: np.asarray(values).tolist() for name, values in threats.items()}
-            rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        elif hasattr(threats, "to_dict"):
-            rows = threats.to_dict("records")
-        elif len(threats) and all(isinstance(row, Mapping) for row in threats):
-            rows = [dict(row) for row in threats]
-        else:
-            array = np.asarray(threats, dtype=np.float64)
-            if array.size and array.shape[1:] != (len(_ARRAY_COLUMNS),):
-                return _raise_invalid_threats(threats)
-            rows = [dict(zip(_ARRAY_COLUMNS, row, strict=True)) for row in array.tolist()]
-        return [_threat_table(row) for row in rows]
-    except ArgumentError:
-        raise
-    except (TypeError, ValueError):
-        return _raise_invalid_threats(threats)
-
-
-def _raise_invalid_threats(threats: Any) -> Any:
-    """Raise ArgumentError for threats that are not in one of the expected forms."""
-    raise ArgumentError.of_argument("threats", type(threats).__name__, _THREATS_EXPECTED)
-
-
-def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a threat as a table of a scenario file, without missing values and radii of 0."""
-    values = {key: value for key, value in row.items() if value is not None and value == value}
-    for kind in SCALE_RATIOS:
-        radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
-        if values.get(radius) == 0.0:
-            values = {key: value for key, value in values.items() if key not in (radius, scale)}
-        elif isinstance(values.get(radius), str):
-            raise ArgumentError.of_argument(f"threats: column {radius}", values[radius], "expected numbers, not text")
-    return values

@@ -7,13 +7,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from planfly.arguments import RANGES, check_arguments
 from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
 from planner.optimisers.multistart import Multistart
 from planner.optimisers.partial_resampling import PartialResampling
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
+from world.argument_types import checks_types
 from world.arrays import Floats
+from world.errors import ArgumentError
 
 # "umda" uses independent Gaussians, as in the paper; "emna" one Gaussian with full covariance; "multistart" Gaussians
 # with full covariance from many starts; "partial" redraws a part of the variables of each point; "differential" is
@@ -95,8 +98,8 @@ class Optimiser:
 
         NaN is treated as the worst value.
 
-        Raises ValueError if the number of rows differs from the number of points that `ask` returned, or if the number
-        of columns differs from the previous call.
+        Raises ArgumentError if the number of rows differs from the number of points that `ask` returned, or if the
+        number of columns differs from the previous call.
         """
         points = self._search.ask()
         objective_values = _parse_columns("values", values, len(points))
@@ -104,12 +107,13 @@ class Optimiser:
             np.empty((len(points), 0)) if violations is None else _parse_columns("violations", violations, len(points))
         )
         if not objective_values.shape[1]:
-            raise ValueError("values: no columns; expected one for each objective")
+            raise ArgumentError.of_argument("values", values, "no columns; expected one for each objective", shown="")
         scores = np.concatenate([np.maximum(violation_values, 0.0), objective_values], axis=1)
         if self._levels and (
             scores.shape[1] != self._scores.shape[1] or violation_values.shape[1] != self._violation_count
         ):
-            raise ValueError("values, violations: the numbers of columns differ from the previous call")
+            allowed = "the numbers of columns differ from the previous call"
+            raise ArgumentError.of_argument("values, violations", values, allowed, shown="")
         if not self._levels:
             self._violation_count = violation_values.shape[1]
             self._levels = _priority_levels(violation_values.shape[1], objective_values.shape[1])
@@ -166,6 +170,7 @@ class Optimiser:
         return f"<Optimiser {name}: {self._points.shape[1]} variables, {self.evaluations:,} evaluations{best_text}>"
 
 
+@checks_types
 def optimise(
     lower: ArrayLike,
     upper: ArrayLike,
@@ -185,7 +190,7 @@ def optimise(
     "partial", which draw all points, the size of the largest generation.
     seed: a whole number, or a generator of random numbers.
     initial: first points, (population, d); None draws uniform points.
-    Raises ValueError for invalid bounds or an invalid population.
+    Raises a `planfly.PlanflyError`, which is also a ValueError, for invalid bounds or another invalid argument.
 
     Minimum of a bowl at (1, 2); and, if a line separates it from the feasible side, a minimum of 0.5 at (0.5, 1.5):
 
@@ -213,25 +218,34 @@ def optimise(
     >>> round(search.minimise(length, evaluations=10_000).value, 2)
     1.08
     """
-    lower_bounds, upper_bounds = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
+    check_arguments(population=population, seed=None if isinstance(seed, np.random.Generator) else seed)
+    lower_bounds, upper_bounds = _parse_numbers("lower", lower), _parse_numbers("upper", upper)
     if lower_bounds.ndim != 1 or lower_bounds.shape != upper_bounds.shape or not lower_bounds.size:
-        raise ValueError(
-            f"lower, upper: shapes {lower_bounds.shape} and {upper_bounds.shape}: expected two of shape (d,)"
-        )
+        shapes = f"of shapes {lower_bounds.shape} and {upper_bounds.shape}"
+        raise ArgumentError.of_argument("lower, upper", lower, "expected two of shape (d,)", shown=shapes)
     if not (np.isfinite(lower_bounds) & np.isfinite(upper_bounds) & (lower_bounds < upper_bounds)).all():
-        raise ValueError("lower, upper: expected finite numbers, lower below upper")
-    if model not in _MODELS:
-        raise ValueError(f"model: {model!r}: allowed {', '.join(_MODELS)}")
-    if population < 4 or population % 2:
-        raise ValueError(f"population: {population}: expected an even number from 4")
-    first_points = None if initial is None else np.array(initial, dtype=np.float64)
-    if first_points is not None and (
-        first_points.shape != (population, lower_bounds.size) or not np.isfinite(first_points).all()
-    ):
-        raise ValueError(
-            f"initial: shape {first_points.shape}: expected finite numbers of shape ({population}, {lower_bounds.size})"
-        )
+        raise ArgumentError.of_argument("lower, upper", lower, "expected finite numbers, lower below upper", shown="")
+    if not isinstance(model, str) or model not in _MODELS:
+        raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
+    if population % 2:
+        raise ArgumentError.of_argument("population", population, RANGES["population"].expected)
+    first_points = None if initial is None else _parse_numbers("initial", initial)
+    expected_shape = (population, lower_bounds.size)
+    if first_points is not None and (first_points.shape != expected_shape or not np.isfinite(first_points).all()):
+        allowed = f"expected finite numbers of shape {expected_shape}"
+        raise ArgumentError.of_argument("initial", initial, allowed, shown=f"of shape {first_points.shape}")
     return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
+
+
+def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:
+    """Return numbers as an array.  Raises ArgumentError for anything else.
+
+    name: name of the argument, for messages.
+    """
+    try:
+        return np.array(numbers, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError.of_argument(name, type(numbers).__name__, "expected an array of numbers") from None
 
 
 def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
@@ -248,10 +262,11 @@ def _parse_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
 
     name: name of the argument, for messages.
 
-    Raises ValueError for another number of rows.
+    Raises ArgumentError for another number of rows.
     """
-    columns = np.array(numbers, dtype=np.float64)
+    columns = _parse_numbers(name, numbers)
     columns = columns[:, np.newaxis] if columns.ndim == 1 else columns
     if columns.ndim != 2 or len(columns) != row_count:
-        raise ValueError(f"{name}: shape {np.shape(numbers)}: expected {row_count} rows, one for each requested point")
+        allowed = f"expected {row_count} rows, one for each requested point"
+        raise ArgumentError.of_argument(name, numbers, allowed, shown=f"of shape {np.shape(numbers)}")
     return np.where(np.isnan(columns), np.inf, columns)

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Unpack
 
@@ -17,6 +17,7 @@ from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.planning.expected_failures import expected_failures
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
+from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_airframe
 from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
@@ -24,18 +25,16 @@ from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
 from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
+from world.argument_types import checks_types
 from world.arrays import Floats
 from world.compile_events import COMPILE_TIMER
-from world.errors import ArgumentError, ScenarioError
+from world.errors import ArgumentError
 from world.files import write_atomically
 from world.scenario import Scenario, embedded_scenarios, with_planner, with_threats
 from world.scenario_tables import MAP_EXTENT
 
 # ----------------------------------------------------------------------
 # Plan a path through a scenario.
-
-# East, north, kill radius and detection radius of a pop-up threat, m; a radius of 0 means no such zone.
-Threat = tuple[float, float, float, float]
 
 
 @with_warm_up(*PLANNING)
@@ -54,11 +53,12 @@ def plan(
     waypoints: a path of your own, (w, 3): east and north of the scenario's origin and altitude AMSL, m, from the
     scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.  Margins
     of the planner that it does not meet make the plan "not feasible" and are named by the verdict, which judges only
-    the flight.
+    the flight; `Plan.margins` has them as numbers, also for a path that leaves the terrain.
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 
-    seed: seed of the search; None takes the seed of the scenario, or 1.
+    seed: seed of the search; None takes the seed of the scenario, or 1.  The default algorithm seldom draws: most of
+    its plans are the same for every seed.
     algorithm: a name of ``planfly plan --help``; None for the default.
     budget: maximum number of evaluations.
     seconds: time limit, after which the best path found is returned.
@@ -115,9 +115,6 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
             if not abs(value) <= MAP_EXTENT:
                 allowed = f"allowed -{MAP_EXTENT:.0f}..{MAP_EXTENT:.0f} m"
                 raise ArgumentError.of_argument(f"waypoints row {row}: {column}", value, allowed)
-        if scenario.terrain is not None and math.isnan(scenario.terrain.height(point[0], point[1])):
-            place = f"row {row}: east {point[0]:g} m, north {point[1]:g} m"
-            raise ArgumentError.of_argument("waypoints", point, "outside the terrain data", shown=place)
     for row, name, end in ((0, "start", scenario.start), (len(path) - 1, "destination", scenario.destination)):
         if (distance := math.dist(path[row], end)) > _END_TOLERANCE_M:
             place = f"row {row}: {distance:.0f} m from the scenario's {name}"
@@ -133,7 +130,7 @@ def replan(
     old: Plan | str | Path,
     at_leg: int,
     *,
-    threats: Sequence[Threat] = (),
+    threats: GivenThreats = (),
     out: str | Path | None = None,
     overwrite: bool = True,
     **options: Unpack[PlanOptions],
@@ -143,7 +140,8 @@ def replan(
     scenario: see `planfly.plan`; threats that only the old plan has are kept.
     old: the plan that is being flown, or its file.
     at_leg: the leg that is about to be flown, from 0.
-    threats: east, north, kill radius and detection radius of each new threat, m; a radius of 0 means no such zone.
+    threats: new threats, as for `planfly.make_scenario`, such as an array (n, 4) of east, north, kill radius and
+    detection radius, m; a radius of 0 means no such zone.
     For the other keywords, see `planfly.plan`.
     Raises a `planfly.PlanflyError` for bad input, and for a plan of another mission.
 
@@ -167,17 +165,10 @@ def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
     return scenario if budget is None else with_planner(scenario, "budget", budget=budget)
 
 
-def _with_new_threats(scenario: Scenario, old_plan: Plan, threats: Sequence[Threat]) -> Scenario:
-    """Return a scenario with new threats, and with the threats that only the old plan has.
-
-    Raises ScenarioError for a new threat outside the terrain data.
-    """
-    for east, north, _, _ in threats:
-        if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
-            reason = f"east {east:g} m, north {north:g} m: outside the terrain data"
-            raise ScenarioError.of_argument("threats", (east, north), reason, shown="")
+def _with_new_threats(scenario: Scenario, old_plan: Plan, threats: GivenThreats) -> Scenario:
+    """Return a scenario with new threats, and with the threats that only the old plan has."""
     old_threats = [threat for threat in old_plan.scenario.spec.threats if threat not in scenario.spec.threats]
-    return with_threats(scenario, threats, "threats", old_threats)
+    return with_threats(scenario, threat_tables(threats), "threats", old_threats)
 
 
 def _search_and_write(
@@ -262,6 +253,7 @@ def failures_to_expect(plan: Plan) -> tuple[str, ...]:
     return expected_failures(plan, load_airframe(plan.scenario)) if plan.safe else ()
 
 
+@checks_types
 def what_blocks(plan: Plan) -> tuple[str, ...]:
     """Return the reasons why a plan is not feasible, one line each; empty for a feasible plan.
 

@@ -108,7 +108,7 @@ def replay(
     >>> [round(time, 1) for time, lines in planfly.replay(example_log(), start=20.0, end=20.1, speed=10.0)][-1]
     20.1
     """
-    check_arguments(speed=speed)
+    check_arguments(speed=speed, width=None if callable(width) else width)
     flight_log = _read_log_if_path(log)
     start_time, end_time = replay_interval(flight_log, start, end)
     return _play_frames(instruments(flight_log), start_time, end_time, speed or 1.0, width)

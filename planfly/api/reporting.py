@@ -69,8 +69,8 @@ def figures(source: Source) -> "dict[str, Figure]":
 
     source: a flight log or its path, a result of `planfly.fly`, or a `Plan`.
     A notebook shows each figure as a picture.
-    The names are "map", "profile", "scene", "turns", "envelope", and for a flight also "time", "exposure", "controls"
-    and "energy".
+    The names are "map", "profile", "scene", "turns", "envelope", for a flight also "time", "exposure", "controls" and
+    "energy", and for a scenario with a radio link "link-map" and "link".
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly

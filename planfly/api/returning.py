@@ -35,7 +35,12 @@ from planfly.flight_options import LogOptions, select_log_options, select_missio
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.rtl.return_summary import return_starts
-from planfly.rtl.sitl_returns import ProgramReturns, check_is_arduplane, fly_by_program
+from planfly.rtl.sitl_returns import (
+    ProgramReturns,
+    check_is_arduplane,
+    check_returns_as_arduplane,
+    fly_by_program,
+)
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import airframe_for_setup
@@ -56,7 +61,7 @@ if TYPE_CHECKING:
 class RemedyTrial:
     """A remedy, and the outcome of the returns after the remedy.
 
-    The returns are flown by the simulated ArduPlane, those closest to a limit also in JSBSim.
+    The returns are flown by the simulated autopilot, those closest to a limit also in JSBSim.
     """
 
     remedy: Remedy
@@ -139,7 +144,7 @@ class ReturnsResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        notes = ["by the simulated ArduPlane flying a point-mass model, in the mean wind"]
+        notes = [f"by the simulated {self.returns.autopilot} flying a point-mass model, in the mean wind"]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             reflown_text = count_text(len(self.returns.jsbsim_differences), "return")
@@ -276,7 +281,9 @@ def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest)
 
 def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResult:
     """Fly a mission, and judge the returns of its flight."""
-    make_return_world(setup)  # Raises errors before the flight.
+    world = make_return_world(setup)  # Raises errors before the flight.
+    if request.program is not None:
+        check_returns_as_arduplane(world, request.program)
     with stage("flying the mission"):
         flight = fly_and_judge(setup, airframe_for_setup(setup), None, reference="never")
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
@@ -285,6 +292,8 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
     """Simulate and judge returns from points of a flight, with glides and requested remedies and files."""
     world = make_return_world(setup)
+    if request.program is not None:
+        check_returns_as_arduplane(world, request.program)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {count_text(len(starts), 'return')}", "flying returns"):
         judged_returns = judge_returns(world, starts, request.every, fly_return)
@@ -342,7 +351,7 @@ def _draw_files(setup: FlightSetup, track: Track, returns: DrawnReturns) -> dict
     from logs.views.figures import draw_pictures, return_views
 
     tracks = [track_line(setup, track)] if len(track) else []
-    lines = [plan_line(setup), *tracks, *return_lines(setup, returns)]
+    lines = [plan_line(setup), *tracks, *return_lines(setup, returns, track if tracks else None)]
     zones = [*map_zones(setup), *glide_shapes(setup, returns)]
     text = kml_text(f"{setup.scenario.name} returns", lines, zones)
     pictures = draw_pictures(return_views(setup, returns, track if tracks else None))

@@ -9,6 +9,7 @@ from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.process_setup import end_repeated_call
 from world.errors import FlightError, PlanflyError
 from world.extras import requires_extra
 
@@ -54,12 +55,13 @@ def serve(
     A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
+    end_repeated_call()
     # Imported here: only this function needs MAVLink.
     from planfly.live.served_flights import ServeOptions, load_served_scenario
     from planfly.live.served_vehicle import serve_vehicle
 
     access = link_access(to, bind, allow, sign_key)
-    check_arguments(served_speed=speed)
+    check_arguments(served_speed=speed, seed=options["seed"])
     serve_options = ServeOptions("" if mission is None else str(mission), speed, Path(log), options)
     flights = load_served_scenario(serve_options)
     if serve_options.logs.exists() and not serve_options.logs.is_dir():

@@ -20,6 +20,7 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FlownMission, check_keywords_not_given
@@ -62,6 +63,7 @@ class SurveyResult:
     remedies: remedies that help, each tested by a flight; empty if none were requested or no line is lost.
     nearest: the trial that came closest to success, if remedies were requested and none helps.
     kept: reason why the layout was kept and no other layout was tried, for messages.
+    circles: text on circles that the autopilot flew at waypoints of the surveys because of their altitudes; "" without.
     files: files written; empty if no folder was named.
     """
 
@@ -74,6 +76,7 @@ class SurveyResult:
     remedies: tuple[SurveyRemedy, ...] = ()
     nearest: NearMiss | None = None
     kept: str = ""
+    circles: str = ""
     files: tuple[Path, ...] = ()
 
     @property
@@ -95,7 +98,7 @@ class SurveyResult:
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
             texts += [survey_text(survey), *overlap_lines(overlap)]
             texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
-        return tuple(texts)
+        return (*texts, self.circles) if self.circles else tuple(texts)
 
     @property
     def remedy_lines(self) -> tuple[str, ...]:
@@ -106,8 +109,8 @@ class SurveyResult:
     def no_remedy_lines(self) -> tuple[str, ...]:
         """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
         texts = [
-            "nothing was found that would help: no turn-around, order, course, parameter or airspeed alone, and no"
-            " longer turn-arounds combined with a parameter or a lower airspeed"
+            "nothing was found that would help: no turn-around, gates, order, course, parameter or airspeed alone, and"
+            " no longer turn-arounds combined with a parameter or a lower airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
@@ -140,9 +143,9 @@ def survey(
     what: the path of a .waypoints or .plan, which is flown; or a result of `planfly.fly`, or a flight log or its path.
     camera: sensor size across and along the track, and focal length, mm; optionally also the required overlaps along
     and across lines, percent; None takes the values of a .plan.
-    suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, an
-    interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight; each is tested
-    by a flight before it is suggested.
+    suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, gates
+    (for PX4), an interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight;
+    each is tested by a flight before it is suggested.
     out: folder for a picture of the lines, and for the remedies as a .plan (for a .plan) or a .waypoints, and a .param;
     None writes no files.
     overwrite: True replaces results in the folder.
@@ -307,5 +310,9 @@ def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verd
         tuple(None if aligned is None else measure_line(requirements, aligned, survey, line) for line in survey.lines)
         for survey in surveys
     )
+    circles = [] if aligned is None else waypoint_circles(requirements, aligned)
+    survey_circles = [circle for circle in circles if any(survey.has_leg(circle.waypoint - 1) for survey in surveys)]
     overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, survey) for survey in surveys)
-    return SurveyResult(setup, track, verdict, surveys, lines, overlaps)
+    return SurveyResult(
+        setup, track, verdict, surveys, lines, overlaps, circles=circles_text(requirements, survey_circles)
+    )

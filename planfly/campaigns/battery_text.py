@@ -2,9 +2,12 @@
 
 import math
 
+import numpy as np
+
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.wording import place_text
 from planfly.campaigns.find_battery import MIN_MASS_FACTOR, BatteryResult
+from planfly.rtl.return_summary import return_law_lines
 
 # Number of parts that decide the battery, and of legs, in the lines.
 _MAX_LISTED = 3
@@ -13,7 +16,8 @@ _MAX_LISTED = 3
 def answer_line(result: BatteryResult) -> str:
     """Return the smallest battery in one line."""
     goal = result.goal
-    keeps_text = f"{goal.reserve:.0%} in the mission and in every return with probability {goal.probability:g}"
+    where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
+    keeps_text = f"{goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
     if math.isinf(result.capacity):
         return (
             f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg its own mass needs too much of the"
@@ -44,18 +48,23 @@ def battery_lines(result: BatteryResult) -> list[str]:
     """Return the lines below the answer: the aircraft's battery, what decides, and how it was found."""
     if not result.completed:
         return []
+
+    def leg_name(number: int) -> str:
+        """Return the name of the legs with a number."""
+        return place_text(requirements.leg(int(np.searchsorted(requirements.setup.route.leg_numbers, number))))
+
     lines = [_own_battery_line(result), *_mass_lines(result)]
     requirements, total = route_requirements(result.base.nominal_setup()), len(result.completed)
     for decision in result.decisions[:_MAX_LISTED]:
         part = "the end of the mission"
         if decision.leg >= 0:
-            leg_text = place_text(requirements.leg(decision.leg))
+            leg_text = leg_name(decision.leg)
             part = f"the return that starts at {decision.time:.0f} s ({leg_text})"
         lines.append(f"decided by {part}: in {decision.flights} of {total} flights")
     energies = result.leg_energies
     if float(energies.sum()) > 0.0:
         largest = sorted(range(len(energies)), key=lambda leg: -float(energies[leg]))[:_MAX_LISTED]
-        parts = [f"{energies[leg]:.1f} Wh ({place_text(requirements.leg(leg))})" for leg in largest]
+        parts = [f"{energies[leg]:.1f} Wh ({leg_name(leg)})" for leg in largest]
         lines.append(f"the mission uses {float(energies.sum()):.1f} Wh (median); most of it: {', '.join(parts)}")
     lost = sum(row.lost_returns > 0 for row in result.completed)
     if result.base.mission.home is None:
@@ -69,14 +78,15 @@ def battery_lines(result: BatteryResult) -> list[str]:
         f"{len(result.rows)} flights, {len(result.rows) - total} of them without completing the mission;"
         f" a return every {result.goal.interval:g} s, up to its loiter: the reserve has to cover loiter and landing"
     )
-    return lines
+    return [*lines, *return_law_lines(result.base.nominal_setup())]
 
 
 def _own_battery_line(result: BatteryResult) -> str:
     """Compare the aircraft's own battery with the smallest battery."""
     if result.is_guessed:
         return "the aircraft does not state its battery, so it is not compared: state battery_wh in the scenario"
-    verdict = {True: "is enough", False: "is too small", None: "may be enough, more flights would show it"}
+    unknown_text = "may be enough, more flights would show it" if result.has_returns else "may not cover the returns"
+    verdict = {True: "is enough", False: "is too small", None: unknown_text}
     low, high = result.own_probability
     return (
         f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve in"

@@ -5,7 +5,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -114,17 +114,17 @@ class CampaignBase:
         return hashlib.sha256(json.dumps(self.inputs(), sort_keys=True).encode()).hexdigest()[:16]
 
 
-def is_mission_file(target: str) -> bool:
+def is_mission_file(target: Scenario | str) -> TypeGuard[str]:
     """Return True if a target is named like a plan or mission file, not like a scenario.
 
     >>> is_mission_file("a/plan.json"), is_mission_file("jacksboro"), is_mission_file("valley.toml")
     (True, False, False)
     """
-    return Path(target).suffix.lower() in (".json", ".waypoints", ".plan")
+    return isinstance(target, str) and Path(target).suffix.lower() in (".json", ".waypoints", ".plan")
 
 
 def open_campaign(
-    target: Plan | str,
+    target: Plan | Scenario | str,
     dispersions: Dispersions,
     options: MissionOptions,
     *,
@@ -133,7 +133,7 @@ def open_campaign(
 ) -> CampaignBase:
     """Open the base of a campaign for a plan, a mission file, or a scenario, for which a path is planned.
 
-    target: a built-in scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
+    target: a built-in scenario's name, a scenario's TOML file, a scenario, a plan, or a plan.json, .waypoints or .plan.
     options: options of the flights; the plan avoids their zones, and their seed is used for the plan and the draws.
     plan_file: file of a scenario's plan, which is read if it exists, and written otherwise.
     Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions with medians at which the
@@ -150,7 +150,8 @@ def open_campaign(
         plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
         if has_plan_file and plan.scenario.to_json() != scenario.to_json():
             differences = describe_differences(*(flatten_inputs(one.to_json()) for one in (plan.scenario, scenario)))
-            message = f"{plan_file}: this plan was made for another scenario, not {target}: {differences}"
+            name = target if isinstance(target, str) else scenario.name
+            message = f"{plan_file}: this plan was made for another scenario, not {name}: {differences}"
             raise MissionError(message, file=str(plan_file))
         if plan_file is not None and not has_plan_file:
             write_atomically(plan_file, plan_json(plan))

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from logs.verdict.places import Place
+from logs.verdict.places import Place, numbered_place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
 
@@ -34,11 +34,13 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
     """
     counts: Counter[str] = Counter()
     places: dict[str, Counter[Place]] = {}
+    # Flights fail at different corners of a loiter, which is one place; the first of them stands for it.
+    first_places: dict[Place, Place] = {}
     for flight in flights:
         failed_findings = list(flight)
         counts.update({rule for rule, _ in failed_findings})
         for rule, place in failed_findings:
-            places.setdefault(rule, Counter())[place] += 1
+            places.setdefault(rule, Counter())[first_places.setdefault(numbered_place(place), place)] += 1
     rules = sorted(counts, key=lambda rule: (-RULE_WORDS[rule].urgency, list(RULE_WORDS).index(rule)))
     return tuple(RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in rules)
 

@@ -74,8 +74,8 @@ class EnergyRow(FlightRow):
     mission_energy: energy used at the end of the mission, Wh.
     return_energy: highest energy used at the end of a return, Wh; NaN if no return's energy is known.
     return_time: start of this return, s.
-    return_leg: leg on which this return starts, from 0.
-    leg_energies: energy used on each leg, Wh.
+    return_leg: number of the leg on which this return starts, as in messages.
+    leg_energies: energy used on each leg by its number, Wh: all legs around a loiter are one.
     battery_factor: drawn factor on the battery's capacity.
     lost_returns: number of returns that do not arrive, whose energy is unknown.
     """
@@ -125,7 +125,9 @@ def fly_for_energy(
         row,
         mission_energy=float(energy.max()),
         duration=float(track.time[-1]),
-        leg_energies=tuple(np.bincount(track.leg[1:], weights=np.diff(energy)).tolist()),
+        leg_energies=tuple(
+            np.bincount(varied.setup.route.leg_numbers_of(track.leg[1:]), weights=np.diff(energy)).tolist()
+        ),
     )
     return _with_returns(row, varied, track, interval)
 
@@ -148,7 +150,8 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     if not arriving:
         return row
     worst = max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
-    leg = int(track.leg[min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))])
+    worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))
+    leg = int(varied.setup.route.leg_numbers_of(track.leg[worst_row : worst_row + 1])[0])
     needed = worst.energy_used + ratio * worst.energy
     return replace(row, return_energy=needed, return_time=worst.time, return_leg=leg)
 
@@ -164,7 +167,7 @@ class BatteryDecision(NamedTuple):
     """Part of the flight that needs the most energy, and the number of flights in which it does.
 
     flights: number of flights.
-    leg: leg on which the deciding return starts, from 0; -1 for the end of the mission.
+    leg: number of the leg on which the deciding return starts, as in messages; -1 for the end of the mission.
     time: median start of these returns, s; NaN for the end of the mission.
     """
 
@@ -187,6 +190,7 @@ class BatteryResult:
     mass_factor: mass of the aircraft with the found battery, relative to its stated mass.
     mass: stated mass, kg.
     volts: nominal voltage of the battery, V; 0 if unknown.
+    has_returns: False if the autopilot's returns are not simulated, so that the battery covers only the mission.
     """
 
     goal: BatteryGoal
@@ -200,6 +204,7 @@ class BatteryResult:
     mass_factor: float
     mass: float
     volts: float
+    has_returns: bool = True
 
     def __repr__(self) -> str:
         return f"<BatteryResult {self.base.name}: {self.capacity:.0f} Wh>"
@@ -221,7 +226,7 @@ class BatteryResult:
     @property
     def is_enough(self) -> bool | None:
         """True if the aircraft's own battery keeps the reserve with the probability; None if it is not known."""
-        if self.is_guessed or math.isnan(self.capacity):
+        if self.is_guessed or math.isnan(self.capacity) or not self.has_returns:
             return None
         if self.own_probability.low >= self.goal.probability:
             return True
@@ -273,7 +278,8 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
             capacity, interval = quantile_of_capacities(rows, goal)
             if not math.isfinite(capacity) or abs(capacity - assumed) <= _CAPACITY_TOLERANCE * assumed:
                 break
-    envelope = base.nominal_setup().envelope
+    setup = base.nominal_setup()
+    envelope = setup.envelope
     return BatteryResult(
         goal=goal,
         base=base,
@@ -286,6 +292,7 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
         mass_factor=mass_factor,
         mass=aircraft.mass,
         volts=envelope.volts or 0.0,
+        has_returns=setup.mission.home is None or make_return_world(setup).is_simulated,
     )
 
 

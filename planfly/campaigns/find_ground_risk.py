@@ -19,14 +19,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT
+from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.returns.glide_map import glide_slopes
 from logs.verdict.returns.judge_glides import fly_without_engine
-from logs.verdict.returns.judge_returns import make_return_world, simulate_returns
+from logs.verdict.returns.judge_returns import make_return_world, simulate_returns, without_engine_world
 from logs.verdict.returns.return_starts import flown_starts
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import draw_flight
@@ -195,11 +194,13 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
         return none
     targets = [world.target(row) for row in starts.rows]
     _, paths = simulate_returns(world, starts, targets, store_paths=True)
-    radius = abs(ArduPlane(world.parameters).returns.rules.radius)
+    radius = abs(world.autopilot.returns.rules.radius)
     positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
-        gliding = fly_without_engine(world, starts, targets, store_paths=True)
+        gliding_world = without_engine_world(world)
+        gliding_targets = [gliding_world.target(row) for row in starts.rows]
+        gliding = fly_without_engine(gliding_world, starts, gliding_targets, store_paths=True)
         glides = [
             one
             for one, result in zip(gliding.tracks, gliding.results, strict=True)
@@ -422,7 +423,7 @@ def _best_glide_ratio(base: CampaignBase) -> float:
 
     Raises FlightError for a model without trims with the throttle closed.
     """
-    from flight.autopilots.arduplane.point_mass import make_point_mass
+    from flight.autopilots.point_mass import make_point_mass
 
     aircraft, setup = base.airframe.aircraft, base.nominal_setup()
     model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())

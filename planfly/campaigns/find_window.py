@@ -18,8 +18,7 @@ from planfly.campaigns.worker_pool import Workers, worker_pool
 from planfly.runtime.stages import Advance
 from planfly.workflow.open_flight import planned_duration
 from world.errors import ForecastError
-from world.forecast.scenario_wind import forecast_wind
-from world.scenario import Scenario, forecast_of_scenario, with_flight_time
+from world.scenario import Scenario, forecast_of_scenario, in_forecast_member, with_flight_time
 
 # Largest number of departures in one search.
 MAX_DEPARTURES = 400
@@ -99,8 +98,8 @@ class Departure:
         """
         if not self.scenarios:
             return math.nan, math.nan
-        winds = [scenario.wind for scenario in self.scenarios]
-        east, north = np.mean([wind.velocity_at(wind.reference_amsl) for wind in winds], axis=0)
+        winds = [scenario.wind_velocity(scenario.start.tolist()) for scenario in self.scenarios]
+        east, north = np.mean(winds, axis=0)
         return math.hypot(east, north), math.degrees(math.atan2(-east, -north)) % 360.0
 
 
@@ -240,12 +239,7 @@ def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
     forecast = forecast_of_scenario(scenario)
     if forecast.members == 1:
         return (scenario,)
-    ends = (scenario.start, scenario.destination)
-    found = []
-    for member in range(forecast.members):
-        wind, table = forecast_wind(scenario.spec.wind, forecast, str(scenario.spec.at), scenario.origin, ends, member)
-        found.append(replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind))
-    return tuple(found)
+    return tuple(in_forecast_member(scenario, forecast, member) for member in range(forecast.members))
 
 
 def last_departure(base: CampaignBase, first: datetime) -> datetime:

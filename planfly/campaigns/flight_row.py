@@ -203,6 +203,8 @@ class FlightRow:
     ended: "completed", or the reason why the flight ended early.
     failed: rule and place of each failed finding, in the verdict's order.
     margins: minimum margin of each judged rule whose margin has a scale.
+    missile_distance: smallest distance outside a missile's sphere, m, negative inside; None if nothing was flown or
+    there are no missiles.
     energy_left: remaining energy, Wh; None if nothing was flown.
     duration: duration of the flight, s.
     made_of: hash of all inputs of the flight; "" outside a table.
@@ -218,6 +220,7 @@ class FlightRow:
     ended: Annotated[str, _TEXT]
     failed: Annotated[tuple[tuple[str, Place], ...], _FAILED_FINDINGS] = ()
     margins: tuple[tuple[str, MinimumMargin], ...] = ()
+    missile_distance: Annotated[float | None, Column("REAL")] = None
     energy_left: Annotated[float | None, Column("REAL")] = None
     duration: Annotated[float, _REAL] = 0.0
     made_of: Annotated[str, _TEXT] = field(default="", compare=False)
@@ -280,6 +283,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         ended=flight.ended,
         failed=list_failed_findings(flight.verdict),
         margins=find_minimum_margins(flight.verdict.findings),
+        missile_distance=_missile_distance(flight.verdict.findings),
         energy_left=varied_flight.setup.battery - float(track.energy[-1]) if has_rows else None,
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
@@ -321,6 +325,12 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
         for finding in closest_findings
         if finding and finding.margin is not None
     )
+
+
+def _missile_distance(findings: Iterable[Finding]) -> float | None:
+    """Return the smallest distance of a flight outside a missile's sphere, m; None if no finding states one."""
+    distances = (finding.nearest for finding in findings if finding.rule == "threat" and finding.nearest is not None)
+    return min(distances, default=None)
 
 
 def make_lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:

@@ -1,8 +1,10 @@
 """Describe the ground risk of a mission in lines, and in a table for an application."""
 
 from logs.verdict.conditions import flown_lines
+from logs.verdict.returns.judge_returns import make_return_world, returning_title, without_engine_world
 from planfly.campaigns.find_ground_risk import GroundRiskResult
 from planfly.campaigns.sora import IGRC_COLUMNS
+from planfly.rtl.return_summary import return_law_lines
 from world.population import DENSITY_LIMITS_PER_KM2, Population, density_band
 from world.wording import count_text
 
@@ -107,11 +109,18 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
             f" {result.speed:g} m/s in the formulas (--max-speed)"
         )
     spread = result.base.dispersions.name
+    setup = result.base.nominal_setup()
     lines.append(
         f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}; returns to launch by"
-        f" ArduPlane's law every {result.goal.interval:g} s"
+        f" {returning_title(setup)}'s law every {result.goal.interval:g} s"
     )
-    return lines
+    if result.goal.glide and setup.mission.home is not None:
+        world = make_return_world(setup)
+        if without_engine_world(world) is not world:
+            lines.append(
+                f"glides without the engine by ArduPlane's law, because {world.autopilot.title}'s is not simulated"
+            )
+    return [*lines, *return_law_lines(setup)[1:]]
 
 
 def table_text(result: GroundRiskResult) -> str:

@@ -20,6 +20,7 @@ from planfly.campaigns.flight_requests import (
     fingerprint,
 )
 from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
+from planfly.runtime.process_setup import check_script_guard
 from world.errors import PlanflyError
 from world.interruption import children_ignore_sigint, delay_signals, end_children, end_with_parent
 
@@ -152,12 +153,13 @@ class LocalPool:
     def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
         """Return the row of a flight, or None if its process has died.
 
-        Raises the PlanflyError of a flight, RuntimeError for any other error of a flight, and OSError if processes
-        repeatedly end at their start.
+        Raises the PlanflyError of a flight, or of `check_script_guard`, RuntimeError for any other error of a flight,
+        and OSError if processes repeatedly end at their start.
         """
         try:
             row = future.result()
         except BrokenProcessPool:
+            check_script_guard(worker.processes)
             self._failed_starts = 0 if worker.has_started else self._failed_starts + 1
             if self._failed_starts == MAX_FAILED_STARTS:
                 workers = f"{len(self._workers)} workers"

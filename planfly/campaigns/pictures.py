@@ -4,6 +4,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -396,6 +397,7 @@ class ChartDirection:
     low, high: interval of the boundary, m/s.
     is_beyond_search: True if the boundary is beyond the maximum wind of the search.
     flights: wind speed, number of flights and number of flyable flights, for the marks.
+    is_judged: True if there are enough flights to judge the direction.
     """
 
     from_deg: float
@@ -404,6 +406,7 @@ class ChartDirection:
     high: float
     is_beyond_search: bool
     flights: tuple[tuple[float, int, int], ...]
+    is_judged: bool = True
 
 
 def draw_go_no_go(
@@ -423,20 +426,7 @@ def draw_go_no_go(
         axes = figure.add_axes((0.06, 0.07, 0.64, 0.80), projection="polar")
         axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
         axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
-        angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
-        circle = [*directions, directions[0]]
-        fine_angles = np.linspace(angle[0], angle[-1], 720)
-
-        def interpolate(values: Sequence[float]) -> np.ndarray:
-            return np.interp(fine_angles, angle, values)
-
-        lower, upper = interpolate([point.low for point in circle]), interpolate([point.high for point in circle])
-        boundary = interpolate([point.boundary for point in circle])
-        axes.fill_between(fine_angles, 0.0, lower, color=PLANNED, alpha=0.45, linewidth=0.0)
-        axes.fill_between(fine_angles, boundary, max_speed, color=FAIL, alpha=0.13, linewidth=0.0)
-        axes.fill_between(fine_angles, lower, upper, color=INTERVAL_COLOUR, alpha=0.45, linewidth=0.0)
-        # The largest wind of the search is not a limit of the mission.
-        axes.plot(fine_angles, np.where(boundary < max_speed - 1e-6, boundary, np.nan), color=INK_COLOUR, linewidth=1.8)
+        _draw_wind_areas(axes, directions, max_speed)
         for direction in directions:
             if direction.is_beyond_search:
                 marker = (3, 0, -direction.from_deg)
@@ -476,12 +466,44 @@ def draw_go_no_go(
             color=QUIET_COLOUR,
         )
         open_edge = max_speed if any(direction.is_beyond_search for direction in directions) else None
-        _draw_legend(figure, target, confidence, wind, open_edge)
+        _draw_legend(figure, directions, target, confidence, wind, open_edge)
     return figure
 
 
+def _draw_wind_areas(axes: Any, directions: Sequence[ChartDirection], max_speed: float) -> None:
+    """Draw the areas of winds in which a mission is and is not flyable, and the boundary between them.
+
+    Next to a direction that is not judged nothing is known.
+    """
+    angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
+    circle = [*directions, directions[0]]
+    fine_angles = np.linspace(angle[0], angle[-1], 720)
+
+    def interpolate(values: Sequence[float]) -> np.ndarray:
+        return np.interp(fine_angles, angle, values)
+
+    lower, upper = interpolate([point.low for point in circle]), interpolate([point.high for point in circle])
+    boundary = interpolate([point.boundary for point in circle])
+    is_known = interpolate([float(point.is_judged) for point in circle]) > 1.0 - 1e-9
+    for start, end, mask, colour, alpha in (
+        (0.0, lower, is_known, PLANNED, 0.45),
+        (boundary, max_speed, is_known, FAIL, 0.13),
+        (lower, upper, is_known, INTERVAL_COLOUR, 0.45),
+        (0.0, max_speed, ~is_known, GRID_COLOUR, 0.5),
+    ):
+        axes.fill_between(fine_angles, start, end, where=mask, color=colour, alpha=alpha, linewidth=0.0)
+    # The largest wind of the search is not a limit of the mission.
+    is_drawn = is_known & (boundary < max_speed - 1e-6)
+    axes.plot(fine_angles, np.where(is_drawn, boundary, np.nan), color=INK_COLOUR, linewidth=1.8)
+
+
 def _draw_legend(
-    figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, open_edge: float | None
+    figure: Figure,
+    directions: Sequence[ChartDirection],
+    target: float,
+    confidence: float,
+    wind: tuple[float, float] | None,
+    open_edge: float | None,
 ) -> None:
     """Draw the legend of the chart of winds.
 
@@ -490,11 +512,17 @@ def _draw_legend(
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles_and_labels: list[tuple[Artist, str]] = [
-        (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
-        (Line2D([], [], color=INK_COLOUR, linewidth=1.8), f"boundary, P = {target:g}"),
-        (Patch(color=INTERVAL_COLOUR, alpha=0.45), f"interval of the\nboundary, {100 * confidence:g} %"),
-        (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
+    handles_and_labels: list[tuple[Artist, str]] = []
+    if any(direction.is_judged for direction in directions):
+        handles_and_labels += [
+            (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
+            (Line2D([], [], color=INK_COLOUR, linewidth=1.8), f"boundary, P = {target:g}"),
+            (Patch(color=INTERVAL_COLOUR, alpha=0.45), f"interval of the\nboundary, {100 * confidence:g} %"),
+            (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
+        ]
+    if not all(direction.is_judged for direction in directions):
+        handles_and_labels.append((Patch(color=GRID_COLOUR, alpha=0.5), "not judged"))
+    handles_and_labels += [
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not flyable"),
     ]

@@ -212,6 +212,8 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
 # ----------------------------------------------------------------------
 # Open and clear a campaign's folder, and write its summary, report and logs of the worst flights.
 
+# Scenario of a campaign that was not given as a file.
+SCENARIO_FILE = "scenario.toml"
 # Files that a campaign or a search for winds writes into its folder, and removes when it is replaced.
 CAMPAIGN_FILES = (
     *(f"{table}{ending}" for table in (CAMPAIGN_DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
@@ -221,6 +223,7 @@ CAMPAIGN_FILES = (
     "winds.png",
     "winds.html",
     "plan.json",
+    SCENARIO_FILE,
 )
 
 
@@ -373,7 +376,7 @@ _ANSWER_STYLES: dict[WindsAnswer, str] = {
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
     """Return the boundary, its interval and the flights of each wind direction, for the go/no-go chart."""
-    directions = []
+    directions, reasons = [], unsettled_reasons(winds)
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
         for direction, speed, flyable in winds.flights:
@@ -382,7 +385,13 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
         marks = tuple((speed, len(outcomes), sum(outcomes)) for speed, outcomes in sorted(counts.items()))
         directions.append(
             ChartDirection(
-                winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.is_beyond_search, marks
+                winds.from_deg(number),
+                boundary.estimate,
+                boundary.low,
+                boundary.high,
+                boundary.is_beyond_search,
+                marks,
+                is_judged=not reasons[number],
             )
         )
     return directions

@@ -3,8 +3,9 @@
 import itertools
 import math
 from datetime import datetime
+from typing import Any
 
-import matplotlib.dates as mdates
+from matplotlib import dates
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -13,6 +14,8 @@ from logs.verdict.rule_words import RULE_WORDS
 from logs.views.drawing import clean_style, new_figure
 from planfly.campaigns.find_window import WindowResult
 
+# matplotlib.dates, which has no types.
+_DATES: Any = dates
 _OPEN_COLOUR = theme.colour("good")
 _CLOSED_COLOUR = theme.colour("bad")
 _UNKNOWN_COLOUR = theme.colour("quiet")
@@ -31,7 +34,7 @@ def draw_window(result: WindowResult) -> Figure:
         wind = figure.add_axes((0.08, 0.30, 0.89, 0.17), sharex=probability)
         energy = figure.add_axes((0.08, 0.09, 0.89, 0.15), sharex=probability)
         departures = result.departures
-        times = [_number(departure.time) for departure in departures]
+        times = [_number_of(departure.time) for departure in departures]
         width = 0.8 * min((after - before for before, after in itertools.pairwise(times)), default=1.0 / 24.0)
         _draw_probability(probability, result, times, width)
         wind.plot(times, [departure.wind[0] for departure in departures], color=_WIND_COLOUR, marker="o", markersize=3)
@@ -62,16 +65,15 @@ def draw_window(result: WindowResult) -> Figure:
             for spine in ("top", "right"):
                 axes.spines[spine].set_visible(False)
             axes.tick_params(labelbottom=axes is energy)
-        locator = mdates.AutoDateLocator(minticks=3, maxticks=12)  # type: ignore[no-untyped-call]  # matplotlib has none
+        locator = _DATES.AutoDateLocator(minticks=3, maxticks=12)
         energy.xaxis.set_major_locator(locator)
-        formatter = mdates.ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]  # nor here
-        energy.xaxis.set_major_formatter(formatter)
+        energy.xaxis.set_major_formatter(_DATES.ConciseDateFormatter(locator))
     return figure
 
 
-def _number(time: datetime) -> float:
-    """Return a time as matplotlib's number of days."""
-    return float(mdates.date2num(time))  # type: ignore[no-untyped-call]  # nor here
+def _number_of(time: datetime) -> float:
+    """Return a time as matplotlib's number of days since 1970."""
+    return time.timestamp() / 86_400.0
 
 
 def _draw_probability(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
@@ -91,15 +93,18 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
         axes.plot([time, time], [low, high], color=_INK_COLOUR, linewidth=1.0)
         if departure.rule and len(times) <= _MAX_LABELS:
             title = RULE_WORDS[departure.rule].title.lower()
-            axes.text(time, 1.06, title, rotation=45, ha="left", va="bottom", color=_INK_COLOUR, fontsize=7)
+            axes.text(time, 0.03, f"{title}  ", rotation=90, ha="right", va="bottom", color=_INK_COLOUR, fontsize=7.5)
     axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
     if result.goal.asked is not None:
-        axes.axvline(_number(result.goal.asked), color=_WIND_COLOUR, linewidth=1.4)
-    axes.set_ylim(0.0, 1.05)
+        place = (_number_of(result.goal.asked), 1.03)
+        axes.annotate("asked", place, color=_WIND_COLOUR, ha="center", va="bottom", fontsize=8, fontweight="bold")
+    axes.set_ylim(0.0, 1.15)
+    axes.set_yticks([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     axes.set_ylabel("flyable flights")
     axes.set_title(
         f"{result.base.name}: {result.goal.flights} flights at each take-off, green with at least"
-        f" {result.goal.probability:.0%} flyable\n(thin line: 95 % interval; text: the rule that fails most)",
+        f" {result.goal.probability:.0%} flyable\n"
+        "(thin line: 95 % interval; text at a bar: the rule that fails most flights)",
         fontsize=9.5,
-        pad=46 if any(departure.rule for departure in result.departures) else 8,
+        pad=8,
     )

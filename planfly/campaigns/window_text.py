@@ -53,7 +53,7 @@ def _departure_line(departure: Departure) -> str:
     if not departure.rows:
         return f"{start}  not judged: {departure.not_judged}"
     speed, from_deg = departure.wind
-    energy = "not known" if math.isnan(departure.energy_left) else f"{departure.energy_left:.0f} Wh left"
+    energy = "not known" if math.isnan(departure.energy_left) else f"{max(0.0, departure.energy_left):.0f} Wh left"
     low, high = departure.interval
     rule = RULE_WORDS[departure.rule].title.lower() if departure.rule else ""
     count = f"{departure.flyable}/{len(departure.rows)}"

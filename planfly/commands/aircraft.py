@@ -120,7 +120,9 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
     group.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
     group.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
     group.add_argument(
-        "--params", metavar="FILE", help="an ArduPlane parameter file, from which facts about the aircraft are taken"
+        "--params",
+        metavar="FILE",
+        help="a parameter file of ArduPlane or PX4, from which facts about the aircraft are taken",
     )
 
 
@@ -184,12 +186,25 @@ def _make_folder(args: argparse.Namespace) -> int:
     print(f"aircraft  {folder_text}/ ({', '.join(files)}), {origin_text}")
     if has_sheet:
         _print_data_sheet_performance(new_aircraft)
+    if args.params is not None:
+        _print_parameters(args)
     write_json_if_requested(args, lambda: _json_answer([new_aircraft]))
     print(
         f"next      `planfly aircraft {shlex.quote(str(folder_text))}` shows it; `planfly fly MISSION --aircraft"
         f" {shlex.quote(str(folder_text))}` flies it"
     )
     return FLYABLE
+
+
+def _print_parameters(args: argparse.Namespace) -> None:
+    """Print the values of a parameter file that were used, and those that the data sheet overrides."""
+    from planfly.workflow.data_sheets import overridden_texts, stated_parameters
+
+    stated = stated_parameters(Path(args.params))
+    values_text = ", ".join(stated.texts.values()) or "no value differs from its default"
+    print(f"  params   {args.params}: {values_text}")
+    if overridden := overridden_texts(vars(args), stated):
+        print(f"  params   the data sheet applies instead of {', '.join(overridden)}")
 
 
 def _identify(args: argparse.Namespace) -> int:
@@ -284,8 +299,8 @@ def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
     climb, descent = (math.degrees(angle) for angle in envelope.air_angles(aircraft.airspeed, 500.0))
     uncertainty = read_uncertainty(aircraft.folder)
     print(
-        f"  speed    cruise {aircraft.airspeed:g} m/s, stall {aircraft.stall_speed:g},"
-        f" up to {aircraft.airspeed_max:g} m/s"
+        f"  speed    cruise {aircraft.airspeed:g} m/s, stall {aircraft.stall_speed:g}, fastest level flight"
+        f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {aircraft.airspeed_max:g} m/s"
     )
     if uncertainty is not None:
         climb_sd, descent_sd = math.degrees(uncertainty.climb_sd), math.degrees(uncertainty.descent_sd)

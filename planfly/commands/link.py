@@ -4,11 +4,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 import planfly
+from planfly.arguments import CHOICES
 from planfly.commands.check import add_mission_or_log_argument
-from planfly.terminal.arguments import (
-    number_parser,
-    parse_position,
-)
+from planfly.terminal.arguments import number_parser, parse_position
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
 from planfly.terminal.options import (
@@ -41,7 +39,11 @@ def add_link_parser(command_line: LineParser) -> None:
         ("power", "DBM", "output of the transmitter, dBm"),
         ("sensitivity", "DBM", "power at which the receiver still works, dBm"),
         ("antenna", "M", "height of the station's antenna above ground, m (default: 3)"),
+        ("station_gain", "DBI", "gain of the station's antenna, dBi (default: 0)"),
+        ("aircraft_gain", "DBI", "gain of the aircraft's antenna, dBi (default: 0)"),
+        ("cable_loss", "DB", "losses of cables and connectors at both ends, dB (default: 0)"),
         ("fade_margin", "DB", "power that the link has to keep above the sensitivity, dB (default: 10)"),
+        ("max_outage", "S", "longest accepted time below the fade margin, s (default: 0)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
@@ -50,13 +52,22 @@ def add_link_parser(command_line: LineParser) -> None:
         type=parse_position,
         help="position of the station's antenna, degrees (default: the mission's home)",
     )
+    group.add_argument(
+        "--use",
+        choices=CHOICES["use"],
+        help="the ground station's link or the remote control, whose loss the autopilot handles differently (default:"
+        " telemetry)",
+    )
     add_imported_log_options(parser)
     add_world_options(parser)
     add_aircraft_and_wind_options(parser)
     add_steering_options(parser).add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
-    add_result_options(parser, "folder for pictures of the link over time and on the map (default: none)")
+    add_result_options(
+        parser,
+        "folder for pictures of the link over time and on the map, and for the coverage as a GeoTIFF (default: none)",
+    )
 
 
 def link(args: argparse.Namespace) -> int:
@@ -70,7 +81,7 @@ def link(args: argparse.Namespace) -> int:
     ok = result.finding.ok
     code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
-    for text in (*flown_lines(judging_conditions(result.setup)), *result.outage_lines):
+    for text in (*flown_lines(judging_conditions(result.setup)), *result.outage_lines, *result.return_lines):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")
@@ -81,9 +92,20 @@ def link(args: argparse.Namespace) -> int:
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
     """Return the answer of the command for --json."""
     from logs.verdict.conditions import judging_conditions
+    from logs.verdict.returns.returns_text import headline
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry
 
     outages = () if result.along is None else result.along.outages
+    entries = [
+        OutageEntry(
+            first_s=round(outage.start, 2),
+            last_s=round(outage.end, 2),
+            margin_db=round(worst.margin, 2),
+            lat_deg=round(worst.lat_deg, 7),
+            lon_deg=round(worst.lon_deg, 7),
+        )
+        for outage, worst in zip(outages, result.worst_points, strict=True)
+    ]
     return LinkAnswer(
         exit_code=code,
         what=source,
@@ -91,6 +113,8 @@ def _json_answer(source: str, result: "LinkResult", code: int) -> object:
         ok=result.finding.ok,
         conditions=judging_conditions(result.setup),
         facts={fact.what: fact.value for fact in result.finding.facts},
-        outages=[OutageEntry(first_s=round(outage.start, 2), last_s=round(outage.end, 2)) for outage in outages],
+        where=result.where,
+        outages=entries,
+        returns=None if result.returns is None else headline(result.returns),
         files=[str(path) for path in result.files],
     )

@@ -51,8 +51,8 @@ def add_returns_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="find the lowest RTL_ALTITUDE, a climb before the turn, or the fewest rally points that make all "
-        "returns safe",
+        help="find the lowest RTL_ALTITUDE (PX4: RTL_RETURN_ALT), a climb before the turn, or the fewest rally points "
+        "that make all returns safe",
     )
     add_sitl_option(
         group,
@@ -105,7 +105,7 @@ def returns(args: argparse.Namespace) -> int:
     for text in result.suggestion_lines:
         print(colour_text("  would help: ", "hint") + text)
     if args.suggest and not result.safe and not result.suggested:
-        print("  no RTL_ALTITUDE, climb or set of rally points that would help was found")
+        print(f"  no {result.returns.trials_text} or set of rally points that would help was found")
     print(f"engine out: {result.glide_headline}")
     for text in result.glide_lines[:_MAX_LISTED_RANGES]:
         print(f"  {text}")

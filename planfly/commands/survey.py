@@ -84,8 +84,11 @@ def survey(args: argparse.Namespace) -> int:
     if args.suggest and not result.usable and not result.remedies:
         for text in result.no_remedy_lines:
             print(f"  {text}")
+    # A camera of --camera belongs to no survey of the file.
+    has_survey_item = any(plan.photo is not None for plan in result.setup.mission.survey_plans)
     for path in result.files:
-        print(f"  written {path}")
+        note = " (the survey as plain items, without its camera)" if path.suffix == ".plan" and has_survey_item else ""
+        print(f"  written {path}{note}")
     if missions := [path for path in result.files if path.suffix in (".waypoints", ".plan")]:
         # Other commands judge a mission without camera items as a path, not as a survey.
         settings = [f" --params {quote(str(path))}" for path in result.files if path.suffix == ".param"]

@@ -15,6 +15,7 @@ from flight.live.telemetry import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 from planfly.live.served_flights import ServedScenario, ServeOptions, autopilot_parameters, run_flight_process
+from planfly.runtime.process_setup import check_script_guard
 from world.frames import to_geo
 from world.interruption import children_ignore_sigint, delay_signals, end_children
 from world.scenario import Scenario
@@ -91,6 +92,7 @@ class _FlightPool:
         """Start a flight process, and return the vehicle's end of the pipe to it."""
         for child in self._children:
             child.join(timeout=0.0)
+        check_script_guard(self._children)
         self._children = [child for child in self._children if child.is_alive()]
         link_end, process_end = self._context.Pipe()
         child = self._context.Process(target=run_flight_process, args=(process_end, self._options), daemon=True)

@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, fields
 from multiprocessing import active_children, get_context
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from planfly.arguments import check_arguments
+from planfly.runtime.process_setup import check_script_guard, end_repeated_call
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import Advance, make_plan
@@ -216,7 +218,11 @@ def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterato
         # All processes are started here.
         with children_ignore_sigint(), delay_signals():
             results = pool.map(_plan_task, tasks[1:])
+        workers = active_children()
         yield from results
+    except BrokenProcessPool:
+        check_script_guard(workers)
+        raise
     except BaseException:
         # End the processes, because their results are no longer needed.
         pool.shutdown(wait=False, cancel_futures=True)
@@ -449,6 +455,7 @@ def paper_tables(
     A script must call this function under ``if __name__ == "__main__":``, because its processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
+    end_repeated_call()
     check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)
     folder = None if out is None else Path(out)
     if folder is not None:

@@ -1,4 +1,4 @@
-"""Fly a return to launch in JSBSim, by the simulated ArduPlane or by the ArduPlane program."""
+"""Fly a return to launch in JSBSim, by the simulated autopilot or by the ArduPlane program."""
 
 import math
 from dataclasses import replace
@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.mission.items import LANDINGS, Command, Frame, Mission, MissionItem
 from flight.mission.return_path import LandingStart
 from flight.simulation.setup import FlightSetup
@@ -26,6 +25,8 @@ LEAD_IN_LENGTH_M = 500.0
 _MAX_START_DISTANCE_M = 60.0
 # Maximum vertical distance at which a flight passes the start of a return, m.
 _MAX_START_HEIGHT_ERROR_M = 15.0
+# Battery with which no flight ends early, Wh.
+_ENDLESS_BATTERY_WH = 1e9
 # Delay of the simulated autopilot in following a slope after a waypoint, s; the altitude of the start waypoint is
 # advanced by this delay.
 _SLOPE_DELAY_S = 3.0
@@ -54,11 +55,12 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  Returns None for a
     return that cannot be flown.
 
-    start: a record of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    start: a record of `flight.autopilots.simulated_returns.RETURN_START`.
     """
     try:
         setup, airframe = return_setup(world, start)
-        flight = fly_to_end(Flight(setup, airframe.aircraft))
+        # The energy is judged by the point mass: an empty battery does not end the flight.
+        flight = fly_to_end(Flight(replace(setup, battery=_ENDLESS_BATTERY_WH), airframe.aircraft))
     except PlanflyError:
         return None
     position = positions_from_start(flight.track, start)
@@ -71,7 +73,7 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
 def return_setup(
     world: ReturnWorld, start: Record, landing: LandingStart | None = None
 ) -> tuple[FlightSetup, Airframe]:
-    """Make setup and airframe of a return, with a lead-in, flown by the simulated ArduPlane.
+    """Make setup and airframe of a return, with a lead-in, flown by the simulated autopilot.
 
     The flight is in the mean wind, without turbulence and navigation error.
 
@@ -79,7 +81,7 @@ def return_setup(
     Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_airframe`.
     """
     scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
-    airframe = replace(load_airframe(scenario), autopilot=ArduPlane(world.parameters))
+    airframe = replace(load_airframe(scenario), autopilot=world.autopilot)
     return replace(make_setup(scenario, airframe, _return_mission(world, start, landing), 1), nav="perfect"), airframe
 
 
@@ -126,6 +128,9 @@ def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | N
     east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     ground_speed = max(1.0, math.hypot(velocity_east, velocity_north))
+    turns = world.autopilot.turns
+    # An autopilot that reads no acceptance radius from an item begins the RTL before the last waypoint.
+    distance_ahead = 0.0 if turns.reads_acceptance else turns.distance(math.pi, altitude)
     altitude += _SLOPE_DELAY_S * velocity_up
     points = [
         (
@@ -133,7 +138,11 @@ def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | N
             north - LEAD_IN_LENGTH_M * velocity_north / ground_speed,
             altitude - LEAD_IN_LENGTH_M * velocity_up / ground_speed,
         ),
-        (east, north, altitude),
+        (
+            east + distance_ahead * velocity_east / ground_speed,
+            north + distance_ahead * velocity_north / ground_speed,
+            altitude,
+        ),
     ]
     origin, mission = world.scenario.origin, world.setup.mission
     items = []

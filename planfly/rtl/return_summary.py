@@ -8,7 +8,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, draw
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import headline, unjudged_parts_text
 from world.errors import PlanflyError
 
 
@@ -77,6 +77,23 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
     is_replaced = world.stands_in and not world.has_other_law
     replacement_text = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
     return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)
+
+
+def return_law_lines(setup: FlightSetup) -> list[str]:
+    """Return lines on the autopilot whose returns are simulated, its path, and the parts that are not judged.
+
+    Return [] for a mission without a home.
+    """
+    if setup.mission.home is None:
+        return []
+    world = make_return_world(setup)
+    behaviour, unjudged = world.autopilot.returns, world.unjudged_parts
+    lines = [f"returns to launch by the simulated {world.autopilot.title} flying a point-mass model"]
+    lines += [behaviour.path_text] if behaviour.path_text else []
+    if unjudged:
+        extent = "in full" if world.is_simulated else "at all"
+        lines.append(f"the returns are not judged {extent}: {unjudged_parts_text(unjudged)}")
+    return lines
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.rtl_point_mass import (
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.catalog import program_class_for
+from flight.autopilots.simulated_returns import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
     RETURN_OFF_TERRAIN,
     RETURN_RESULT,
     RETURN_TIMEOUT,
 )
-from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.catalog import program_class_for
 from flight.mission.return_path import ReturnTarget
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import (
@@ -158,6 +158,13 @@ def check_is_arduplane(program: Path) -> None:
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
+
+
+def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
+    """Raise ArgumentError if the simulated returns are not those of ArduPlane, which its program could not check."""
+    if not isinstance(world.autopilot, ArduPlane):
+        allowed = f"ArduPlane's program does not fly the returns of {world.autopilot.title}"
+        raise ArgumentError.of_argument("sitl", str(program), allowed)
 
 
 def choose_worst_returns(
@@ -355,7 +362,7 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
 
 def _other_targets(world: ReturnWorld, simulated_target: ReturnTarget) -> Iterator[ReturnTarget]:
     """Yield home and all rally points, except the target of the simulated ArduPlane."""
-    home_altitude = ArduPlane(world.parameters).returns.rules.height + world.home.up
+    home_altitude = world.autopilot.returns.rules.height + world.home.up
     positions = [
         ("home", (world.home.east, world.home.north, home_altitude)),
         *(

@@ -3,9 +3,12 @@
 import gc
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import FunctionType
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
 
 _Result = TypeVar("_Result")
 # Total number of values in all frames within `with_large_stack`; Numba recurses some 500 frames deep.
@@ -13,6 +16,8 @@ _STACK_VALUES = 2**17
 # Number of new objects after which garbage is collected.  The imports of a command leave some 300,000, and nothing to
 # collect; a flight allocates few more.
 _MIN_OBJECTS_TO_COLLECT = 1_000_000
+# Exit code of a process that would call the function again which started it.
+_REPEATED_CALL_EXIT_CODE = 78
 # Environment variable of a process set up by `prepare_process`, inherited by its child processes.
 _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
@@ -39,6 +44,31 @@ def prepare_child() -> None:
     if _OWN_PROCESS_VARIABLE in os.environ:
         gc.set_threshold(_MIN_OBJECTS_TO_COLLECT, 50, 50)
         watch_address_space()
+
+
+def end_repeated_call() -> None:
+    """End this process without a word if it is a worker that is still importing the script of its parent.
+
+    Call this function first in functions that start processes. Without ``if __name__ == "__main__":`` the import calls
+    the same function again; the parent then reports it (`check_script_guard`).
+    """
+    from multiprocessing import current_process
+
+    # `multiprocessing` sets this attribute while a spawned process imports the script.
+    if getattr(current_process(), "_inheriting", False):
+        raise SystemExit(_REPEATED_CALL_EXIT_CODE)
+
+
+def check_script_guard(workers: "Iterable[BaseProcess]") -> None:
+    """Raise PlanflyError if one of these processes has ended by `end_repeated_call`."""
+    if not any(worker.exitcode == _REPEATED_CALL_EXIT_CODE for worker in workers):
+        return
+    # Imported here: `import planfly` loads nothing else.
+    from world.errors import PlanflyError
+
+    script = getattr(sys.modules.get("__main__"), "__file__", None) or "the script"
+    reason = 'its calls need the line `if __name__ == "__main__":` above them, because worker processes import it'
+    raise PlanflyError(f"{script}: {reason}", file=script) from None
 
 
 def watch_address_space() -> None:

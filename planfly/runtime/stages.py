@@ -11,6 +11,8 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import NamedTuple
 
+from world.argument_types import checks_types
+
 # Function that takes the progress of a stage: done, total, a remark.
 Advance = Callable[[float, float, str], None]
 
@@ -87,6 +89,7 @@ def _ignore_progress(_done: float, _total: float, _remark: str) -> None:
     pass
 
 
+@checks_types
 def progress(callback: Callable[[str, float, float, str], None]) -> AbstractContextManager[None]:
     """Report the progress of the calls inside a ``with`` block.
 

@@ -145,7 +145,7 @@ class Jobs:
     def start_task(self, kind: str, session: Session) -> None:
         """Start a flight of the current mission, or a long task.
 
-        kind: "fly", or the name of a long task: "returns" or "campaign".
+        kind: "fly", or the name of a long task, such as "returns" or "campaign".
         """
         if kind == "fly":
             self.fly(session)

@@ -1,6 +1,11 @@
-"""Judge returns to launch along the route, and fly campaigns, in the studio's second worker process."""
+"""Answer questions that take many flights, in the studio's second worker process.
+
+Can it return home, how likely is it to succeed, does the battery last, when can it take off, whom does it fly over?
+"""
 
 from collections import Counter
+from collections.abc import Iterable
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +15,7 @@ from logs.verdict.returns.returns_text import headline, point_of_no_return_text,
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
+from planfly.campaigns.worker_pool import Workers
 from planfly.rtl.return_summary import return_starts
 from planfly.studio.edit_context import EditContext
 from planfly.studio.worker_process import Advance
@@ -23,6 +29,16 @@ _MAX_RETURNS = 240
 _MAX_LISTED_RANGES = 6
 # Number of flights in a campaign.
 FLIGHT_COUNT = 24
+# Number of flights for the ground risk, each with its returns and falls.
+_RISK_FLIGHTS = 12
+# Number of flights of each take-off in a forecast.
+_WINDOW_FLIGHTS = 10
+# Time between two take-offs.
+_WINDOW_STEP = timedelta(hours=1)
+# Time after the first take-off at which the last one is tried.
+_WINDOW_SPAN = timedelta(hours=12)
+# One process besides this one: the other core flies for the page.
+_WORKERS = Workers(count=1)
 
 
 def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
@@ -69,20 +85,7 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
     require_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson
 
-    context, mission = payload
-    setup = context.setup(mission)
-    base = CampaignBase(
-        *(
-            context.scenario,
-            context.airframe,
-            mission,
-            context.place_mission(mission),
-            setup.plan,
-            default_dispersions(),
-            context.seed,
-        ),
-        name=Path(mission.source).stem,
-    )
+    base = _campaign_base(*payload)
     flyable, failure_counts = 0, Counter[str]()
     for index in range(FLIGHT_COUNT):
         advance(index, FLIGHT_COUNT, f"{flyable} of {index} flyable")
@@ -95,4 +98,76 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
         "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable else "fail",
         "headline": f"{flyable} of {FLIGHT_COUNT} flights are flyable: {lower:.0%} to {upper:.0%} at 95 %",
         "lines": [*common, f"planfly campaign flies more: {FLIGHT_COUNT} flights show little about rare failures"],
+    }
+
+
+def _campaign_base(context: EditContext, mission: Mission) -> CampaignBase:
+    """Return the base of a campaign that flies a mission with planfly's default dispersions."""
+    return CampaignBase(
+        scenario=context.scenario,
+        airframe=context.airframe,
+        mission=mission,
+        placed=context.place_mission(mission),
+        plan=context.setup(mission).plan,
+        dispersions=default_dispersions(),
+        seed=context.seed,
+        name=Path(mission.source).stem,
+    )
+
+
+def run_battery_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+    """Find the smallest battery for a mission and its returns, as page data.
+
+    payload: editing context, and mission.
+    """
+    require_extra("campaigns")
+    from planfly.campaigns.battery_text import answer_line, battery_lines
+    from planfly.campaigns.find_battery import BatteryGoal, find_battery
+
+    result = find_battery(_campaign_base(*payload), BatteryGoal(flights=FLIGHT_COUNT), _WORKERS, advance)
+    return _answer(result.is_enough, answer_line(result), battery_lines(result))
+
+
+def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+    """Find the volumes and the ground risk class of a mission by SORA 2.5, as page data.
+
+    payload: editing context, and mission.
+    """
+    require_extra("campaigns")
+    from planfly.campaigns.find_ground_risk import GroundRiskGoal, find_ground_risk
+    from planfly.campaigns.ground_risk_text import answer_line, risk_lines
+
+    result = find_ground_risk(_campaign_base(*payload), GroundRiskGoal(flights=_RISK_FLIGHTS), _WORKERS, advance)
+    return _answer(True if result.is_judged else None, answer_line(result), risk_lines(result))
+
+
+def run_window_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+    """Find the times of take-off at which a mission is flyable in the forecast of its scenario, as page data.
+
+    payload: editing context, and mission.
+
+    Raises MissionError without a forecast.
+    """
+    require_extra("campaigns")
+    from planfly.campaigns.find_window import DEFAULT_PROBABILITY, WindowGoal, departure_times, find_window
+    from planfly.campaigns.window_text import answer_line, window_lines
+
+    context, mission = payload
+    facts = context.scenario.wind.forecast
+    if facts is None:
+        reason = "departures need a forecast: planfly studio --forecast FILE --at TIME"
+        raise MissionError(f"{mission.source}: {reason}", field="forecast")
+    first = facts.departure
+    departures = departure_times(first, min(first + _WINDOW_SPAN, facts.last_time), _WINDOW_STEP)
+    goal = WindowGoal(departures, first, DEFAULT_PROBABILITY, _WINDOW_FLIGHTS)
+    result = find_window(_campaign_base(context, mission), goal, _WORKERS, advance)
+    return _answer(result.is_go, answer_line(result), window_lines(result))
+
+
+def _answer(is_good: bool | None, headline: str, lines: Iterable[str]) -> dict[str, Any]:
+    """Return an answer as page data.  is_good: None if it is not known."""
+    return {
+        "state": "open" if is_good is None else "ok" if is_good else "fail",
+        "headline": headline,
+        "lines": [*lines],
     }

@@ -173,7 +173,7 @@ class Choose(_Message):
 class Ask(_Message):
     """Request to fly, to do a long task, or to stop the work in progress."""
 
-    kind: Literal["fly", "returns", "campaign", "stop"]
+    kind: Literal["fly", "returns", "campaign", "battery", "ground_risk", "window", "stop"]
 
 
 class Save(_Message):

@@ -15,6 +15,7 @@ from planfly.arguments import check_arguments
 from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.process_setup import end_repeated_call
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
 from world.extras import requires_extra
@@ -64,6 +65,7 @@ def open_studio(
     A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
     Raises a `planfly.PlanflyError` for bad input.
     """
+    end_repeated_call()
     check_arguments(seed=options["seed"], port=port)
     listener = _open_listener(port)
     with contextlib.closing(listener):

@@ -191,6 +191,7 @@ def settings_json(
         "wind_speed": float(scenario.wind.speed),
         "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1),
         "turbulence": scenario.wind.turbulence,
+        "forecast": "" if scenario.wind.forecast is None else scenario.wind.forecast.describe(),
         "limits": {name: limits.get(name) for name in LIMITS} | {"min_clearance_m": scenario.limits.min_clearance_m},
         "ceiling": None if scenario.external else float(scenario.ceiling),
         "parameters": dict(changed_parameters.values),

@@ -24,7 +24,7 @@ from planfly.workflow.trial_flight import Trial
 from world.errors import PlanflyError
 from world.scenario import with_flight
 
-RemedyKind = Literal["side", "turn-around", "every", "course", "parameter", "airspeed"]
+RemedyKind = Literal["side", "turn-around", "gates", "every", "course", "parameter", "airspeed"]
 
 # Turn-around distances that are tried, m.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
@@ -118,6 +118,7 @@ def find_survey_remedies(
     candidates = [
         trials.try_other_side(),
         longer_turn_around,
+        trials.try_gates(),
         trials.find_stride(math.inf if longer_turn_around is None else longer_turn_around.value),
         trials.find_course(),
         trials.find_parameter(),
@@ -291,6 +292,31 @@ class _Trials:
             if self._is_remedy(flight)
             else None
         )
+
+    def try_gates(self) -> SurveyRemedy | None:
+        """Try gates (CONDITION_GATE) instead of waypoints at the ends of lines with turn-arounds.
+
+        PX4 flies past a gate, and switches the camera in the gate's plane instead of at its acceptance radius.  Returns
+        None for an autopilot without gates, or if the flight does not pass.
+        """
+        mission, route = self._setup.mission, self._setup.route
+        ends = {
+            int(route.items[i])
+            for survey in self._surveys
+            for line in survey.lines
+            for i in (line.first, line.last)
+            if line.begins < i < line.ends
+        }
+        items = tuple(
+            replace(item, command=int(Command.CONDITION_GATE), params=(0.0,) * 4)
+            if item.seq in ends and item.command == Command.NAV_WAYPOINT
+            else item
+            for item in mission.items
+        )
+        if not self._setup.autopilot.route_rules.reads_as_px4 or items == mission.items:
+            return None
+        flight = self._fly_trial(replace(mission, items=items), self._airframe, "gates at the ends of the lines")
+        return SurveyRemedy("gates", "", 0.0, 1.0, "", *flight) if self._is_remedy(flight) else None
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
         """Find the smallest interleave stride that passes, with turn-around distances below `max_turn_around`.

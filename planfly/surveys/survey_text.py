@@ -132,6 +132,10 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             change = "the lines in the opposite order"
         case "turn-around":
             change = f"turn-arounds of {remedy.value:.0f} m instead of {remedy.current:.0f} m"
+        case "gates":
+            change = (
+                "gates (CONDITION_GATE, a setting of QGroundControl) instead of waypoints where the camera is switched"
+            )
         case "every":
             first_line_text = (
                 f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""

@@ -20,7 +20,8 @@ class DecisionEntry:
 
     flights: int
     returns_from_leg: int | None
-    """Leg on which the return starts that needs the most energy, from 0; null for the end of the mission."""
+    """Number of the leg on which the return starts that needs the most energy, as in texts; null for the end of the
+    mission."""
     start_s: float | None
     """Median start of these returns, s."""
 
@@ -53,5 +54,5 @@ class BatteryAnswer:
     """Flights in which the aircraft's battery keeps the reserve."""
     decisions: list[DecisionEntry]
     leg_energies_wh: list[float]
-    """Median energy of each leg."""
+    """Median energy of each leg, by the leg's number in texts; all legs around a loiter are one."""
     conditions: Conditions

@@ -21,7 +21,8 @@ class CauseEntry:
 
     name: str
     does: str
-    """Action: return, land, autoland, on, circle, glide, parachute, terminate, level, guided, landed or never."""
+    """Action: return, land, autoland, on, circle, glide, parachute, terminate, level, guided, landed, never, land here
+    or disarm."""
     parameter: str
     """Parameter that decides the action; empty if there is none."""
     value: int
@@ -132,7 +133,7 @@ class GlideEntry:
     """Flat ground that can be reached, m east; null for none."""
     flat_north_m: float | None
     own: str
-    """Outcome of the return that ArduPlane itself would fly: arrives, low, ground, threat, unknown or not flown."""
+    """Outcome of the autopilot's own return without thrust: arrives, low, ground, threat, unknown or not flown."""
     own_target: str
     own_over_m: float | None
     """Height above ground of that return at its target, m; null if it does not arrive."""
@@ -172,7 +173,7 @@ class GlidesEntry:
     nothing: int
     unknown: int
     own_arrives: int
-    """Number of places from which the return that ArduPlane itself flies arrives."""
+    """Number of places from which the return that the autopilot itself flies arrives."""
     ranges: list[GlideEntry]
 
 
@@ -192,7 +193,8 @@ class ReturnsAnswer:
     rtl_autoland: int | None
     """ArduPlane's parameter RTL_AUTOLAND; null if another autopilot flies."""
     not_judged: list[str]
-    """Reasons that leave the returns undecided: terrain, law, autoland, return path or landing."""
+    """Reasons that leave the returns undecided: terrain, law, autoland, return path, landing, or a clause that names a
+    setting of the autopilot."""
     ranges: list[ReturnEntry]
     by_program: ByProgram | None
     """Returns flown with --sitl; worse outcomes are counted in headline and ranges."""

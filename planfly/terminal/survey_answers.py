@@ -41,7 +41,7 @@ class SurveyRemedyEntry:
     """A change with which the survey was flown so that all lines can be used."""
 
     kind: str
-    """Kind of the change: side, turn-around, every, course, parameter or airspeed."""
+    """Kind of the change: side, turn-around, gates, every, course, parameter or airspeed."""
     name: str
     """Name of the parameter."""
     current: float

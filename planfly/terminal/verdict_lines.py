@@ -6,6 +6,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
+from logs.verdict.wording import shorten_statement
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
@@ -75,8 +76,11 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
 
 
 def _place_and_value(finding: Finding) -> str:
-    """Return the place of a finding, with its value if it has one, such as "leg 4 (12.3 m)"."""
-    value, _ = finding.compared_texts()
+    """Return the place of a failed finding, with its value if it has one, such as "leg 4 (12.3 m)".
+
+    If the value is within its limit, the finding fails for another reason, which replaces the value.
+    """
+    value = finding.compared_texts()[0] if finding.margin is not None else shorten_statement(finding.brief)
     return finding.where + (f" ({value})" if value else "")
 
 

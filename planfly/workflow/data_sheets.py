@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,7 +40,16 @@ from aircraft.uncertainty import (
     uncertainty_text,
 )
 from flight.autopilots.arduplane.parameters import DEFINITIONS
-from flight.autopilots.parameter_files import Entry, read_parameter_file
+from flight.autopilots.parameter_files import Entry
+from flight.autopilots.parameter_origin import (
+    ARDUPILOT,
+    PX4,
+    read_origin,
+    read_parameters_for,
+    refuse_unknown_parameters,
+)
+from flight.autopilots.px4.parameters import FROM_ARDUPILOT
+from flight.autopilots.px4.parameters import TABLE as PX4_TABLE
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import (
     Simulator,
@@ -58,50 +67,99 @@ from world.errors import FlightError
 from world.files import temporary_folder
 
 # ----------------------------------------------------------------------
-# Values in an ArduPlane parameter file that differ from the defaults of ArduPlane are measured values.
+# Values in a parameter file that differ from the defaults of its autopilot are measured values.
 
-# Parameters that are used.  Speeds are equivalent airspeeds, and are used as the airspeeds of the sheet.
+# Parameters of ArduPlane that are used.  Speeds are equivalent airspeeds, and are used as the airspeeds of the sheet.
 _USED_PARAMETERS = (
     *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
     *("TECS_CLMB_MAX", "THR_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
 )
+# PX4's stall speed, and its default, m/s (`fw_pos_control_params.c`).
+_PX4_STALL = ("FW_AIRSPD_STALL", 7.0)
 # Ratio of AIRSPEED_MIN to the stall speed.
 _MIN_AIRSPEED_STALL_RATIO = 1.2
+# Values of a data sheet that a parameter states, too.  The autopilot's own limits, which may be lower than what the
+# aircraft can do, stay in its parameters.
+_SHEET_FIELDS = {
+    "AIRSPEED_CRUISE": "cruise",
+    "AIRSPEED_STALL": "stall",
+    "AIRSPEED_MIN": "stall",
+    "TECS_CLMB_MAX": "climb",
+    "ROLL_LIMIT_DEG": "bank",
+}
+_SETTINGS = ("AIRSPEED_CRUISE", "ROLL_LIMIT_DEG")
 
 
-def stated_parameters(file: Path) -> dict[str, float]:
-    """Return the parameters of a file that describe the aircraft and differ from their defaults.
+@dataclass(frozen=True, slots=True)
+class StatedParameters:
+    """Parameters of a file that describe the aircraft and differ from their defaults.
 
-    The keys are current names of ArduPlane's parameters.
-
-    Raises ParameterError for a file that cannot be read.
+    values: by ArduPlane's present name and in its unit; AIRSPEED_STALL only of a file for PX4.
+    texts: name and value as the file states them, by the same names.
     """
-    entries = read_parameter_file(file)
-    values = {}
-    for definition in DEFINITIONS.values():
-        if definition.name not in _USED_PARAMETERS:
-            continue
-        value = _stated_value(entries, definition.name, definition.old)
-        if value is not None and abs(value - definition.default) > 1e-6 * max(1.0, abs(definition.default)):
-            values[definition.name] = value
-    return values
+
+    values: Mapping[str, float]
+    texts: Mapping[str, str]
 
 
-def _stated_value(entries: Mapping[str, Entry], name: str, deprecated: tuple[str, float] | None) -> float | None:
-    """Return the value of a parameter in a parameter file, or None if the file does not state it.
+def stated_parameters(file: Path) -> StatedParameters:
+    """Return the parameters of a file for ArduPlane or PX4 that describe the aircraft and differ from their defaults.
 
-    deprecated: former name of the parameter, and the factor from its unit to the present unit; None without one.
+    Raises ParameterError for a file that cannot be read, a file for another vehicle, and a file whose names neither
+    autopilot knows.
     """
-    if name in entries:
-        return entries[name].value
-    if deprecated is None:
+    autopilot = read_origin(file).autopilot or ARDUPILOT
+    entries = read_parameters_for(file, autopilot)
+    values: dict[str, float] = {}
+    texts: dict[str, str] = {}
+    for name in (*_USED_PARAMETERS, "AIRSPEED_STALL"):
+        stated = _px4_value(entries, name) if autopilot == PX4 else _arduplane_value(entries, name)
+        if stated is not None and abs(stated[0] - stated[1]) > 1e-6 * max(1.0, abs(stated[1])):
+            values[name], texts[name] = stated[0], stated[2]
+    refuse_unknown_parameters(file, autopilot, entries, values)
+    return StatedParameters(values, texts)
+
+
+def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
+    """Return a parameter's value, its default, and its text in a file for ArduPlane; None if the file lacks it."""
+    definition = next((one for one in DEFINITIONS.values() if one.name == name), None)
+    if definition is None or name not in _USED_PARAMETERS:
         return None
-    deprecated_name, unit_factor = deprecated
-    return entries[deprecated_name].value * unit_factor if deprecated_name in entries else None
+    if name in entries:
+        return entries[name].value, definition.default, f"{name} {entries[name].value:g}"
+    if definition.old is None or definition.old[0] not in entries:
+        return None
+    old_name, unit_factor = definition.old
+    return entries[old_name].value * unit_factor, definition.default, f"{old_name} {entries[old_name].value:g}"
+
+
+def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
+    """Return a parameter's value and default in ArduPlane's unit, and its text in a file for PX4; None without it."""
+    px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
+    if px4_name not in entries:
+        return None
+    default = _PX4_STALL[1] if px4_name == _PX4_STALL[0] else PX4_TABLE.by_name[px4_name].default
+    value = entries[px4_name].value
+    return value / factor, default / factor, f"{px4_name} {value:g}"
+
+
+def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedParameters) -> list[str]:
+    """Return texts on the parameters that the numbers of a data sheet override.
+
+    numbers: by keyword, in the units of the options; None or 0 if not stated.
+
+    >>> overridden_texts({"cruise": 18.0}, StatedParameters({"AIRSPEED_CRUISE": 19.0}, {"AIRSPEED_CRUISE": "A 19"}))
+    ['A 19 (cruise 18 m/s)']
+    """
+    return [
+        f"{parameters.texts[name]} ({field} {numbers[field]:g} {RANGES[field][1]})"
+        for name, field in _SHEET_FIELDS.items()
+        if name in parameters.values and numbers.get(field)
+    ]
 
 
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
-    """Return a data sheet whose missing values are taken from ArduPlane parameters.
+    """Return a data sheet whose missing values are taken from parameters, by ArduPlane's names.
 
     TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX (libraries/AP_TECS/AP_TECS.cpp).
 
@@ -113,7 +171,8 @@ def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSh
     filled = replace(
         sheet,
         cruise=sheet.cruise or parameters.get("AIRSPEED_CRUISE", 0.0),
-        stall=sheet.stall or parameters.get("AIRSPEED_MIN", 0.0) / _MIN_AIRSPEED_STALL_RATIO,
+        stall=sheet.stall
+        or parameters.get("AIRSPEED_STALL", parameters.get("AIRSPEED_MIN", 0.0) / _MIN_AIRSPEED_STALL_RATIO),
         bank=sheet.bank or math.radians(parameters.get("ROLL_LIMIT_DEG", 0.0)),
         trim_throttle=sheet.trim_throttle or 0.01 * parameters.get("TRIM_THROTTLE", 0.0),
         sink=sheet.sink or parameters.get("TECS_SINK_MIN", 0.0),
@@ -167,7 +226,7 @@ def parse_sheet(
     volts, energy = _parse_battery(battery) if battery is not None else (0.0, 0.0)
     propeller = _parse_propeller(prop) if prop is not None else (0.0, 0.0)
     layouts: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
-    if layout is not None and layout not in layouts:
+    if layout is not None and layout not in list(layouts):
         raise FlightError.of_argument("layout", layout, f"expected {', '.join(layouts)}")
     sheet_values = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
     return DataSheet(**sheet_values, volts=volts, energy=energy, propeller=propeller, layout=layouts[layout or "tail"])
@@ -290,6 +349,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         battery_guessed="energy" in sized.guessed,
         max_speed_sd=top_speed_sd,
         climb_guessed="climb" in sized.guessed,
+        bank_guessed="bank" in sized.guessed,
     )
     return uncertainty, _draw_with_balanced_thrust(uncertainty, balance, climb_sd / thrust_slopes[0])
 
@@ -418,20 +478,25 @@ def make_data_sheet_folder(
 
     Returns the aircraft.
 
-    parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
+    parameters: file of ArduPlane's or PX4's parameters, which fill the gaps of the sheet.
     sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
     overwrite: True replaces the folder of an aircraft.
     Raises FlightError, in one line with the allowed range, for a sheet outside the range of small aircraft, a folder
     that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    file_parameters = {} if parameters is None else stated_parameters(parameters)
+    stated = StatedParameters({}, {}) if parameters is None else stated_parameters(parameters)
+    numbers = {field: getattr(sheet, field) / RANGES[field][4] for field in _SHEET_FIELDS.values()}
+    readme_lines = _parameter_lines(stated, overridden_texts(numbers, stated))
+    # What the sheet states applies, in the autopilot's parameters, too.
+    is_overridden = {name: bool(getattr(sheet, _SHEET_FIELDS[name])) for name in _SETTINGS}
+    file_parameters = {name: value for name, value in stated.values.items() if not is_overridden.get(name)}
     if sized is None:
         sheet = with_parameters(sheet, file_parameters)
         _check_required_numbers(sheet)
         sized = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as draft_folder:
-        files = _make_files(sized, target.name, draft_folder, file_parameters)
+        files = _make_files(sized, target.name, draft_folder, file_parameters, readme_lines)
     write_aircraft_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
@@ -445,12 +510,29 @@ def _check_required_numbers(sheet: DataSheet) -> None:
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 
+def _parameter_lines(stated: StatedParameters, overridden: Sequence[str]) -> list[str]:
+    """Return lines of ``README.md`` on the values of a parameter file; [] without such values.
+
+    overridden: texts on the parameters that the data sheet overrides.
+    """
+    used = [text for text in stated.texts.values() if not any(other.startswith(f"{text} (") for other in overridden)]
+    lines = [f"From the parameter file: {', '.join(used)}.", *_climb_lines(stated)] if used else []
+    if overridden:
+        lines.append(f"Not used of the parameter file, because the data sheet states it: {', '.join(overridden)}.")
+    return ["", *lines] if lines else []
+
+
 def _make_files(
-    sized: SizedAircraft, name: str, draft_folder: Path, file_parameters: Mapping[str, float]
+    sized: SizedAircraft,
+    name: str,
+    draft_folder: Path,
+    file_parameters: Mapping[str, float],
+    readme_lines: Sequence[str],
 ) -> dict[str, str]:
     """Return the text of each file of the aircraft's folder, by file name.
 
     draft_folder: temporary folder for a draft of the aircraft, which trims and gains are computed from.
+    readme_lines: lines of ``README.md`` on the parameter file.
     """
     folder = draft_folder / name
     folder.mkdir()
@@ -483,7 +565,9 @@ def _make_files(
         "ardupilot.toml": servo_text(aircraft, performance),
         "uncertainty.toml": uncertainty_text(uncertainty),
         DRAWS_FILE: draws_text(draws),
-        "README.md": _readme_text(name, sized, performance, uncertainty, file_parameters),
+        "README.md": _readme_text(
+            aircraft, sized, performance, uncertainty, readme_lines, _trim_throttle_lines(file_parameters, performance)
+        ),
     }
 
 
@@ -688,30 +772,49 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
     ]
 
 
-def _climb_lines(file_parameters: Mapping[str, float]) -> list[str]:
+def _climb_lines(stated: StatedParameters) -> list[str]:
     """Return a line of ``README.md`` on the throttle of the file's climb rate; [] if it is full throttle."""
-    if not {"TECS_CLMB_MAX", "THR_MAX"} <= file_parameters.keys():
+    if not {"TECS_CLMB_MAX", "THR_MAX"} <= stated.values.keys():
         return []
-    return ["TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX; the table has the climb at full throttle."]
+    climb_name, throttle_name = (stated.texts[name].split()[0] for name in ("TECS_CLMB_MAX", "THR_MAX"))
+    climb_text = f"{climb_name} is the climb rate with the throttle at {throttle_name}"
+    return [f"{climb_text}; the table has the climb at full throttle."]
+
+
+def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str]:
+    """Return lines of ``README.md`` on the performance of the model and the speeds of its guidance."""
+    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
+    return [
+        f"The model weighs {aircraft.mass * GRAVITY:.1f} N, flies level at {aircraft.airspeed:g} m/s with"
+        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
+        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
+        f" {performance.slowest.airspeed:.1f} m/s.",
+        f"Guidance flies at {aircraft.airspeed_min:g} to {aircraft.airspeed_max:g} m/s:"
+        f" up to {100.0 * MAX_SPEED:.0f} % of the fastest level flight.",
+    ]
 
 
 def _readme_text(
-    name: str,
+    aircraft: Aircraft,
     sized: SizedAircraft,
     performance: Performance,
     uncertainty: Uncertainty,
-    file_parameters: Mapping[str, float],
+    parameter_lines: Sequence[str],
+    throttle_lines: Sequence[str],
 ) -> str:
-    """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files."""
-    sheet = sized.sheet
+    """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files.
+
+    parameter_lines, throttle_lines: lines on the parameter file, and on its throttle of level flight.
+    """
+    sheet, name = sized.sheet, aircraft.name
     propulsion = "burns fuel; its mass stays the same" if sheet.burns_fuel else "is electric"
-    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
     lines = [
         f"# {name}",
         "",
         f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {propulsion}.",
         "Values that the sheet does not state are scaled from aircraft of its class; see `aircraft/data_sheet.py` of",
-        "planfly. A slope close to the model's limit is left undecided.",
+        "planfly. A slope close to the model's limit is left undecided, and so is a turn that only a guessed bank",
+        "limit forbids.",
         "",
         "| | | |",
         "|---|---|---|",
@@ -719,16 +822,11 @@ def _readme_text(
     for field, title, unit, factor in _README_ROWS:
         if value := factor * getattr(sheet, field):
             lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in sized.guessed else 'stated'} |")
-    if file_parameters:
-        values_text = ", ".join(f"{key} {value:g}" for key, value in file_parameters.items())
-        lines += ["", f"From the parameter file: {values_text}.", *_climb_lines(file_parameters)]
     lines += [
+        *parameter_lines,
         "",
-        f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"
-        f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
-        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator reaches its stop at"
-        f" {performance.slowest.airspeed:.1f} m/s.",
-        *_trim_throttle_lines(file_parameters, performance),
+        *_performance_lines(aircraft, performance),
+        *throttle_lines,
         "",
         "## Uncertainties",
         "",

@@ -34,7 +34,7 @@ from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.flight_options import LogOptions, apply_options, flight_entries
+from planfly.flight_options import LogOptions, apply_options, flight_entries, load_scenario_with_options
 from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import find_aircraft_and_energy, load_airframe, max_turn_bank
 from planfly.workflow.file_autopilots import with_file_autopilot
@@ -43,7 +43,7 @@ from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
 from planner.plan import read_plan
 from world.errors import LogError, MissionError, StartError
 from world.frames import to_geo
-from world.scenario import Scenario, load_scenario, with_flight, with_wind
+from world.scenario import Scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
 from world.wording import count_text
 
@@ -195,7 +195,7 @@ def _choose_scenario_and_place_mission(
     scenario, named_scenario = plan_scenario, options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options["terrain"])
     if named_scenario is not None:
-        scenario = load_scenario(str(named_scenario), terrain)
+        scenario = load_scenario_with_options(named_scenario, {"terrain": terrain})
     if scenario is None:
         # The vertical legs are those that ArduPlane flies, so that the flight can be compared with a simulated flight.
         aircraft = flight_entries(options)["aircraft"]

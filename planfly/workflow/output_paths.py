@@ -31,7 +31,7 @@ RUN_FILES = (
 # Names of the figures of a report, as in `logs.views.figures.FIGURES`.
 REPORT_FIGURES = (
     *("map", "profile", "scene", "turns", "returns", "worst-returns", "return-heights", "glide", "survey"),
-    *("time", "exposure", "controls", "energy", "envelope"),
+    *("link-map", "link", "time", "exposure", "controls", "energy", "envelope"),
 )
 # Files of a report, including all figures as PNG and SVG.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in REPORT_FIGURES for kind in ("png", "svg")))
@@ -45,7 +45,7 @@ SURVEY_FILES = (
     "survey.png",
     *(
         f"{remedy}.{kind}"
-        for remedy in ("side", "turn-around", "every", "course", "parameter", "airspeed")
+        for remedy in ("side", "turn-around", "gates", "every", "course", "parameter", "airspeed")
         for kind in ("waypoints", "plan")
     ),
     "parameter.param",
@@ -60,7 +60,7 @@ RETURN_FILES = (
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
 # Files of `planfly.link`.
-LINK_FILES = ("link.png", "link-map.png")
+LINK_FILES = ("link.png", "link-map.png", "link-coverage.tif")
 # Files of `planfly.ground_risk`.
 GROUND_RISK_FILES = ("ground-risk.kml", "ground-risk.geojson", "ground-risk.png", "ground-risk.md")
 # File of `planfly.window`.

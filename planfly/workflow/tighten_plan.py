@@ -209,7 +209,7 @@ def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list
             # outside a larger sphere either.
             continue
         # The nearest distance is negative inside the sphere.
-        depth = next((-fact.value for fact in finding.facts if fact.what == "nearest"), None)
+        depth = None if finding.nearest is None else -finding.nearest
         if depth is None:
             continue
         threat = spec["threats"][finding.place.index]

@@ -223,9 +223,9 @@ def vertical_distance(zone: Record, band: AltitudeBand) -> float:
 # Length of pieces near a zone, m: short enough for the heights to apply to the positions.
 MAX_PIECE_LENGTH = 25.0
 # Margin of a piece of a path. nearest: smallest distance outside an exclusion or inside an inclusion, horizontal or
-# vertical, m; negative if a zone is violated. satisfied: True if every zone's margin is satisfied. zone: the nearest
-# zone, with preference for a violated margin; -1 without a zone.
-ZONE_MARGIN = np.dtype([("nearest", np.float64), ("satisfied", np.bool_), ("zone", np.int64)])
+# vertical, m; negative if a zone is violated. excess: smallest excess over a zone's required distance, m; negative if
+# a margin is violated. zone: the nearest zone, with preference for a violated margin; -1 without a zone.
+ZONE_MARGIN = np.dtype([("nearest", np.float64), ("excess", np.float64), ("zone", np.int64)])
 
 
 @inner
@@ -247,7 +247,7 @@ def measure_zone_margin(
     lateral_error: (2,) lateral tracking error at a and b, m.
     error_below, error_above: vertical tracking error, m.
     """
-    margin.nearest, margin.satisfied, margin.zone = math.inf, True, -1
+    margin.nearest, margin.excess, margin.zone = math.inf, math.inf, -1
     records, max_lateral_error = zones.records, max(lateral_error[0], lateral_error[1])
     west, east = min(a[0], b[0]) - max_lateral_error, max(a[0], b[0]) + max_lateral_error
     south, north = min(a[1], b[1]) - max_lateral_error, max(a[1], b[1]) + max_lateral_error
@@ -256,7 +256,7 @@ def measure_zone_margin(
     for z in range(zones.required.shape[0]):
         required, zone = zones.required[z], records.zones[z]
         max_required = max(required.horizontal, required.vertical)
-        search_distance = max(max_required, min(margin.nearest, 1e9))
+        search_distance = max(max_required, min(max(margin.nearest, max_required + margin.excess), 1e9))
         if zone.exclusion and box_distance(records, z, west, east, south, north) >= search_distance:
             continue
         uses_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -293,17 +293,17 @@ def measure_zone_margin(
 @inner
 def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
     """Update the record with the distances of a piece of the path from zone z."""
-    is_satisfied = horizontal >= required.horizontal or vertical >= required.vertical
+    excess = max(horizontal - required.horizontal, vertical - required.vertical)
     if not zone.exclusion:
-        is_satisfied = horizontal >= required.horizontal and -vertical >= required.vertical
+        excess = min(horizontal - required.horizontal, -vertical - required.vertical)
     distance = _distance_to_violation(zone, horizontal, vertical)
     # A zone whose margin is violated takes precedence over a nearer one.
-    if margin.satisfied != is_satisfied:
-        if not is_satisfied:
+    if (margin.excess >= 0.0) != (excess >= 0.0):
+        if excess < 0.0:
             margin.zone = z
     elif distance < margin.nearest or margin.zone < 0:
         margin.zone = z
-    margin.satisfied = margin.satisfied and is_satisfied
+    margin.excess = min(margin.excess, excess)
     margin.nearest = min(margin.nearest, distance)
 
 

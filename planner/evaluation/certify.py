@@ -7,6 +7,7 @@ the legs. Compiled measurements are in `planner.evaluation.certify_kernels`.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from aircraft.tracking import zero_tracking_error
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_pieces
 from planner.evaluation.certify_kernels import (
+    corner_excursions,
     heights_above_ground,
     leg_slope_limits,
     missile_distance,
@@ -23,7 +25,7 @@ from planner.evaluation.certify_kernels import (
 )
 from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
-from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, ProblemArrays
+from planner.evaluation.problem import Problem, ProblemArrays
 from planner.plan import Certificate, path_digest
 from world.arrays import Floats
 from world.geometry import leg_runs, leg_slopes, turning_angles
@@ -44,7 +46,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     problems: list[str] = []
     turn = _turn_margin(data, waypoints, problems)
     available_length = _leg_length_margin(data, waypoints, problems)
-    slope = float(min(_arc_slope_margin(data, waypoints, problems), _leg_slope_margin(data, waypoints, problems)))
+    slope = min(_arc_slope_margin(data, waypoints, problems), _leg_slope_margin(data, waypoints, problems))
     clearance = _clearance_margin(data, waypoints, problems)
     bounds = _bounds_margin(data, waypoints, problems)
     distance = kill_distance(data, waypoints)
@@ -52,7 +54,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     return Certificate(
         turn,
         available_length,
-        slope,
+        _without_rounding(float(slope)),
         clearance,
         bounds,
         distance,
@@ -98,56 +100,57 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
     return [f"{place}: {problem}" + (f" (also {other_places}{remainder})" if others else "")]
 
 
+def _without_rounding(margin: float) -> float:
+    """Return a margin, or 0 for one that is negative only by rounding, so that a margin below 0 is a problem."""
+    return 0.0 if -_EPSILON <= margin < 0.0 else margin
+
+
 def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest margin of a turn to its limit, rad; append too sharp turns to `problems`."""
-    max_turn = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN_RAD
-    required_margin = 0.0 if data.legs_hold_turns else ANGLE_MARGIN_RAD
-    margins = max_turn - turning_angles(with_end_course_points(data, waypoints))
-    max_turn_deg = math.degrees(max_turn - required_margin)
+    turns = turning_angles(with_end_course_points(data, waypoints))
     problems += _summarise_faults(
         [
             (
-                margin,
+                data.max_turn - turn,
                 f"waypoint {i}",
-                f"turns {math.degrees(max_turn - margin):.1f} deg, allowed {max_turn_deg:.1f} deg",
+                f"turns {math.degrees(turn):.1f} deg, allowed {math.degrees(data.max_turn):.1f} deg",
             )
-            for i, margin in enumerate(margins.tolist())
-            if margin < required_margin - _EPSILON
+            for i, turn in enumerate(turns.tolist())
+            if data.max_turn - turn < -_EPSILON
         ]
     )
-    return float(margins.min(initial=math.inf))
+    return _without_rounding(float((data.max_turn - turns).min(initial=math.inf)))
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest length that a leg has between its turns, m; append too short legs to `problems`.
-
-    The length is inf if legs need not be as long as their turns.
-    """
+    """Return the smallest margin of a leg's length to the required length, m; append too short legs to `problems`."""
+    runs = leg_runs(waypoints)
     problems += _summarise_faults(
         [
             (length, f"leg {i}", f"{length:.1f} m long, at least {MIN_CERTIFIED_LEG_M:g} m are required")
-            for i, length in enumerate(leg_runs(waypoints).tolist())
+            for i, length in enumerate(runs.tolist())
             if length < MIN_CERTIFIED_LEG_M
         ]
     )
-    min_margin = math.inf
-    faults: list[_Fault] = []
+    min_margin = float(runs.min()) - MIN_CERTIFIED_LEG_M
     if not data.legs_hold_turns:
         return min_margin
+    faults: list[_Fault] = []
     lengths = turn_and_roll_lengths(data, waypoints)
-    for i, (length, turns_length, roll_length) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
+    for i, (length, turns_length, roll_length) in enumerate(zip(runs.tolist(), *lengths, strict=True)):
         if turns_length == 0.0:
             continue
-        min_margin = min(min_margin, float(length - turns_length - roll_length))
-        settling_and_roll = settling_length(float(turns_length), float(length)) + roll_length
-        if turns_length + settling_and_roll > length + _EPSILON:
+        settling_and_roll = settling_length(float(turns_length), length) + float(roll_length)
+        margin = length - float(turns_length) - settling_and_roll
+        min_margin = min(min_margin, margin)
+        if margin < -_EPSILON:
             description = (
                 f"{length:.0f} m long, its turns need {turns_length:.0f} m and {settling_and_roll:.0f} m to settle"
                 " with a plan's margins for the autopilot's turns"
             )
-            faults.append((float(length - turns_length) - settling_and_roll, f"leg {i}", description))
+            faults.append((margin, f"leg {i}", description))
     problems += _summarise_faults(faults)
-    return min_margin
+    return _without_rounding(min_margin)
 
 
 def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -168,16 +171,18 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
             continue
         slope = math.atan(arc_slope(leg_tangents[i - 1], leg_tangents[i], tangents[i], radii[i]))
         level_start = np.array([0.0, 0.0, waypoints[i, 2]])
-        for start, end in ((i - 1, i), (i, i + 1)):
-            level_end = np.append((waypoints[end] - waypoints[start])[:2], waypoints[i, 2])
-            climb, dive = slope_limits(data, level_start, level_end)
-            margin = min(climb - slope, dive + slope)
-            min_margin = min(min_margin, margin + data.angle_margin)
-            if margin < -_EPSILON:
-                faults.append(
-                    (margin, f"turn at waypoint {i}", _slope_fault_text(data, slope, climb, dive, " along its arc"))
-                )
-                break
+        level_ends = [
+            np.append((waypoints[k + 1] - waypoints[k])[:2], waypoints[i, 2])
+            for k in (i - 1, i)  # the courses before and after the turn
+        ]
+        climbs, dives = zip(*(slope_limits(data, level_start, end) for end in level_ends), strict=True)
+        climb, dive = min(climbs), min(dives)
+        margin = min(climb - slope, dive + slope)
+        min_margin = min(min_margin, margin)
+        if margin < -_EPSILON:
+            faults.append(
+                (margin, f"turn at waypoint {i}", _slope_fault_text(data, slope, climb, dive, " along its arc"))
+            )
     problems += _summarise_faults(faults)
     return min_margin
 
@@ -189,7 +194,7 @@ def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     faults: list[_Fault] = []
     for i, (slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
         margin = min(climb - slope, dive + slope)
-        min_margin = min(min_margin, margin + data.angle_margin)
+        min_margin = min(min_margin, margin)
         if margin < -_EPSILON:
             faults.append((margin, f"leg {i}", _slope_fault_text(data, slope, climb, dive)))
     problems += _summarise_faults(faults)
@@ -209,50 +214,63 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height above the required clearance, m; append violations to `problems`.
+    """Return the smallest height above the required height, m; append violations to `problems`.
 
-    The height is NaN if the path leaves the terrain.
+    The required height above ground is the clearance and the buffer. The margin is NaN if the path leaves the terrain.
     """
-    min_margin = math.inf
-    min_margins: dict[str, float] = {}
-    for piece in heights_above_ground(data, waypoints):
-        margin = float(piece["height"]) - data.clearance
-        min_margin = math.nan if math.isnan(margin) or math.isnan(min_margin) else min(min_margin, margin)
-        if margin >= float(piece["buffer"]) - _EPSILON:
-            continue
+    pieces = heights_above_ground(data, waypoints)
+    margins = pieces["height"] - data.clearance - pieces["buffer"]
+    too_low: dict[str, _LowPlace] = {}
+    off_terrain: dict[str, None] = {}
+    for piece, margin in zip(pieces, margins.tolist(), strict=True):
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
-        if math.isnan(margin) or not min_margins.get(name, math.inf) <= margin:
-            min_margins[name] = margin
+        if math.isnan(margin):
+            off_terrain[name] = None
+        elif margin < -_EPSILON:
+            known = too_low.get(name, _LowPlace(math.inf, math.inf))
+            too_low[name] = _LowPlace(min(known.margin, margin), min(known.height, float(piece["height"])))
     required_text = f"{data.clearance:g} m and {data.buffer:.1f} m of margin required"
-    off_terrain = [(0.0, name, "leaves the terrain data") for name, margin in min_margins.items() if math.isnan(margin)]
-    too_low = [
-        (margin, name, f"{margin + data.clearance:.1f} m above ground at its lowest, {required_text}")
-        for name, margin in min_margins.items()
-        if not math.isnan(margin)
-    ]
-    problems += [*_summarise_faults(off_terrain), *_summarise_faults(too_low)]
-    return min_margin
+    problems += _summarise_faults([(0.0, name, "leaves the terrain data") for name in off_terrain])
+    problems += _summarise_faults(
+        [
+            (place.margin, name, f"{place.height:.1f} m above ground at its lowest, {required_text}")
+            for name, place in too_low.items()
+            if name not in off_terrain
+        ]
+    )
+    return _without_rounding(float(margins.min()))
+
+
+class _LowPlace(NamedTuple):
+    """Smallest margin to the required height, and smallest height above ground, of a leg or a turn, m."""
+
+    margin: float
+    height: float
 
 
 def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m.
 
-    Violations are appended to `problems`.
+    From the edge of the map it is less by the autopilot's excursion at the corner. Violations are appended to
+    `problems`.
     """
     min_corner = np.array([data.west, data.south, data.floor])
     max_corner = np.array([data.east, data.north, data.ceiling])
-    margins = np.minimum(waypoints - min_corner, max_corner - waypoints).min(axis=1)
+    distances = np.minimum(waypoints - min_corner, max_corner - waypoints)
+    if data.tracking.has_error:
+        distances[:, :2] -= corner_excursions(data, waypoints)[:, None]
+    margins = distances.min(axis=1)
     problems += _summarise_faults(
         [
             (float(margins[i]), f"waypoint {i}", f"{-margins[i]:.1f} m outside the area, floor or ceiling")
             for i in np.nonzero(margins < -_EPSILON)[0]
         ]
     )
-    return float(margins.min())
+    return _without_rounding(float(margins.min()))
 
 
 def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Return the smallest distance to a zone, and the smallest headroom below the maximum height, m.
+    """Return the smallest margins to the required distance from a zone and to the maximum height, m.
 
     Both are inf if the scenario has neither zones nor a maximum height. Violations are appended to `problems`.
     """
@@ -260,17 +278,17 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
     if not is_limited(space):
         return math.inf, math.inf
     pieces = airspace_pieces(data, np.ascontiguousarray(waypoints))
-    headroom = float((space.max_height - pieces["height"]).min())
+    # The height of a piece off the terrain is NaN, which the clearance reports.
+    headroom = float(np.fmin.reduce(space.max_height - pieces["height"] - pieces["buffer"], initial=math.inf))
     zone_faults: dict[str, tuple[float, int]] = {}
     height_faults: dict[str, float] = {}
     for piece in pieces:
         name = f"turn at waypoint {piece['number']}" if piece["of_corner"] else f"leg {piece['number']}"
         zone_margin, piece_headroom = piece["zones"], float(space.max_height - piece["height"])
-        if not zone_margin["satisfied"]:
+        if zone_margin["excess"] < -_EPSILON:
             zone_faults[name] = min(
                 zone_faults.get(name, (math.inf, 0)), (float(zone_margin["nearest"]), int(zone_margin["zone"]))
             )
-        # NaN off the terrain is reported by the clearance.
         if piece_headroom < float(piece["buffer"]) - _EPSILON:
             height_faults[name] = min(height_faults.get(name, math.inf), piece_headroom)
     for zone in dict.fromkeys(z for _, z in zone_faults.values()):
@@ -292,7 +310,7 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
             for name, piece_headroom in height_faults.items()
         ]
     )
-    return float(pieces["zones"]["nearest"].min()), headroom
+    return _without_rounding(float(pieces["zones"]["excess"].min())), _without_rounding(headroom)
 
 
 def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:

@@ -246,6 +246,19 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
 
 
 @compiled
+def corner_excursions(data: ProblemArrays, waypoints: Floats) -> Floats:
+    """Return the largest distance of the flight from the legs at each waypoint, m, (w,)."""
+    count = waypoints.shape[0]
+    legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
+    measure_legs(waypoints, legs)
+    measure_corners(data, downwind_vector(data.aircraft), waypoints, legs, corners)
+    excursions = np.empty(count)
+    for i in range(count):
+        excursions[i] = corners[i].excursion
+    return excursions
+
+
+@compiled
 def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:
     """Return the maximum climb and dive angles of each leg, (w - 1,) rad each."""
     count = waypoints.shape[0] - 1

@@ -242,7 +242,8 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
     >>> from world.scenario import with_threats
-    >>> guarded = with_threats(load_scenario("hard-07"), [(5000.0, 5000.0, 8000.0, 0.0)], "threats")
+    >>> threat = {"east_m": 5000.0, "north_m": 5000.0, "kill_radius_m": 8000.0}
+    >>> guarded = with_threats(load_scenario("hard-07"), [threat], "threats")
     >>> path = np.stack([guarded.start, guarded.destination])
     >>> certificate = Certificate(0.1, np.inf, 0.1, 9.0, -50.0, -50.0, ())
     >>> found = np.array([0, 0, 1, 1]), np.zeros(4)

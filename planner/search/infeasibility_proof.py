@@ -47,7 +47,8 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario, with_threats
     >>> scenario = load_scenario("hard-07")
-    >>> guarded = with_threats(scenario, [(5000.0, 5000.0, 6000.0, 0.0)], "threats")
+    >>> threat = {"east_m": 5000.0, "north_m": 5000.0, "kill_radius_m": 6000.0}
+    >>> guarded = with_threats(scenario, [threat], "threats")
     >>> [is_closed(make_problem(one, load_airframe(one).limits).certified) for one in (scenario, guarded)]
     [False, True]
     """

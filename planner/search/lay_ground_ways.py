@@ -17,6 +17,7 @@ import numpy as np
 
 from aircraft.path_limits import Limits, aircraft_slopes
 from aircraft.tracking import SPEED_RATIOS
+from planner.airspace.zone_limits import ZoneMargins, make_airspace
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, make_problem
 from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
@@ -169,8 +170,8 @@ def add_departure_and_approach(
 class _Site:
     """Plan, and the problems with which its departure and approach are certified.
 
-    low_problem: problem of the parts below the required clearance; of its certificate only the distances from missiles
-    and zones are used.
+    low_problem: problem of the parts below the required clearance, without margins to zones; of its certificate only
+    the distances from missiles and zones are used.
     turn_radius: radius of the tightest turn, m.  turn_lengths: lengths that turns take of their legs.
     """
 
@@ -264,7 +265,8 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     # An inclusion with a floor begins above the field.
     zones = tuple(zone for zone in scenario.zones if zone.kind == "exclusion" or zone.floor is None)
     low_problem = make_problem(replace(scenario, zones=zones), algorithm_limits)
-    low_problem = replace(low_problem, certified=low_problem.certified._replace(clearance=-1e5))
+    edges = make_airspace(low_problem.scenario, ZoneMargins(0.0, 0.0, 1.0), 0.0)
+    low_problem = replace(low_problem, certified=low_problem.certified._replace(clearance=-1e5, airspace=edges))
     altitude = float(max(scenario.start[2], scenario.destination[2]))
     turn_radius = max(
         algorithm_limits.turn_radius(course, course + math.pi, altitude) for course in (0.0, 0.5 * math.pi)

@@ -54,7 +54,7 @@ def replan(
     >>> limits = load_airframe(scenario).limits
     >>> old = plan_path(scenario, limits, seed=1)
     >>> east, north, _ = old.waypoints[6]
-    >>> now = with_threats(scenario, [(east, north, 300.0, 0.0)], "threats")
+    >>> now = with_threats(scenario, [{"east_m": east, "north_m": north, "kill_radius_m": 300.0}], "threats")
     >>> new = replan(now, limits, old, 3, seed=1)
     >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
     (True, 3, True)

@@ -319,9 +319,9 @@ class Search:
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:
         """Return True if a path violates the slope limits and nothing else."""
-        other_margins = certificate.turn, certificate.clearance, certificate.bounds, certificate.zone_distance
-        keeps_distance = certificate.kill_distance >= self.required_distance and certificate.headroom >= 0.0
-        return certificate.slope < self.problem.certified.angle_margin and keeps_distance and min(other_margins) >= 0.0
+        keeps_distance = certificate.kill_distance >= self.required_distance
+        other_margins = replace(certificate, slope=0.0).margins
+        return certificate.slope < 0.0 and keeps_distance and all(margin >= 0.0 for margin in other_margins)
 
     def must_end(self) -> bool:
         """Return True if the search is stopped or its budget is exhausted, and record the reason."""

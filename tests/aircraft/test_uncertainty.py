@@ -32,6 +32,7 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
         battery_guessed=True,
         max_speed_sd=1.25,
         climb_guessed=True,
+        bank_guessed=True,
     )
     (tmp_path / "uncertainty.toml").write_text(uncertainty_text(known), encoding="utf-8")
     found = read_uncertainty(tmp_path)
@@ -41,6 +42,7 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
     assert found.quantities == (THRUST, LEVEL)
     assert found.battery_guessed
     assert found.climb_guessed
+    assert found.bank_guessed
     assert (found.power_sd, found.max_speed_sd) == (0.3, 1.25)
     assert read_uncertainty(tmp_path.parent) is None
 

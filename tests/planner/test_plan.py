@@ -125,6 +125,13 @@ def test_feasible_is_counted_and_continuous_and_safe_is_outside_missiles_too() -
     assert not made(certificate=failed).safe
 
 
+def test_the_last_margin_counts_what_no_other_measures() -> None:
+    assert made().margins == (0.1, 20.0, 0.2, 9.0, 10.0, 50.0, math.inf, math.inf, 0.0)
+    blocked = replace(CERTIFICATE, problems=("climb-out: no path", "landing: no path"))
+    assert made(certificate=blocked).margins[-1] == -2.0
+    assert made(violations=np.array([0, 1, 2, 0])).margins[-1] == -3.0
+
+
 def test_plans_are_equal_if_their_files_are() -> None:
     assert made() == made()
     moved = made(certificate=CERTIFICATE, violations=np.array([0, 1, 0, 0]))
@@ -245,7 +252,7 @@ def test_what_is_known_of_zones_and_height_comes_back_and_nothing_of_it_is_writt
 # ----------------------------------------------------------------------
 # A plan on a terminal's one line, and as a notebook shows it.
 
-GOOD_CERTIFICATE = Certificate(np.radians(5.0), np.inf, np.radians(1.25), 9.04, 10.0, 51.0, ())
+GOOD_CERTIFICATE = Certificate(np.radians(5.0), 84.2, np.radians(1.25), 9.04, 10.0, 51.0, ())
 
 
 @pytest.fixture(scope="module")
@@ -288,6 +295,7 @@ def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
     assert rows["length / straight line"] == "1.2500"
     assert rows["clearance to spare, at least"] == "9.0 m"
     assert rows["outside missiles' reach by at least"] == "51 m"
+    assert rows["lengths of legs to spare"] == "84 m"
     assert rows["turns and slopes to spare"] == "5.0°, 1.25°"
     assert rows["algorithm, seed"] == "umda, 7"
 

@@ -4,10 +4,14 @@ import fcntl
 import os
 import stat
 import sys
+import tomllib
 import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from world import file_locks
 from world.errors import MissionError, PlanflyError, ScenarioError
@@ -19,6 +23,7 @@ from world.files import (
     read_small_file,
     read_toml,
     toml_table,
+    toml_text,
     utf8_text,
     write_atomically,
     write_folder,
@@ -86,6 +91,29 @@ def test_a_path_that_leads_nowhere_is_whole_anyhow(name: str, tmp_path: Path) ->
     (tmp_path / "link").symlink_to(tmp_path / "there")
     assert absolute_path(tmp_path / name) == str(tmp_path / name)
     assert absolute_path(tmp_path / "link") == str(tmp_path / "there")
+
+
+_TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
+_VALUES = st.one_of(
+    _TEXTS,
+    st.booleans(),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.lists(st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=2), max_size=2),
+)
+_TABLES = st.recursive(
+    st.dictionaries(_TEXTS, _VALUES, max_size=4),
+    lambda tables: st.dictionaries(
+        _TEXTS, st.one_of(_VALUES, tables, st.lists(tables, min_size=1, max_size=3)), max_size=4
+    ),
+    max_leaves=8,
+)
+
+
+@given(_TABLES)
+def test_the_text_of_a_table_is_read_as_this_table(table: dict[str, Any]) -> None:
+    """By Python's own parser of TOML, with any texts as keys and values."""
+    assert tomllib.loads(toml_text(table)) == table
 
 
 def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:

@@ -259,7 +259,9 @@ def test_other_entries_of_flight_and_planner(scenario: Scenario) -> None:
 
 
 def test_more_threats_stand_on_the_ground_with_the_scales_of_the_others(scenario: Scenario) -> None:
-    more = with_threats(scenario, [(500.0, -300.0, 250.0, 0.0), (0.0, 600.0, 0.0, 900.0)], "--threat")
+    missile = {"east_m": 500.0, "north_m": -300.0, "kill_radius_m": 250.0}
+    radar = {"east_m": 0.0, "north_m": 600.0, "detection_radius_m": 900.0}
+    more = with_threats(scenario, [missile, radar], "--threat")
     assert more.threats.names[-2:] == ("pop-up 1", "pop-up 2")
     assert more.terrain is not None
     for place in more.threats.position[-2:]:
@@ -269,7 +271,14 @@ def test_more_threats_stand_on_the_ground_with_the_scales_of_the_others(scenario
     assert more.threats.detection_scale[-2:].tolist() == pytest.approx([0.0, 1800.0])
     assert same_scenario(scenario_from_spec(more.to_json(), "again"), more)
     with pytest.raises(ScenarioError, match=r"--threat: kill_radius_m: -5\.0: allowed above 0"):
-        with_threats(scenario, [(0.0, 0.0, -5.0, 0.0)], "--threat")
+        with_threats(scenario, [missile | {"kill_radius_m": -5.0}], "--threat")
+    with pytest.raises(ScenarioError, match=r"^--threat: east 400000 m, north -300 m: outside the terrain data"):
+        with_threats(scenario, [missile | {"east_m": 400_000.0}], "--threat")
+    # A name, a scale and a height of its own are kept.
+    tall = missile | {"name": "S-1", "kill_scale_m": 10.0, "height_m": 30.0}
+    threats = with_threats(scenario, [tall], "--threat").threats
+    assert (threats.names[-1], float(threats.kill_scale[-1])) == ("S-1", 10.0)
+    assert threats.position[-1, 2] == pytest.approx(more.threats.position[-2, 2] + 30.0)
 
 
 def test_ends_keep_their_heights_above_the_sea_whatever_is_below() -> None:

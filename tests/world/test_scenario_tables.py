@@ -220,7 +220,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     ),
     "no height": ("amsl_m = 400", "", "start: amsl_m: missing; give amsl_m or height_m"),
     "two heights": ("amsl_m = 400", "amsl_m = 400\nheight_m = 9", "start: height_m: give amsl_m or height_m, not both"),
-    "half a position": ("east_m = -4000", "", "start: position: give east_m and north_m, or lat_deg and lon_deg"),
+    "half a position": ("east_m = -4000", "", "start: east_m: missing; a position needs east_m and north_m"),
     "two positions": ("east_m = -4000", "east_m = -4000\nlat_deg = 46\nlon_deg = 8", "start: position: give"),
     "latitude": ("", "[origin]\nlat_deg = 91\nlon_deg = 8", "origin.lat_deg: 91: allowed -89..89"),
     "missing longitude": ("", "[origin]\nlat_deg = 46", "origin.lon_deg: Field required"),

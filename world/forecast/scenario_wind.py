@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,10 @@ from world.wind import Wind
 if TYPE_CHECKING:
     from world.scenario_tables import WindTable
 
+# Height above the highest ground up to which the mean profile of a mission's wind is fitted, m.
+_CLEARANCE_M = 150.0
+# Greatest height above the start of ground that counts for this, m.
+_MAX_CLIMB_M = 2000.0
 # Distance below the lowest level within which the lowest level's wind applies, m.
 MAX_DEPTH_BELOW_LEVELS_M = 100.0
 # Distance around a forecast of a single place within which it applies, m: half a cell of a global model.
@@ -61,13 +65,25 @@ def scenario_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, sta
     return read_forecast(Path(str(table.forecast)), map_box(origin, bounds), start_ground)
 
 
+class ForecastSite(NamedTuple):
+    """Place of a mission in a forecast.
+
+    origin: of the map.
+    ends: start and destination of the mission, (3,) east, north and up, m.
+    max_ground: highest ground of the map, m AMSL; -inf without terrain.
+    """
+
+    origin: GeoOrigin
+    ends: tuple[Floats, Floats]
+    max_ground: float
+
+
 def forecast_wind(
-    table: "WindTable", forecast: Forecast, at: str, origin: GeoOrigin, ends: tuple[Floats, Floats], member: int = 0
+    table: "WindTable", forecast: Forecast, at: str, site: ForecastSite, member: int
 ) -> tuple[Wind, "WindTable"]:
     """Return the wind of a flight in a forecast, and the [wind] table with the wind's mean profile.
 
     at: time of flight, whose start is the take-off.
-    ends: start and destination of the mission, (3,) east, north and up, m.
     member: member of the ensemble.
 
     Raises ForecastError if the take-off is outside the forecast's times, an end of the mission outside its box or its
@@ -81,14 +97,17 @@ def forecast_wind(
             f"take-off {departure:%Y-%m-%d %H:%M} UTC",
             f"the forecast covers {forecast.first_time:%Y-%m-%d %H:%M} to {forecast.last_time:%Y-%m-%d %H:%M} UTC",
         )
-    latitudes, longitudes = to_geo(origin, [point[0] for point in ends], [point[1] for point in ends])
-    altitudes = np.array([float(point[2]) for point in ends])
+    latitudes, longitudes = to_geo(site.origin, [point[0] for point in site.ends], [point[1] for point in site.ends])
+    altitudes = np.array([float(point[2]) for point in site.ends])
     reference = float(altitudes[0])
     field = without_high_levels(forecast.field_from(departure, member), reference)
     if field.packed().size > MAX_FIELD_NUMBERS:
         shown = f"{field.packed().size:,} numbers for a flight"
         raise ForecastError.at(file, "nodes", shown, f"allowed {MAX_FIELD_NUMBERS:,}: make its area smaller")
-    profile = fit_mean_profile(field, 0.0, float(latitudes[0]), float(longitudes[0]), reference)
+    # A mission flies from its lower end to somewhat above the highest ground.
+    highest = max(float(altitudes.max()), min(site.max_ground, reference + _MAX_CLIMB_M)) + _CLEARANCE_M
+    place = float(latitudes[0]), float(longitudes[0])
+    profile = fit_mean_profile(field, 0.0, *place, reference, (float(altitudes.min()), highest))
     if profile.speed > _MAX_MEAN_WIND_MPS:
         raise ForecastError.at(
             file,

@@ -8,7 +8,7 @@ axis, and below the lowest and above the highest level, the value at that node o
 import bisect
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -237,8 +237,10 @@ def _interpolate_points(
 # ----------------------------------------------------------------------
 # The mean profile of a field: what the planner and the limits of the verdict are computed with.
 
-# Heights above the reference altitude to which the mean profile is fitted, m.
-_PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
+# Heights above the start of a return to which the mean profile around it is fitted, m.
+PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
+# Number of altitudes of a mission to which its mean profile is fitted.
+_PROFILE_POINTS = 9
 # Levels above this height over the reference altitude are left out, except the lowest of them, m: all altitudes of a
 # scenario are between -500 and 9,000 m AMSL.
 _MAX_HEIGHT_M = 9500.0
@@ -280,27 +282,47 @@ def without_high_levels(field: WindField, reference_amsl: float) -> WindField:
     )
 
 
-def fit_mean_profile(
-    field: WindField, seconds: float, latitude: float, longitude: float, reference_amsl: float
-) -> MeanProfile:
-    """Return the mean profile of a field at a time (s) and place (deg), around the reference altitude (m AMSL).
+def fit_profile_line(heights: Floats, samples: Floats) -> MeanProfile:
+    """Return the mean profile through winds at heights above the reference altitude.
 
-    Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.  The gradient is limited so that the speed is at least
-    0 at all nodes.
+    heights: (h,) m.
+    samples: (h, 2) m/s, east and north.
+
+    Each component is a least-squares line over height. Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.
     """
-    altitudes = reference_amsl + _PROFILE_HEIGHTS_M
-    ones = np.ones(altitudes.size)
-    samples = field.velocities_at(seconds * ones, latitude * ones, longitude * ones, altitudes)
-    # Least-squares line of each component over height: its value at the reference altitude, and its slope.
-    slopes = _PROFILE_HEIGHTS_M - _PROFILE_HEIGHTS_M.mean()
-    slope = slopes @ samples / (slopes @ slopes)
-    east, north = samples.mean(axis=0) - _PROFILE_HEIGHTS_M.mean() * slope
+    offsets = heights - heights.mean()
+    slope = offsets @ samples / (offsets @ offsets)
+    east, north = samples.mean(axis=0) - heights.mean() * slope
     speed = round(math.hypot(east, north), 5)
     if speed == 0.0:
         return MeanProfile(0.0, 0.0, 0.0)
     from_course = math.radians(round(math.degrees(math.atan2(-east, -north)) % 360.0, 5) % 360.0)
     gradient = -(slope[0] * math.sin(from_course) + slope[1] * math.cos(from_course))
-    return MeanProfile(speed, from_course, limit_gradient(gradient, speed, field.altitudes - reference_amsl))
+    return MeanProfile(speed, from_course, round(min(_MAX_GRADIENT, max(-_MAX_GRADIENT, float(gradient))), 9))
+
+
+def fit_mean_profile(
+    field: WindField,
+    seconds: float,
+    latitude: float,
+    longitude: float,
+    reference_amsl: float,
+    altitudes: tuple[float, float],
+) -> MeanProfile:
+    """Return the mean profile of a field at a time (s) and place (deg).
+
+    reference_amsl: altitude of the profile's speed, m AMSL.
+    altitudes: lowest and highest altitude of the mission, between which the profile is fitted, m AMSL.
+
+    The gradient is limited so that the speed is at least 0 at all nodes: the flight adds the deviation of the field
+    from the profile, and the speed of a profile is never below 0.
+    """
+    points = np.linspace(*altitudes, _PROFILE_POINTS)
+    ones = np.ones(points.size)
+    samples = field.velocities_at(seconds * ones, latitude * ones, longitude * ones, points)
+    profile = fit_profile_line(points - reference_amsl, samples)
+    gradient = limit_gradient(profile.gradient, profile.speed, field.altitudes - reference_amsl)
+    return replace(profile, gradient=gradient)
 
 
 def limit_gradient(gradient: float, speed: float, heights: Floats) -> float:

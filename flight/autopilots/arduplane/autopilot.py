@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
-from flight.autopilots.arduplane.failsafes import battery_failsafes
+from flight.autopilots.arduplane.failsafes import battery_failsafes, failsafe_causes, link_loss_reactions
 from flight.autopilots.arduplane.ground_law import (
     ARDUPLANE_GROUND,
     IN_AIR,
@@ -22,12 +22,18 @@ from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_loop, arduplane_tick
 from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
 from flight.autopilots.arduplane.open_settings import describe_open_settings
-from flight.autopilots.arduplane.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, ArduPilotParameters
+from flight.autopilots.arduplane.parameters import (
+    CLIMB_BEFORE_TURN,
+    HEIGHT_CANDIDATES,
+    SIDE_CANDIDATES,
+    ArduPilotParameters,
+)
 from flight.autopilots.arduplane.releases import choose_release, release_note, simulated_release
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parts import (
+    Cause,
     ControlLaw,
     Deviations,
     GroundRules,
@@ -35,6 +41,8 @@ from flight.autopilots.parts import (
     MissionChecks,
     MissionParts,
     ReturnBehaviour,
+    ReturnMission,
+    ReturnTrials,
     RtlSettings,
     SpeedLimits,
     SpeedRules,
@@ -42,12 +50,17 @@ from flight.autopilots.parts import (
 )
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.ground_ways import Approach, GroundPhases, TakeOff
+from flight.mission.items import LANDINGS, Command
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
-from flight.mission.return_path import ReturnRules
+from flight.mission.return_path import LandingStart, ReturnCircle, ReturnRules, ReturnTarget
 from world.arrays import Floats
-from world.kernels import Record
+from world.kernels import Record, Records
 from world.scenario_tables import ArduPlaneVersion, FlightTable
+
+if TYPE_CHECKING:
+    from flight.autopilots.point_mass import PointMass
+    from flight.autopilots.simulated_returns import ReturnEnvironment, SimulatedReturns
 
 # Fields of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` that belong to the current leg or mission, not to the
 # aircraft.
@@ -85,6 +98,8 @@ _NEUTRAL = {
     "Q_ENABLE": 0.0,
     "RUDDER_ONLY": 0.0,
 }
+# Values of RTL_CLIMB_MIN that are tried to make RTLs safe, m.
+_TRIED_CLIMBS_M = (20.0, 50.0, 100.0, 200.0)
 # Bit of FENCE_OPTIONS: a position inside any inclusion is inside the fence (`AC_PolyFence_loader::breached`).
 _UNION_OF_INCLUSIONS_BIT = 1 << 1
 
@@ -275,7 +290,74 @@ class ArduPlane(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour in an RTL from the parameters."""
-        return ReturnBehaviour(self._return_rules, self._rtl_parameters)
+        return ReturnBehaviour(
+            self._return_rules,
+            self._rtl_parameters,
+            after_link_loss=partial(link_loss_reactions, self.parameters),
+            fly=self._fly_returns,
+            flies_without_engine=True,
+            causes=self._failsafe_causes,
+            unsimulated_text=self._unsimulated_return_text,
+            unjudged_texts=self._unjudged_return_texts,
+            trials=self._return_trials,
+        )
+
+    def _fly_returns(
+        self,
+        starts: Records,
+        targets: Sequence[ReturnTarget],
+        aircraft: "PointMass",
+        environment: "ReturnEnvironment",
+        *,
+        store_positions: bool = False,
+        abort_limits: tuple[Floats, Floats] | None = None,
+        engine_out: bool = False,
+    ) -> "SimulatedReturns":
+        """Simulate RTLs; see `flight.autopilots.parts.FlyReturns`."""
+        # Imported here: only simulated RTLs need the trims of JSBSim.
+        from flight.autopilots.arduplane.rtl_point_mass import fly_returns
+
+        radius = self._return_rules.radius
+        return fly_returns(
+            starts,
+            [
+                None if target.straight else ReturnCircle(*target.position, radius, target.slope_base)
+                for target in targets
+            ],
+            self.parameters,
+            aircraft,
+            environment,
+            landings=[_simulated_landing(target, engine_out=engine_out) for target in targets],
+            store_positions=store_positions,
+            abort_limits=abort_limits,
+            engine_out=engine_out,
+        )
+
+    def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
+        """Return the events that can end a mission in AUTO, with ArduPlane's reaction to each."""
+        return failsafe_causes(
+            self.parameters,
+            has_fence=mission.has_fence,
+            has_landing=bool(mission.landings),
+            ends_landed=not mission.commands.isdisjoint(LANDINGS),
+        )
+
+    def _unsimulated_return_text(self, mission: ReturnMission) -> str:
+        """Return "terrain" if RTLs follow the terrain, otherwise ""."""
+        return "terrain" if self.parameters.rtl_follows_terrain else ""
+
+    def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
+        """Return ("return path",) if RTL_AUTOLAND 4 follows a mission's return path, otherwise ()."""
+        has_path = not mission.commands.isdisjoint((Command.DO_RETURN_PATH_START, Command.DO_LAND_START))
+        return ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
+
+    @property
+    def _return_trials(self) -> ReturnTrials:
+        """Heights of RTL_ALTITUDE, and climbs before the turn by RTL_CLIMB_MIN or FLIGHT_OPTIONS."""
+        options = float(int(self.parameters.flight_options) | CLIMB_BEFORE_TURN)
+        climbs = [{"RTL_CLIMB_MIN": climb} for climb in _TRIED_CLIMBS_M]
+        altitude = {"RTL_ALTITUDE": max(0.0, self.parameters.rtl_altitude)}
+        return ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb")
 
     def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
         """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX that a scenario's RTL settings require.
@@ -539,6 +621,18 @@ def read_loiter_radius(loiter: Loiter) -> float:
     if not (loiter.endless or loiter.to_altitude) and stated_radius > _MAX_BYTE_RADIUS_M:
         stated_radius = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated_radius / 10.0))
     return stated_radius if stated_radius > _MAX_IGNORED_RADIUS_M else 0.0
+
+
+def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStart | None:
+    """Return the landing sequence that a simulated RTL joins after its loiter, or flies straight to; None without one.
+
+    A landing is not simulated: an RTL whose landing sequence begins with the landing ends at its loiter.  Without an
+    engine an RTL ends at its loiter, or at the start of the sequence.
+    """
+    landing = target.landing
+    if engine_out:
+        return landing._replace(next_stops=()) if landing and target.straight else None
+    return landing if landing and not landing.is_landing else None
 
 
 def _radius_growth(up: float) -> float:

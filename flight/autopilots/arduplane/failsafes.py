@@ -4,48 +4,11 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
 """
 
-from typing import Literal, NamedTuple
+import math
 
 from flight.autopilots.arduplane.parameters import OTHER_BATTERY_MONITORS, ArduPilotParameters
-from flight.autopilots.parts import BatteryFailsafe
-
-# Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or RTL
-# without that mode; "on": continue the mission; "landed": none, because the aircraft is on the ground; "never": none,
-# because nothing can trigger the cause; the other reactions do not lead home.
-FailsafeAction = Literal[
-    "return",
-    "land",
-    "autoland",
-    "on",
-    "circle",
-    "glide",
-    "parachute",
-    "terminate",
-    "level",
-    "guided",
-    "landed",
-    "never",
-]
-
-
-class Cause(NamedTuple):
-    """An event that can end the mission, and ArduPlane's reaction.
-
-    name: name of the event in messages.
-    action: ArduPlane's reaction.
-    parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
-    """
-
-    name: str
-    action: FailsafeAction
-    parameter: str = ""
-    value: int = 0
-
-    @property
-    def is_return(self) -> bool:
-        """True if the reaction is an RTL; a landing is not an RTL."""
-        return self.action == "return"
-
+from flight.autopilots.parts import BatteryFailsafe, Cause, FailsafeAction, LinkLossReaction
+from world.scenario_tables import LinkUse
 
 _LONG_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
 # FBWA without a pilot: wings level, nose level, throttle at its minimum.
@@ -63,6 +26,8 @@ _BATTERY_FAILSAFE: dict[int, FailsafeAction] = {
 }
 # Values of BATT_MONITOR that measure only the voltage: an analog monitor, and the Bebop's monitor (`has_current`).
 _MONITORS_WITHOUT_CURRENT = (3, 6)
+# FS_SHORT_ACTN that starts no short failsafe.
+_NO_SHORT_FAILSAFE = 3
 _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
 
 
@@ -86,25 +51,12 @@ def failsafe_causes(
     battery low BATT_FS_LOW_ACT 1 return
     battery critical BATT_FS_CRT_ACT 0 on
     """
-    long_action = int(parameters.long_failsafe)
-    causes = [Cause("the pilot's RTL", "return"), Cause("the mission's end", "landed" if ends_landed else "return")]
-    short_action = int(parameters.short_failsafe)
-    # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
-    detects_loss = parameters.throttle_failsafe == 1.0
-    leaves_auto = _SHORT_FAILSAFE.get(short_action, "on") != "on" and detects_loss
-    if leaves_auto:
-        causes.append(Cause("RC lost for 1.5 s", _SHORT_FAILSAFE[short_action], "FS_SHORT_ACTN", short_action))
-    if leaves_auto and long_action == 0:
-        # After the short failsafe ArduPlane is no longer in AUTO; in any other mode FS_LONG_ACTN 0 is an RTL.
-        causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short_action))
-    elif detects_loss:
-        causes.append(Cause("RC lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action))
-    else:
-        causes.append(Cause("RC lost", "on", "THR_FAILSAFE", int(parameters.throttle_failsafe)))
-    if parameters.station_failsafe > 0.0:
-        causes.append(Cause("station lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action))
-    else:
-        causes.append(Cause("station lost", "on", "FS_GCS_ENABL", 0))
+    causes = [
+        Cause("the pilot's RTL", "return"),
+        Cause("the mission's end", "landed" if ends_landed else "return"),
+        *_remote_control_causes(parameters),
+        _station_cause(parameters),
+    ]
     causes += _battery_causes(parameters, has_landing=has_landing)
     if has_fence:
         action = int(parameters.fence_action)
@@ -113,6 +65,65 @@ def failsafe_causes(
         else:
             causes.append(Cause("fence broken", "on", "FENCE_ENABLE", 0))
     return tuple(causes)
+
+
+def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
+    """Return the short failsafe of a lost remote control if it leaves AUTO, and the long failsafe."""
+    long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
+    # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
+    if parameters.throttle_failsafe != 1.0:
+        return [Cause("RC lost", "on", "THR_FAILSAFE", int(parameters.throttle_failsafe))]
+    long_failsafe = Cause("RC lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action)
+    if _SHORT_FAILSAFE.get(short_action, "on") == "on":
+        return [long_failsafe]
+    short_name = f"RC lost for {parameters['FS_SHORT_TIMEOUT']:g} s"
+    short_failsafe = Cause(short_name, _SHORT_FAILSAFE[short_action], "FS_SHORT_ACTN", short_action)
+    if long_action == 0:
+        # After the short failsafe ArduPlane is no longer in AUTO; in any other mode FS_LONG_ACTN 0 is an RTL.
+        long_failsafe = Cause("RC lost", "return", "FS_SHORT_ACTN", short_action)
+    return [short_failsafe, long_failsafe]
+
+
+def _station_cause(parameters: ArduPilotParameters) -> Cause:
+    """Return the failsafe of a lost ground station."""
+    if parameters.station_failsafe <= 0.0:
+        return Cause("station lost", "on", "FS_GCS_ENABL", 0)
+    long_action = int(parameters.long_failsafe)
+    return Cause("station lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action)
+
+
+def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[LinkLossReaction, ...]:
+    """Return the reactions to the loss of a radio link in AUTO, outside a landing sequence, in order of time.
+
+    use: "telemetry" for the ground station's heartbeats, "control" for the remote control.
+
+    FS_LONG_TIMEOUT counts from the station's last heartbeat (`Plane::check_long_failsafe`).  For the remote control it
+    counts from the short failsafe, which begins FS_SHORT_TIMEOUT after the loss (`check_short_rc_failsafe`), even if it
+    changes nothing in AUTO.
+
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> made = ArduPilotParameters.defaults().changed(FS_SHORT_ACTN=1, FS_LONG_ACTN=1, FS_LONG_TIMEOUT=20)
+    >>> [(reaction.action, reaction.delay) for reaction in link_loss_reactions(made, "control")]
+    [('circle', 1.5), ('return', 21.5)]
+    >>> link_loss_reactions(made, "telemetry")
+    (LinkLossReaction(action='on', delay=inf, parameter='FS_GCS_ENABL', value=0),)
+    """
+    long_delay = parameters["FS_LONG_TIMEOUT"]
+    if use == "telemetry":
+        causes, delays = [_station_cause(parameters)], [long_delay]
+    else:
+        short_delay = parameters["FS_SHORT_TIMEOUT"]
+        if int(parameters.short_failsafe) != _NO_SHORT_FAILSAFE:
+            long_delay += short_delay
+        causes = _remote_control_causes(parameters)
+        delays = [short_delay, long_delay][-len(causes) :]
+    reactions = [
+        LinkLossReaction(cause.action, delay, cause.parameter, cause.value)
+        for cause, delay in zip(causes, delays, strict=True)
+        if cause.action != "on"
+    ]
+    last = causes[-1]
+    return tuple(reactions) or (LinkLossReaction("on", math.inf, last.parameter, last.value),)
 
 
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:

@@ -17,18 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass
 from flight.autopilots.arduplane.rtl_point_mass import (
     CLIMB,
-    RETURN_RESULT,
-    RETURN_START,
-    ReturnEnvironment,
     fill_stage,
     fly_stages,
     rtl_timeout,
     truncate_at_first_loiter,
     waypoint_ahead,
 )
+from flight.autopilots.point_mass import PointMass
+from flight.autopilots.simulated_returns import RETURN_RESULT, RETURN_START, ReturnEnvironment
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.return_path import LandingStart, nearest_landing_sequence
 from world.arrays import Floats
@@ -40,7 +38,7 @@ from world.wind import mean_wind_speed
 class GoArounds:
     """Simulated go-arounds.
 
-    results: outcomes, (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
+    results: outcomes, (n,) of dtype `flight.autopilots.simulated_returns.RETURN_RESULT`.
     tracks: n arrays (t, 3) of positions at intervals of 1 s, m.
     landings: the landing sequence that each go-around joins, n in all.
     """
@@ -99,7 +97,7 @@ def fly_go_arounds(
 ) -> GoArounds:
     """Simulate n go-arounds, each from a start on a landing glide to the end of a landing sequence.
 
-    starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
     end_altitude: altitude above which the climb ends, m AMSL.
     pitch: pitch angle during the climb, rad.
     landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  If the
@@ -107,8 +105,8 @@ def fly_go_arounds(
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> from flight.autopilots.arduplane.point_mass import make_point_mass
-    >>> from flight.autopilots.arduplane.rtl_point_mass import make_return_environment
+    >>> from flight.autopilots.point_mass import make_point_mass
+    >>> from flight.autopilots.simulated_returns import make_return_environment
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
     >>> from world.wind import Wind

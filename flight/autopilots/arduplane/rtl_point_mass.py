@@ -1,7 +1,7 @@
 """Simulate an RTL with a point mass in about 2 ms, at least 100 times faster than JSBSim.
 
 The control law is the compiled code of `flight.autopilots.arduplane.law`: L1 to the target, the slope or the climb, and
-TECS with its limits.  It controls a `flight.autopilots.arduplane.point_mass.PointMass`, whose bank and pitch follow
+TECS with its limits.  It controls a `flight.autopilots.point_mass.PointMass`, whose bank and pitch follow
 their demands with the lags of ArduPlane's controllers.  The minimum clearance is within 7 m of the minimum clearances
 of 38 flights of ArduPlane (`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
 
@@ -13,7 +13,6 @@ onto its slope where it meets the slope.  Fourteen such flights of ArduPlane are
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,37 +27,46 @@ from flight.autopilots.arduplane.law import (
 )
 from flight.autopilots.arduplane.navigator import LANDING_JOIN_ALTITUDE_TOLERANCE_M, is_past_finish_line, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass, advance_point_mass, angle_of_attack, excess_power
 from flight.autopilots.arduplane.tecs import (
     airspeed_target,
     limited_nav_roll,
     update_tecs,
     wind_up_ste_integrator,
 )
+from flight.autopilots.point_mass import PointMass, advance_point_mass, angle_of_attack, excess_power
+from flight.autopilots.return_steps import (
+    LOITER_PROGRESS,
+    PATH_LAG_S,
+    advance_loiter,
+    initialise_outcome,
+    initialise_state,
+    simulate_each,
+    steady_throttle,
+    store_position,
+    update_clearances,
+)
+from flight.autopilots.simulated_returns import (
+    ENGINE_FAILURE_REACTION_S,
+    LOITER_CAPTURE_RADIUS_M,
+    RETURN_ABORTED,
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    RETURN_TIMEOUT,
+    TIMEOUT_BASE_S,
+    TIMEOUT_RATIO,
+    ReturnEnvironment,
+    SimulatedReturns,
+)
 from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
-from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import LandingStart, ReturnCircle
-from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
+from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII
 from world.arrays import Floats, Heights
-from world.frames import POLYMAP, PolyMapRecord
+from world.frames import PolyMapRecord
 from world.geometry import wrap
-from world.kernels import Record, Records, compiled, inner, read_only, record_dtype
-from world.scenario import Scenario
-from world.terrain import ground_height
-from world.wind import mean_wind_speed
-
-# Progress around the RTL loiter since the aircraft captured it at the target altitude.
-_LOITER_PROGRESS = record_dtype(
-    "seconds",  # s since the capture
-    "turned",  # rad flown around the center since then, positive to the right
-    "bearing",  # rad, bearing from the center, at the last tick
-)
-
-# Start of an RTL: position in map axes, m; velocity over the ground, m/s; bank, rad.
-RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
+from world.kernels import Record, Records, compiled, inner, record_dtype
 
 # Climb at the start of a flight, as in a go-around.
 CLIMB = record_dtype(
@@ -69,94 +77,12 @@ CLIMB = record_dtype(
 )
 NO_CLIMB: Record = np.zeros(1, CLIMB)[0]
 
-# End of an RTL: it reached its landing sequence, or flew its loiter at the target altitude once around and for
-# `flight.mission.itinerary.ENDLESS_LOITER_TIME_S` s.
-RETURN_ARRIVED = 1
-# End of an RTL: it hit the ground.
-RETURN_GROUND_IMPACT = 2
-# End of an RTL: it left the elevation data.
-RETURN_OFF_TERRAIN = 3
-# End of an RTL: it timed out.
-RETURN_TIMEOUT = 4
-# End of an RTL: it fell below the minimum clearance or distance that the caller demands.
-RETURN_ABORTED = 5
-# Outcome of one simulated RTL.  Times in s since the start; heights above ground and distances outside spheres in m.
-RETURN_RESULT = record_dtype(
-    ("outcome", np.int64),  # `RETURN_ARRIVED` ... `RETURN_ABORTED`
-    "end_time",
-    "arrival_time",  # of the arrival within `LOITER_CAPTURE_RADIUS_M` of the target; NaN without an arrival
-    "arrival_altitude",  # m AMSL, at the arrival
-    "clearance",  # minimum height above ground; after ground contact down to -`MAX_IMPACT_DEPTH_M`
-    "clearance_time",  # of that minimum, or of the first ground contact
-    "clearance_east",
-    "clearance_north",
-    "clearance_up",
-    "clearance_before_arrival",  # minimum height above ground before the arrival
-    "sphere_distance",  # minimum distance outside the kill spheres
-    ("threat", np.int64),  # index of the sphere at that distance; -1 without spheres
-    "threat_time",
-    "distance_before_arrival",  # minimum distance outside the kill spheres before the arrival
-    "energy",  # Wh, NaN if the envelope has no power data
-    ("position_count", np.int64),  # number of stored positions
-)
-# An RTL has arrived at its loiter within this distance of its target (m), or within
-# `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of its radii.  Flights of ArduPlane were compared up to there.
-LOITER_CAPTURE_RADIUS_M = 200.0
-# Depth below the ground to which an RTL that hits the ground is continued, m: this shows by how much it is too low, and
-# whether an RTL that barely hits the ground would hit again.
-MAX_IMPACT_DEPTH_M = 10.0
-# Interval between stored positions, ticks; 1 s.
-STORED_EVERY_TICKS = 10
-# Lag of the flight path behind the pitch, s: the time in which lift turns the velocity of a small aircraft.
-_PATH_LAG_S = 0.4
-# An RTL times out after this multiple of the nominal time for its distance and climb ...
-_TIMEOUT_RATIO = 3.0
-# ... plus this time, s.
-_TIMEOUT_BASE_S = 600.0
 # Bank above which an aircraft without thrust is treated as turning, rad.
 _TURN_BANK_RAD = math.radians(5.0)
 # Lag with which the airspeed settles in such a turn, s.
 _TURN_AIRSPEED_LAG_S = 8.0
-# Delay from engine failure to the turn back, s; the delay used in the ArduPlane reference flights.
-ENGINE_FAILURE_REACTION_S = 3.0
-
-
-@dataclass(frozen=True, slots=True)
-class ReturnEnvironment:
-    """Terrain and threats that an RTL can meet, for compiled code.
-
-    heights, to_pixel: altitudes of the terrain, and the map from position to pixel; all NaN without terrain.
-    spheres, radii: centers (m, 3) and radii (m,) of the kill spheres, m; a sphere with radius 0 is ignored.
-    known: True if the scenario has terrain.
-    """
-
-    heights: Heights
-    to_pixel: PolyMapRecord
-    spheres: Floats
-    radii: Floats
-    known: bool
-
-
-@dataclass(frozen=True, slots=True)
-class SimulatedReturns:
-    """Simulated RTLs.
-
-    results: outcomes, (n,) of dtype `RETURN_RESULT`.
-    tracks: n arrays (t, 3) of positions at intervals of 1 s, m; empty if positions were not stored.
-    """
-
-    results: Records
-    tracks: tuple[Floats, ...] = ()
-
-
-def make_return_environment(scenario: Scenario) -> ReturnEnvironment:
-    """Return the terrain and the kill spheres of a scenario, for simulated RTLs."""
-    threats, terrain = scenario.threats, scenario.terrain
-    spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
-    if terrain is None:
-        nothing: Heights = np.full((2, 2), np.nan, dtype=np.float32)
-        return ReturnEnvironment(read_only(nothing), np.zeros(1, POLYMAP)[0], spheres, radii, False)
-    return ReturnEnvironment(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
+# Interval between stored positions, ticks; 1 s.
+STORED_EVERY_TICKS = 10
 
 
 def fly_returns(
@@ -173,7 +99,7 @@ def fly_returns(
 ) -> SimulatedReturns:
     """Simulate an RTL from each of n starts.
 
-    starts: (n,) of `RETURN_START`.
+    starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
     targets: n loiters, the target of each start; None to go straight to the landing sequence.
     landings: n landing sequences to join after the loiter, up to their end or first loiter, or None; or no sequences.
     store_positions: True to store the positions.
@@ -183,7 +109,8 @@ def fly_returns(
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> from flight.autopilots.arduplane.point_mass import make_point_mass
+    >>> from flight.autopilots.point_mass import make_point_mass
+    >>> from flight.autopilots.simulated_returns import RETURN_START, make_return_environment
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
     >>> from world.wind import Wind
@@ -206,15 +133,14 @@ def fly_returns(
     ]
     if engine_out:
         stages = [np.concatenate([waypoint_ahead(start), route]) for start, route in zip(starts, stages, strict=True)]
-    results = np.zeros(len(starts), RETURN_RESULT)
     timeouts = [rtl_timeout(start, route, aircraft) for start, route in zip(starts, stages, strict=True)]
-    positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if store_positions else 0, 3))
-    tracks, record = [], parameters.record()
+    record = parameters.record()
     min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
-    for k, route in enumerate(stages):
+
+    def fly(k: int, positions: Floats, result: Record) -> None:
         fly_stages(
             starts[k],
-            route,
+            stages[k],
             record,
             record,
             NO_CLIMB,
@@ -231,11 +157,10 @@ def fly_returns(
             float(min_distances[k]),
             engine_out,
             positions,
-            results[k],
+            result,
         )
-        if store_positions:
-            tracks.append(positions[: int(results[k]["position_count"])].copy())
-    return SimulatedReturns(results, tuple(tracks))
+
+    return simulate_each(timeouts, fly, store_positions=store_positions)
 
 
 def _make_stages(
@@ -301,7 +226,7 @@ def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
         lap_length = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["loiter_radius"])
         seconds += (distance + lap_length) / min_ground_speed + abs(end["up"] - altitude) / 2.0
         east, north, altitude = end["east"], end["north"], end["up"]
-    return float(_TIMEOUT_BASE_S + _TIMEOUT_RATIO * seconds)
+    return float(TIMEOUT_BASE_S + TIMEOUT_RATIO * seconds)
 
 
 @compiled
@@ -334,11 +259,11 @@ def fly_stages(
     positions: array (t, 3), m, to fill with one position per second until it is full.
     """
     # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
-    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
+    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)
     waypoints, loiter = spaced[::2], progress_records[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
     target, estimated, state, memory = waypoints[1], motions[0], states[0], memories[0]
-    _initialise_outcome(start, estimated, has_terrain, result)
+    initialise_outcome(start, estimated, has_terrain, result)
     _load_stage(stages, 0, waypoints, estimated, memory)
     _initialise_memory(start, parameters, aircraft, excesses, state, memory)
     pitch, path_angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK_S
@@ -347,13 +272,13 @@ def fly_stages(
     for tick in range(int(timeout / dt)):
         time = tick * dt
         if tick % STORED_EVERY_TICKS == 0:
-            _store_position(estimated, positions, result)
+            store_position(estimated, positions, result)
         eas2tas, is_last = eas_to_tas_ratio(estimated.up), stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
         if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
             _record_arrival(estimated, time, engine_out, result)
-        _update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
+        update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
         if result.outcome != RETURN_TIMEOUT:
             break
         if result.clearance < min_clearance or result.sphere_distance < min_distance:
@@ -391,17 +316,8 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
     return (
         1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time)),
         1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
-        1.0 - math.exp(-dt / _PATH_LAG_S),
+        1.0 - math.exp(-dt / PATH_LAG_S),
     )
-
-
-@inner
-def _store_position(estimated: Record, positions: Floats, result: Record) -> None:
-    """Append the present position to the stored positions, unless the array is full."""
-    row = result.position_count
-    if row < positions.shape[0]:
-        positions[row, 0], positions[row, 1], positions[row, 2] = estimated.east, estimated.north, estimated.up
-        result.position_count += 1
 
 
 @inner
@@ -430,7 +346,7 @@ def _is_stage_complete(
 ) -> bool:
     """Return True if the current stage is complete: the flight straight ahead, the climb, or the leg to the target.
 
-    loiter: progress around the loiter, a record of `_LOITER_PROGRESS`.
+    loiter: progress around the loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
     is_before_reaction: True until the engine failure is noticed; the aircraft flies straight on.
     time: time since the start, s.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
@@ -494,7 +410,7 @@ def _is_target_reached(
     loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
 
     target: waypoint of the stage.
-    loiter: progress around the last loiter, a record of `_LOITER_PROGRESS`.
+    loiter: progress around the last loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
     """
@@ -503,37 +419,7 @@ def _is_target_reached(
     altitude_error = abs(estimated.up - target.up)
     if not is_last_stage:
         return memory.reached_loiter_target and altitude_error < LANDING_JOIN_ALTITUDE_TOLERANCE_M
-    offset_e, offset_n = estimated.east - target.centre_east, estimated.north - target.centre_north
-    bearing = math.atan2(offset_e, offset_n)
-    if loiter.seconds > 0.0:
-        loiter.turned += wrap(bearing - loiter.bearing)
-    loiter.bearing = bearing
-    if loiter.seconds > 0.0 or (
-        math.hypot(offset_e, offset_n) < max(RTL_ARRIVAL_RADIUS_M, arrival_radius)
-        and altitude_error < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
-    ):
-        loiter.seconds += dt
-    return loiter.seconds > ENDLESS_LOITER_TIME_S and abs(loiter.turned) >= 2.0 * math.pi
-
-
-@inner
-def _initialise_outcome(
-    start: Record, estimated: Record, has_terrain: bool, result: Record
-) -> None:  # pragma: no cover
-    """Set ``estimated`` to the start of the flight, and ``result`` to the values before the flight."""
-    estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
-    estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
-    estimated.velocity_up = start.velocity_up
-    result.clearance = result.clearance_before_arrival = math.inf if has_terrain else math.nan
-    result.threat = -1
-    result.sphere_distance, result.distance_before_arrival = math.inf, math.inf
-    result.arrival_time, result.arrival_altitude, result.energy, result.outcome, result.position_count = (
-        math.nan,
-        math.nan,
-        0.0,
-        RETURN_TIMEOUT,
-        0,
-    )
+    return advance_loiter(estimated, target, loiter, arrival_radius, dt)
 
 
 @inner
@@ -587,14 +473,8 @@ def _initialise_memory(
     Follows `flight.autopilots.arduplane.law.initialise_memory`, but also for a climb or a descent: the altitude demand
     is ahead of the aircraft by the demand's lag.
     """
-    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
-    air_east = start.velocity_east - wind * aircraft.wind_east
-    air_north = start.velocity_north - wind * aircraft.wind_north
+    initialise_state(start, aircraft, state)
     climb_rate = start.velocity_up
-    state.airspeed = max(1.0, math.hypot(math.hypot(air_east, air_north), climb_rate))
-    state.yaw, state.roll = math.atan2(air_east, air_north), start.roll
-    state.alpha = angle_of_attack(state, aircraft)
-    state.pitch = math.asin(min(1.0, max(-1.0, climb_rate / state.airspeed))) + state.alpha
     memory.is_initialised = True
     memory.altitude_demand, memory.climb_rate_demand = start.up, climb_rate
     memory.altitude_demand_in = memory.altitude_demand_limited = (
@@ -607,9 +487,7 @@ def _initialise_memory(
     memory.seb_integrator = (
         memory.pitch_demand * state.airspeed * GRAVITY - GRAVITY * climb_rate - INITIAL_SKE_INTEGRATOR
     )
-    throttle = 1.0
-    while throttle > 0.0 and excess_power(excess_table, throttle, state.airspeed, start.up, aircraft) > climb_rate:
-        throttle -= 0.01
+    throttle = steady_throttle(start, state, aircraft, excess_table)
     memory.throttle_demand, memory.last_throttle_demand = throttle, parameters.throttle_cruise
     memory.ste_integrator = throttle - parameters.throttle_cruise
 
@@ -674,54 +552,3 @@ def _demand_throttle_and_pitch(
     ) / _TURN_AIRSPEED_LAG_S
     path_angle = -math.asin(min(0.5, max(-0.5, sink / state.airspeed + acceleration_demand / GRAVITY)))
     memory.pitch_demand = path_angle + angle_of_attack(state, aircraft) - parameters.pitch_trim
-
-
-@inner
-def _update_clearances(
-    estimated: Record,
-    time: float,
-    heights: Heights,
-    to_pixel: PolyMapRecord,
-    spheres: Floats,
-    radii: Floats,
-    has_terrain: bool,
-    result: Record,
-) -> None:
-    """Update the end time, the minimum height above ground and the minimum distance outside the kill spheres.
-
-    End the RTL outside the elevation data, or once the aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
-    """
-    result.end_time = time
-    for m in range(spheres.shape[0]):
-        radius = radii[m]
-        if radius <= 0.0:
-            continue
-        offset_e, offset_n, offset_up = (
-            estimated.east - spheres[m, 0],
-            estimated.north - spheres[m, 1],
-            estimated.up - spheres[m, 2],
-        )
-        sphere_distance = math.sqrt(offset_e * offset_e + offset_n * offset_n + offset_up * offset_up) - radius
-        if sphere_distance < result.sphere_distance:
-            result.sphere_distance, result.threat, result.threat_time = sphere_distance, m, time
-        if math.isnan(result.arrival_time):
-            result.distance_before_arrival = min(result.distance_before_arrival, sphere_distance)
-    if not has_terrain:
-        return
-    clearance = estimated.up - ground_height(heights, to_pixel, estimated.east, estimated.north)
-    if math.isnan(clearance):
-        result.outcome = RETURN_OFF_TERRAIN
-        return
-    if clearance < result.clearance:
-        if result.clearance > 0.0:
-            if math.isnan(result.arrival_time):
-                result.clearance_before_arrival = clearance
-            result.clearance_time = time
-            result.clearance_east, result.clearance_north, result.clearance_up = (
-                estimated.east,
-                estimated.north,
-                estimated.up,
-            )
-        result.clearance = clearance
-    if clearance <= -MAX_IMPACT_DEPTH_M:
-        result.outcome, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time

@@ -1,11 +1,11 @@
 """Define the simulated PX4 for fixed wing as an autopilot, with its parameters."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import ClassVar, NamedTuple, Self, get_args
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self, get_args
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
@@ -15,17 +15,21 @@ from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
+    Cause,
     ControlLaw,
     Deviations,
     FeasibilityLimits,
     MissionChecks,
     MissionParts,
     ReturnBehaviour,
+    ReturnMission,
+    ReturnTrials,
     RtlSettings,
     SpeedLimits,
     SpeedRules,
     TurnRules,
 )
+from flight.autopilots.px4.failsafes import failsafe_causes, link_loss_reactions
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE_M
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
 from flight.autopilots.px4.open_settings import describe_open_settings
@@ -34,13 +38,17 @@ from flight.autopilots.px4.tracking_error import altitude_miss_probability, trac
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import LANDINGS, Command
 from flight.mission.loiter_circles import LoiterRules
-from flight.mission.return_path import ReturnRules
+from flight.mission.return_path import ReturnRules, ReturnTarget
 from world.arrays import Floats
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
-from world.kernels import Record
+from world.kernels import Record, Records
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
+
+if TYPE_CHECKING:
+    from flight.autopilots.point_mass import PointMass
+    from flight.autopilots.simulated_returns import ReturnEnvironment, SimulatedReturns
 
 _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 
@@ -103,6 +111,15 @@ _RTL_TYPES_NOT_FLOWN = {
 _ALONG_THE_MISSION = (2.0, 4.0)
 # Values of RTL_TYPE for an RTL that may go to the mission's landing.
 _TO_LANDING = (1.0, 3.0)
+# Destination of an RTL by the value of RTL_TYPE.
+_DESTINATION_TEXTS = {
+    0: "the nearer of home and the nearest rally point",
+    1: "the nearer of the mission's landing and the nearest rally point, or home without both",
+    2: "the mission's landing, or home, along the mission",
+    3: "the nearest of home, the mission's landing and the rally points",
+    4: "the mission's landing, or home, along the mission",
+    5: "the nearest rally point",
+}
 # Value of RTL_TYPE for an RTL to a rally point alone.
 _TO_RALLY_POINT = 5.0
 # Distance from home within which PX4 ignores a rally point, m (`MAX_DIST_FROM_HOME_FOR_LAND_APPROACHES` in rtl.cpp).
@@ -262,18 +279,29 @@ class Px4(Autopilot):
             yield "FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated"
         if not mission.returns:
             return
-        return_type = parameters["RTL_TYPE"]
+        yield from self._unsimulated_return_texts(mission.rally_distance)
+        if parameters["RTL_TYPE"] in _TO_LANDING and not mission.commands.isdisjoint(
+            (*LANDINGS, Command.DO_LAND_START)
+        ):
+            yield f"RTL_TYPE {parameters['RTL_TYPE']:g} may return to the mission's landing, which is not simulated"
+        yield from self._unjudged_return_texts(mission.rally_distance)
+
+    def _unsimulated_return_texts(self, rally_distance: float) -> Iterator[str]:
+        """Describe a value of RTL_TYPE with which no return is simulated.
+
+        rally_distance: distance of the nearest rally point from home, m; infinite without one.
+        """
+        return_type = self.parameters["RTL_TYPE"]
         if return_type in _ALONG_THE_MISSION:
             yield f"RTL_TYPE {return_type:g} returns along the mission, which is not simulated"
-        if return_type in _TO_LANDING and not mission.commands.isdisjoint((*LANDINGS, Command.DO_LAND_START)):
-            yield f"RTL_TYPE {return_type:g} may return to the mission's landing, which is not simulated"
-        if return_type == _TO_RALLY_POINT and math.isinf(mission.rally_distance):
+        if return_type == _TO_RALLY_POINT and math.isinf(rally_distance):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where it begins, which is not simulated"
-        if return_type != _TO_RALLY_POINT and mission.rally_distance <= _RALLY_HOME_DISTANCE_M:
+
+    def _unjudged_return_texts(self, rally_distance: float) -> Iterator[str]:
+        """Describe settings with which a part of a return is not simulated; see `_unsimulated_return_texts`."""
+        parameters = self.parameters
+        if parameters["RTL_TYPE"] != _TO_RALLY_POINT and rally_distance <= _RALLY_HOME_DISTANCE_M:
             yield "PX4 ignores a rally point within 10 m of home, to which the return is simulated"
-        if parameters["RTL_DESCEND_ALT"] != parameters["RTL_RETURN_ALT"]:
-            end_text = f"RTL_DESCEND_ALT {parameters['RTL_DESCEND_ALT']:g}"
-            yield f"{end_text} ends the return, which is flown to RTL_RETURN_ALT {parameters['RTL_RETURN_ALT']:g}"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
 
@@ -367,31 +395,110 @@ class Px4(Autopilot):
     @property
     def returns(self) -> ReturnBehaviour:
         """Behaviour in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
-        return ReturnBehaviour(self._return_rules, _rtl_parameters)
+        return ReturnBehaviour(
+            self._return_rules,
+            _rtl_parameters,
+            after_link_loss=partial(link_loss_reactions, self.parameters),
+            fly=self._fly_returns,
+            causes=self._failsafe_causes,
+            unsimulated_text=self._unsimulated_returns,
+            unjudged_texts=self._unjudged_returns,
+            path_text=self._return_path_text,
+            trials=self._return_trials,
+        )
+
+    @property
+    def _return_trials(self) -> ReturnTrials:
+        """Heights of RTL_RETURN_ALT, then of RTL_DESCEND_ALT, and the values of RTL_TYPE that are simulated."""
+        first, last = ({name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
+        other_types = sorted({0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]})
+        return ReturnTrials(
+            (first, last | first),
+            tuple({"RTL_TYPE": value} for value in other_types),
+            "RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_TYPE",
+        )
+
+    def _fly_returns(
+        self,
+        starts: Records,
+        targets: Sequence[ReturnTarget],
+        aircraft: "PointMass",
+        environment: "ReturnEnvironment",
+        *,
+        store_positions: bool = False,
+        abort_limits: tuple[Floats, Floats] | None = None,
+        engine_out: bool = False,
+    ) -> "SimulatedReturns":
+        """Simulate RTLs; see `flight.autopilots.parts.FlyReturns`.  Raises ValueError after an engine failure."""
+        # Imported here: only simulated RTLs need the trims of JSBSim.
+        from flight.autopilots.px4.rtl_point_mass import fly_returns
+
+        if engine_out:
+            raise ValueError("PX4's RTL without an engine is not simulated")
+        return fly_returns(
+            starts,
+            targets,
+            self.parameters,
+            aircraft,
+            environment,
+            store_positions=store_positions,
+            abort_limits=abort_limits,
+        )
+
+    def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
+        """Return the events that can end a mission, with PX4's reaction to each."""
+        return failsafe_causes(self.parameters, has_fence=mission.has_fence)
+
+    def _unsimulated_returns(self, mission: ReturnMission) -> str:
+        """Return the reason why no RTL of a mission is simulated; "" if RTLs are simulated."""
+        begins_with_landing = bool(mission.landings) and mission.landings[0].is_landing
+        if begins_with_landing and self.parameters["RTL_TYPE"] in _TO_LANDING:
+            return "landing"
+        return next(self._unsimulated_return_texts(mission.rally_distance), "")
+
+    def _unjudged_returns(self, mission: ReturnMission) -> tuple[str, ...]:
+        """Return the parts of the RTLs of a mission that are not simulated."""
+        return_type, has_sequence = self.parameters["RTL_TYPE"], any(start.landing for start in mission.landings)
+        is_unknown = return_type in _TO_LANDING and not has_sequence and not mission.commands.isdisjoint(LANDINGS)
+        landing_text = f"RTL_TYPE {return_type:g} may return to a landing without DO_LAND_START, which is not simulated"
+        return (*([landing_text] if is_unknown else []), *self._unjudged_return_texts(mission.rally_distance))
+
+    @property
+    def _return_path_text(self) -> str:
+        """Sentence on the path of an RTL."""
+        parameters = self.parameters
+        return_type = parameters["RTL_TYPE"]
+        first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
+        return (
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}; unless it begins"
+            f" higher, it first climbs in a circle to RTL_RETURN_ALT {first_height} above that place; it flies there"
+            f" level, and over home or a rally point it descends in circles to RTL_DESCEND_ALT {last_height}"
+        )
 
     @property
     def _return_rules(self) -> ReturnRules:
-        """Rules of an RTL at any distance, from RTL_RETURN_ALT, RTL_LOITER_RAD and RTL_TYPE.
+        """Rules of an RTL at any distance, from RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_LOITER_RAD and RTL_TYPE.
 
-        RTL_RETURN_ALT applies above a rally point as above home.  Follows PX4's
-        `src/modules/navigator/rtl.cpp`.  RTL_TYPE 0 returns to the nearest of home and the rally points; 1 (the default
-        of fixed wings) and 5 return to the nearest rally point, or to home without a rally point.  The other types, and
-        1, also use a mission's landing, which is not simulated.
+        Both heights apply above a rally point as above home.  Follows PX4's `src/modules/navigator/rtl.cpp`.  RTL_TYPE
+        0 returns to the nearest of home and the rally points; 1 (the default of fixed wings) and 5 return to the
+        nearest rally point, or to home without a rally point.  The other types, and 1, also use a mission's landing, to
+        which an RTL that is an item of the mission is not simulated.
 
         >>> rules = Px4(Px4Parameters.defaults()).returns.rules
-        >>> rules.includes_home, rules.rally_height, rules.deviation_note
-        (False, 100.0, '')
+        >>> rules.includes_home, rules.transit_height, rules.rally_height, rules.deviation_note
+        (False, 100.0, 100.0, '')
         """
         parameters = self.parameters
         return_type = int(parameters["RTL_TYPE"])
         return ReturnRules(
-            height=parameters["RTL_RETURN_ALT"],
+            height=parameters["RTL_DESCEND_ALT"],
             radius=parameters["RTL_LOITER_RAD"],
             max_sink_rate=parameters["FW_T_SINK_R_SP"],
             rally_limit=0.0,
             includes_home=return_type in (0, 3),
             holds_height=True,
-            rally_height=parameters["RTL_RETURN_ALT"],
+            transit_height=parameters["RTL_RETURN_ALT"],
+            rally_height=parameters["RTL_DESCEND_ALT"],
             may_use_landing=return_type in (1, 3),
             deviation_note=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
         )

@@ -182,6 +182,14 @@ def control_as_px4(
         update_rtl_loiter(estimated, waypoints[memory.leg + 1], guidance, dt)
     elif find_target(waypoints, memory) + 1 >= waypoints.shape[0]:
         _end_mission(estimated, waypoints[waypoints.shape[0] - 1], guidance, parameters, memory, dt)
+    update_roll_setpoint(parameters, memory, dt)
+    update_tecs(state, estimated, parameters, memory, airspeed_setpoint, eas_to_tas, dt)
+    _control_attitude(state, estimated, gains, guidance, parameters, memory, commands, dt)
+
+
+@inner
+def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
+    """Move the roll setpoint at a limited rate (FW_PN_R_SLEW_MAX) towards that of the lateral acceleration."""
     max_roll_step = parameters.roll_slew_rate * dt
     limited_roll = roll_setpoint(memory.lateral_acceleration, parameters)
     memory.roll_setpoint = (
@@ -189,8 +197,6 @@ def control_as_px4(
         if max_roll_step > 0.0
         else limited_roll
     )
-    update_tecs(state, estimated, parameters, memory, airspeed_setpoint, eas_to_tas, dt)
-    _control_attitude(state, estimated, gains, guidance, parameters, memory, commands, dt)
 
 
 @inner

@@ -274,6 +274,48 @@ def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record)
 
 
 @inner
+def climb_before_return(
+    estimated: Record,
+    lowest_return_altitude: float,
+    wind_east: float,
+    wind_north: float,
+    target_airspeed: float,
+    parameters: Record,
+    memory: Record,
+) -> bool:
+    """Circle up to the return altitude where the RTL began; return False once the aircraft is that high.
+
+    ``memory.from_east``, ``from_north`` and ``from_up`` are where the RTL began, and then where the climb ended, at the
+    altitude at which the RTL began.
+
+    lowest_return_altitude: return altitude of an RTL that begins lower, m AMSL.
+    """
+    if not memory.is_in_rtl:
+        memory.is_in_rtl, memory.is_loitering = True, False
+        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    if memory.rtl_climb_complete:
+        return False
+    return_altitude = max(memory.from_up, lowest_return_altitude)
+    memory.rtl_climb_complete = estimated.up >= return_altitude - parameters.altitude_acceptance_radius
+    if memory.rtl_climb_complete:
+        memory.from_east, memory.from_north = estimated.east, estimated.north
+        return False
+    memory.altitude_setpoint = return_altitude
+    follow_loiter(
+        estimated,
+        memory.from_east,
+        memory.from_north,
+        parameters.loiter_radius,
+        wind_east,
+        wind_north,
+        target_airspeed,
+        parameters,
+        memory,
+    )
+    return True
+
+
+@inner
 def _navigate_rtl(
     estimated: Record,
     rtl: Record,
@@ -285,34 +327,20 @@ def _navigate_rtl(
 ) -> None:
     """Fly an RTL: circle up to the return altitude if necessary, fly straight to the target, and descend there.
 
-    Follows PX4's `src/modules/navigator/rtl_direct.cpp`; the aircraft never descends before it is over its target.
+    Follows PX4's `src/modules/navigator/rtl.cpp` and `rtl_direct.cpp`: the return altitude is RTL_RETURN_ALT above the
+    destination, or the altitude at the start if that is higher, and the aircraft never descends before it is over its
+    target, where it descends to RTL_DESCEND_ALT.
     """
-    if not memory.is_in_rtl:
-        memory.is_in_rtl, memory.is_loitering = True, False
-        memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
-    return_altitude = max(memory.from_up, rtl.up)
-    if not memory.rtl_climb_complete:
-        memory.rtl_climb_complete = estimated.up >= return_altitude - parameters.altitude_acceptance_radius
-        if memory.rtl_climb_complete:
-            memory.from_east, memory.from_north = estimated.east, estimated.north
-    if not memory.rtl_climb_complete:
-        memory.altitude_setpoint = return_altitude
-        follow_loiter(
-            estimated,
-            memory.from_east,
-            memory.from_north,
-            parameters.loiter_radius,
-            wind_east,
-            wind_north,
-            target_airspeed,
-            parameters,
-            memory,
-        )
+    # The target is RTL_DESCEND_ALT above the destination, but no higher than the return altitude.
+    lowest_return_altitude = rtl.up + max(0.0, parameters.rtl_altitude - parameters.rtl_descend_altitude)
+    if climb_before_return(
+        estimated, lowest_return_altitude, wind_east, wind_north, target_airspeed, parameters, memory
+    ):
         return
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(rtl.centre_east - estimated.east, rtl.centre_north - estimated.north)
     memory.is_loitering = memory.is_loitering or distance < abs(rtl.loiter_radius) + switch_distance(speed, parameters)
-    memory.altitude_setpoint = rtl.up if memory.is_loitering else return_altitude
+    memory.altitude_setpoint = rtl.up if memory.is_loitering else max(memory.from_up, lowest_return_altitude)
     # The leg to the target is flown as a loiter, whose guidance leads straight to the center from a distance.
     follow_loiter(
         estimated,

@@ -81,6 +81,7 @@ DEFINITIONS = {
     "throttle_slew_rate": Definition("FW_THR_SLEW_MAX", 0.0, 0.0, 100.0, documented=(0.0, 1.0)),
     # RTL.
     "rtl_altitude": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
+    "rtl_descend_altitude": Definition("RTL_DESCEND_ALT", 100.0, 0.0, 10_000.0),
     "rtl_loiter_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
     "rtl_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
     # Mission checks.
@@ -100,7 +101,6 @@ DEFINITIONS = {
     "weight_base": Definition("WEIGHT_BASE", -1.0, -1.0, 10_000.0),
     "weight_gross": Definition("WEIGHT_GROSS", -1.0, -1.0, 10_000.0),
     "service_ceiling": Definition("FW_SERVICE_CEIL", -1.0, -1.0, 20_000.0),
-    "rtl_descend_altitude": Definition("RTL_DESCEND_ALT", 100.0, 0.0, 10_000.0),
     "rtl_land_delay": Definition("RTL_LAND_DELAY", -1.0, -1.0, 10_000.0),
     "fence_action": Definition("GF_ACTION", 2.0, 0.0, 5.0),
     "fence_max_distance": Definition("GF_MAX_HOR_DIST", 0.0, 0.0, 1e6),
@@ -108,7 +108,7 @@ DEFINITIONS = {
     "max_flight_time": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
 # Parameters that are read but not simulated with a value other than PX4's default.
-NOT_SIMULATED = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
+NOT_SIMULATED = tuple(definition.name for definition in list(DEFINITIONS.values())[-18:])
 # Minimum number of parameters in a complete set: a ground station saves more than a thousand.
 _COMPLETE_SET_COUNT = 300
 # Parameters whose values should not decrease from one to the next; PX4 warns of some such values and flies with them.
@@ -168,13 +168,21 @@ _OUTPUT_COUNT_BY_DRIVER = {
 OUTPUT_FUNCTION_NAMES = tuple(
     f"{driver}_FUNC{output}" for driver, count in _OUTPUT_COUNT_BY_DRIVER.items() for output in range(1, count + 1)
 )
-# Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.describe_unsimulated_settings`).
+# Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.describe_unsimulated_settings`),
+# or that state the reaction to a lost link (`flight.autopilots.px4.failsafes`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
     "BAT_CRIT_THR": 0.07,
     "BAT_EMERGEN_THR": 0.05,
     "BAT1_CAPACITY": -1.0,
     "CBRK_FLIGHTTERM": 121212.0,
+    # Loss of a radio link (`flight.autopilots.px4.failsafes`).
+    **dict.fromkeys(("COM_DLL_EXCEPT", "COM_RCL_EXCEPT", "NAV_DLL_ACT"), 0.0),
+    "COM_DL_LOSS_T": 10.0,
+    "COM_FAIL_ACT_T": 5.0,
+    "COM_RC_IN_MODE": 3.0,
+    "COM_RC_LOSS_T": 0.5,
+    "NAV_RCL_ACT": 2.0,
     "COM_FLTT_LOW_ACT": 0.0,
     "COM_ARM_AUTH_REQ": 0.0,
     "COM_LOW_BAT_ACT": 0.0,

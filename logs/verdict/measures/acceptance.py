@@ -13,7 +13,7 @@ from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
-    performance_tables,
+    leg_performance,
     sharpest_fly_over_turn,
     slope_limit,
     tighter_turn_limit,
@@ -207,7 +207,7 @@ def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> boo
     # Include the next turns on both sides, because they use part of the legs.
     start, end = max(0, first - 3), min(len(requirements.points), last + 4)
     nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, after:end])
-    turns = turn_requirements(nearby_route, performance_tables(nearby_route, requirements.limits))
+    turns = turn_requirements(nearby_route, leg_performance(requirements.limits))
     for new_corner, old_corner in ((before - start, before), (first - start, after)):
         if not 0 < old_corner < requirements.legs:
             continue

@@ -48,9 +48,7 @@ def air_climb_angle(requirements: RouteRequirements, leg: int, speed: float, alt
     speed: true airspeed, m/s.
     altitude: altitude at which the wind is taken, m AMSL.
     """
-    tailwind, crosswind = requirements.setup.scenario.wind.components_on_course(
-        float(requirements.courses[leg]), altitude
-    )
+    tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     slope, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):
         ground_track_speed = ground_speed(speed * math.cos(angle), tailwind, crosswind)

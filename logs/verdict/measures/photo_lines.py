@@ -242,7 +242,7 @@ def _count_photos(line: PhotoLine, is_taken: Flags, length: float) -> tuple[int,
 
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
-    """Minimum overlap of a survey's usable photos, as fractions of a photo.
+    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 if they do not touch.
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
@@ -339,7 +339,7 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
             continue
         spacing = np.maximum(line.photo, camera.interval * strip.speeds)[strip.is_usable]
         heights = strip.heights[strip.is_usable]
-        overlaps = 1.0 - spacing / (camera.along * np.maximum(heights, 1e-9))
+        overlaps = _overlaps(spacing, camera.along, heights)
         lowest_index = int(np.argmin(overlaps))
         if measure.front is None or overlaps[lowest_index] < measure.front:
             lowest_spacing, is_slow = float(spacing[lowest_index]), bool(spacing[lowest_index] > line.photo)
@@ -348,10 +348,20 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
                 front=float(overlaps[lowest_index]),
                 line=number,
                 photo_spacing=lowest_spacing,
-                height=float(heights[lowest_index]),
+                height=max(0.0, float(heights[lowest_index])),
                 is_camera_limited=is_slow,
             )
     return measure
+
+
+def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
+    """Return the overlap of photos at distances from each other, as fractions of a photo, (n,); at least 0.
+
+    distances: m, (n,).
+    width: width of a photo in units of the height.
+    heights: heights above ground, m, (n,); a photo from the ground shows nothing.
+    """
+    return np.maximum(0.0, 1.0 - distances / (width * np.maximum(heights, 1e-9)))
 
 
 def _with_side_overlap(
@@ -394,7 +404,7 @@ def _with_side_overlap(
         is_neighbor = (ranks[number] - ranks[previous_numbers] == 1) & (
             np.abs(offsets[number] - offsets[previous_numbers]) <= _MAX_NEIGHBOR_SPACINGS * survey.spacing
         )
-        overlaps = np.where(is_neighbor, 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9)), np.nan)
+        overlaps = np.where(is_neighbor, _overlaps(gaps, measure.camera.across, heights), np.nan)
         if np.isfinite(overlaps).any():
             lowest_index = int(np.nanargmin(overlaps))
             if measure.side is None or overlaps[lowest_index] < measure.side:
@@ -404,7 +414,7 @@ def _with_side_overlap(
                     side=float(overlaps[lowest_index]),
                     line_pair=pair,
                     line_spacing=float(gaps[lowest_index]),
-                    side_height=float(heights[lowest_index]),
+                    side_height=max(0.0, float(heights[lowest_index])),
                 )
         previous_line[:, on_line] = this_line[:, on_line]
     return measure

@@ -1,12 +1,13 @@
 """Compute the requirements of a route and the aircraft's limits, which are the planned side of every finding."""
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.envelope import GRAVITY
+from aircraft.envelope import GRAVITY, ground_speed
 from aircraft.path_limits import (
     BLEND_ACCELERATION,
     Limits,
@@ -27,13 +28,14 @@ from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.places import Place
-from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, SPEED_TOLERANCE_MPS, U_TURN_RAD
+from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, POSSIBLE_BANK_RAD, SPEED_TOLERANCE_MPS, U_TURN_RAD
 from world.airspace.inclusions import unite_inclusions
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
 from world.arrays import Floats
 from world.errors import MissionError
 from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
+from world.wind import Wind
 
 # ----------------------------------------------------------------------
 # The zones by which a flight is judged: the scenario's zones, then the zones of the mission's own fence.
@@ -155,12 +157,38 @@ class TurnRequirements:
     limit: Floats
 
 
-def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceTable]:
-    """Return the aircraft's performance at each airspeed of a route, m/s."""
-    return {float(speed): limits.performance(float(speed)) for speed in route.leg_airspeeds}
+# Performance of the aircraft by leg and airspeed, m/s.
+LegPerformance = Callable[[int, float], PerformanceTable]
 
 
-def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> TurnRequirements:
+def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformance:
+    """Return the function that gives the aircraft's performance on a leg at an airspeed, m/s.
+
+    winds: wind of each leg; () for the wind of the limits on all legs.
+    """
+    leg_limits = [replace(limits, wind=wind) for wind in winds]
+    return lambda leg, speed: (leg_limits[leg] if leg_limits else limits).performance(speed)
+
+
+def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
+    """Return the wind of each leg: in a forecast, at the leg's middle when the aircraft is there; otherwise ().
+
+    The times are those of a flight at the route's airspeeds in these winds, without loiters.
+    """
+    if setup.scenario.wind.field is None:
+        return ()
+    points, courses, winds, time = route.positions, leg_courses(route.positions), [], 0.0
+    for leg, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1).tolist()):
+        middle, airspeed = 0.5 * (points[leg] + points[leg + 1]), float(route.leg_airspeeds[leg])
+        wind = setup.scenario.local_wind(middle.tolist(), time + 0.5 * length / airspeed)
+        components = wind.components_on_course(float(courses[leg]), float(middle[2]))
+        speed = ground_speed(airspeed, *components)
+        time += length / (speed if speed > 1.0 else airspeed)
+        winds.append(wind)
+    return tuple(winds)
+
+
+def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirements:
     """Compute the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
     points = route.positions
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
@@ -170,12 +198,12 @@ def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> Tu
     min_radius, radius, length_before, length_after = (np.zeros(count) for _ in range(4))
     for i in range(1, count - 1):
         speed = float(max(route.leg_airspeeds[i - 1], route.leg_airspeeds[i]))
-        min_radius[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
+        min_radius[i] = turn_radius_between(performance(i, speed), courses[i - 1], courses[i], points[i, 2])
         radius[i] = route.arc_radii[i] or min_radius[i]
         length_before[i], length_after[i] = turn_lengths(
             abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i])
         )
-    reversal = _reversal_lengths(route, tables, courses, turns, radius, points[:, 2])
+    reversal = _reversal_lengths(route, performance, courses, turns, radius, points[:, 2])
     limit = _sharpest_turns(route, runs, min_radius, length_before, length_after, reversal)
     return TurnRequirements(turns, min_radius, radius, length_before, length_after, reversal, limit)
 
@@ -196,7 +224,7 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 
 
 def _reversal_lengths(
-    route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
+    route: Route, performance: LegPerformance, courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
     """Return the length of each leg that the roll between opposite banks uses, m, (w - 1,).
 
@@ -206,7 +234,7 @@ def _reversal_lengths(
     for leg in range(1, len(courses) - 1):
         are_fly_bys = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
         if turns[leg] * turns[leg + 1] < 0.0 and are_fly_bys:
-            table = tables[float(route.leg_airspeeds[leg])]
+            table = performance(leg, float(route.leg_airspeeds[leg]))
             course_east, course_north = math.sin(courses[leg]), math.cos(courses[leg])
             min_altitude = float(min(up[leg], up[leg + 1]))
             lengths[leg] = roll_reversal_length(
@@ -323,11 +351,14 @@ class RouteRequirements:
     climb, dive: (w - 1,) rad over the ground, the minimum along the leg; inf if the envelope is omitted.
     certain_climb, certain_dive: (w - 1,) the certain part of these limits if the aircraft model is uncertain.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
+    possible_bank: largest bank limit that the aircraft may have, rad; the setup's bank limit unless it is a guess.
+    possible_turn_limit, possible_min_radius: (w,) as `turn_limit` and `min_radius`, with this bank limit.
     envelope: True if the aircraft's limits apply; otherwise only the ability shown by the flight applies.
     airspace: the zones of scenario and mission.
     surveys: surveys of a user's mission, if the scenario judges surveys by their lines.
     zone_check_legs: for a quick answer, the first and last leg on which zones are checked; None to check all legs and
         all zones.
+    winds: (w - 1,) wind of each leg in a forecast; () for the scenario's wind on all legs.
     ground_phases: take-off and landing of the flight, to whose airborne part the other fields belong; None without.
     shortcuts: results of `logs.verdict.measures.acceptance.shortcut_distance` so far, by the first and last waypoint
         that the shortcut omits; neighbouring waypoints have most shortcuts in common.
@@ -352,6 +383,9 @@ class RouteRequirements:
     dive: Floats
     certain_climb: Floats
     certain_dive: Floats
+    possible_bank: float
+    possible_turn_limit: Floats
+    possible_min_radius: Floats
     ground_speed: Floats
     path: PlannedPath
     envelope: bool
@@ -359,6 +393,7 @@ class RouteRequirements:
     surveys: tuple[Survey, ...]
     ground_phases: FlownGround | None = None
     zone_check_legs: tuple[int, int] | None = None
+    winds: tuple[Wind, ...] = ()
     shortcuts: dict[tuple[int, int], float | None] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -375,6 +410,10 @@ class RouteRequirements:
     def limits_source(self) -> str:
         """Source of the scenario's limits: planfly's defaults if the mission came without a scenario."""
         return "default" if self.setup.scenario.external else "scenario"
+
+    def wind_on(self, leg: int) -> Wind:
+        """Return the mean wind on a leg."""
+        return self.winds[leg] if self.winds else self.setup.scenario.wind
 
     def waypoint(self, index: int) -> Place:
         """Return a waypoint as the place of a finding."""
@@ -426,14 +465,19 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     """
     route, limits = true_airspeed_route(setup), setup.limits
     points = route.positions
-    tables = performance_tables(route, limits)
-    turns = turn_requirements(route, tables)
+    winds = find_leg_winds(setup, route)
+    performance = leg_performance(limits, winds)
+    turns = turn_requirements(route, performance)
     courses, runs = leg_courses(points), leg_runs(points)
-    climb, dive, speeds = _leg_limits(route, tables, points, courses)
+    climb, dive, speeds = _leg_limits(route, performance, points, courses)
     certain_limits = limits.with_margin()
     certain_climb, certain_dive = climb, dive
     if certain_limits.envelope is not limits.envelope:
-        certain_climb, certain_dive, _ = _leg_limits(route, performance_tables(route, certain_limits), points, courses)
+        certain_climb, certain_dive, _ = _leg_limits(route, leg_performance(certain_limits, winds), points, courses)
+    possible_turns, possible_bank = turns, _possible_bank(setup)
+    if possible_bank > limits.max_bank:
+        possible_limits = replace(limits, max_bank=possible_bank)
+        possible_turns = turn_requirements(route, leg_performance(possible_limits, winds))
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
     return RouteRequirements(
@@ -456,12 +500,25 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         dive=dive,
         certain_climb=certain_climb,
         certain_dive=certain_dive,
+        winds=winds,
+        possible_bank=possible_bank,
+        possible_turn_limit=possible_turns.limit if envelope else np.full(len(points), math.inf),
+        possible_min_radius=possible_turns.min_radius,
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,
         airspace=judged_airspace(setup),
         surveys=judged_surveys(setup),
     )
+
+
+def _possible_bank(setup: FlightSetup) -> float:
+    """Return the largest bank limit that may apply in a flight, rad: the setup's unless the aircraft's is a guess."""
+    envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
+    if not envelope.bank_guessed or setup.max_bank < envelope.max_bank:
+        return setup.max_bank
+    other_limit = math.inf if stated_bank is None else math.radians(stated_bank)
+    return min(POSSIBLE_BANK_RAD, setup.autopilot.turns.max_bank, other_limit)
 
 
 # The setups whose surveys were searched last, with these surveys: several parts of one verdict need them.
@@ -532,7 +589,7 @@ def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> Planne
 
 
 def _leg_limits(
-    route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
+    route: Route, performance: LegPerformance, points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return each leg's climb and dive limits over the ground (rad) and ground speed (m/s), (legs,) each.
 
@@ -541,7 +598,7 @@ def _leg_limits(
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
-        table, course = tables[float(route.leg_airspeeds[leg])], float(courses[leg])
+        table, course = performance(leg, float(route.leg_airspeeds[leg])), float(courses[leg])
         altitudes = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
         speeds[leg] = min(ground_speed_on(table, course, altitude) for altitude in altitudes)
         if any(math.isnan(ground_speed_on(table, course, altitude)) for altitude in altitudes):
@@ -614,9 +671,21 @@ def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
 
     The dive limit applies to a descending leg, the climb limit to every other leg.
     """
-    is_rising = requirements.slopes[leg] >= 0.0
-    scenario_limit = requirements.limits.max_climb if is_rising else requirements.limits.max_dive
-    aircraft_limit = float((requirements.climb if is_rising else requirements.dive)[leg])
+    return _tighter_slope_limit(requirements, leg, is_climb=bool(requirements.slopes[leg] >= 0.0))
+
+
+def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
+    """Return the tighter limits on climb and dive along a leg's course, rad, positive."""
+    return (
+        _tighter_slope_limit(requirements, leg, is_climb=True)[0],
+        _tighter_slope_limit(requirements, leg, is_climb=False)[0],
+    )
+
+
+def _tighter_slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
+    """Return the tighter limit of scenario and aircraft on a climb or a dive, rad, positive, and its source."""
+    scenario_limit = requirements.limits.max_climb if is_climb else requirements.limits.max_dive
+    aircraft_limit = float((requirements.climb if is_climb else requirements.dive)[leg])
     if scenario_limit is not None and scenario_limit <= aircraft_limit:
         return scenario_limit, "scenario"
     return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"

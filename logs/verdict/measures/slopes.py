@@ -334,9 +334,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     )
     if fit is None:
         return None
-    tailwind, crosswind = requirements.setup.scenario.wind.components_on_course(
-        float(requirements.courses[leg]), top_altitude
-    )
+    tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), top_altitude)
     slopes = [
         ground_slope(math.asin(min(1.0, max(-1.0, value / commanded_speed))), commanded_speed, tailwind, crosswind)
         for value in (fit[0], fit[0] + fit[1])
@@ -372,8 +370,8 @@ def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: floa
 
 def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
     """Return the airspeed that the aircraft would have in the mean wind, without gusts, m/s."""
-    wind, track = requirements.setup.scenario.wind, aligned.track
-    mean_wind = wind.velocities_at(np.ascontiguousarray(track.position[rows, 2]))
+    track = aligned.track
+    mean_wind = requirements.setup.scenario.wind_velocities(track.position[rows], track.time[rows])
     east, north = track.velocity[rows, 0] - mean_wind[:, 0], track.velocity[rows, 1] - mean_wind[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 

@@ -90,6 +90,19 @@ class AlignedTrack:
         """Return True if any part of a leg was flown."""
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
+    def leg_segments(self, leg: int) -> tuple[int, int]:
+        """Return the first segment of the track on a leg, and the segment after the last; both are 0 for none.
+
+        The first leg includes the track before it, the last leg the track after it.  A short leg of which both
+        waypoints were passed at one row, as in the turn between its neighbours, has the segment after this row.
+        """
+        if not self.has_flown(leg) and not self.passed[leg + 1]:
+            return 0, 0
+        last_row = len(self.track) - 1
+        first = 0 if leg == 0 else int(self.rows[leg])
+        end = last_row if leg + 2 == len(self.rows) else int(self.rows[leg + 1])
+        return (first, end) if end > first else (min(first, last_row - 1), min(first, last_row - 1) + 1)
+
     def leg_at(self, row: int) -> int:
         """Return the leg on which a row was flown; the last row belongs to the leg of the row before it."""
         return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from logs.verdict.returns.judge_glides import NO_GLIDES, Glide, Glides, Reach
+from logs.verdict.returns.judge_glides import NO_GLIDES, Glides
 from logs.verdict.returns.judge_returns import (
     Kind,
     ReturnRange,
@@ -86,19 +86,15 @@ class DrawnReturns:
     glides: Glides = NO_GLIDES
 
     @property
-    def segments_by_outcome(self) -> list[tuple[Kind, list[SimulatedReturn]]]:
-        """Segments of the path with the same outcome of their returns.
-
-        If a start has several returns, the worst of them applies.
-        """
+    def worst_by_start(self) -> list[SimulatedReturn]:
+        """The worst return from each start, in order of time."""
         by_time = sorted(self.returns.each, key=lambda ret: ret.time)
-        worst_by_time = [min(group, key=worst_first_key) for _, group in groupby(by_time, lambda ret: ret.time)]
-        return group_segments(worst_by_time, lambda ret: ret.kind)
+        return [min(group, key=worst_first_key) for _, group in groupby(by_time, lambda ret: ret.time)]
 
     @property
-    def segments_by_reach(self) -> list[tuple[Reach, list[Glide]]]:
-        """Segments of the track with the same best glide destination."""
-        return group_segments(self.glides.each, lambda glide: glide.reach)
+    def segments_by_outcome(self) -> list[tuple[Kind, list[SimulatedReturn]]]:
+        """Segments of the path with the same outcome of their returns."""
+        return group_segments(self.worst_by_start, lambda ret: ret.kind)
 
 
 Element = TypeVar("Element")

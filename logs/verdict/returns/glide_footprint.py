@@ -124,14 +124,27 @@ class _CellBlocks(NamedTuple):
 
     def outlines(self, is_chosen: Flags) -> tuple[Part, ...]:
         """Return the outlines of the areas of chosen blocks, with their holes; neighbouring blocks are joined."""
-        if not is_chosen.any():
-            return ()
-        edges = np.diff(np.pad(is_chosen.astype(np.int8), ((0, 0), (1, 1))), axis=1)
-        rows, starts = np.nonzero(edges == 1)
-        _, ends = np.nonzero(edges == -1)
-        south = self.south + rows * self.side
-        boxes = shapely.box(self.west + starts * self.side, south, self.west + ends * self.side, south + self.side)
-        return outline_parts(shapely.union_all(boxes).simplify(0.0))
+        return cell_outlines(self.west, self.south, self.side, is_chosen)
+
+
+def cell_outlines(west: float, south: float, side: float, is_chosen: Flags) -> tuple[Part, ...]:
+    """Return the outlines of the areas of chosen square cells, with their holes; neighbouring cells are joined.
+
+    west, south: south-western corner of the first cell, m.
+    side: side of a cell, m.
+    is_chosen: (n, e), rows from south to north.
+
+    >>> [ring.tolist() for ring in cell_outlines(0.0, 0.0, 1.0, np.array([[True, True]]))[0]]
+    [[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]]]
+    """
+    if not is_chosen.any():
+        return ()
+    edges = np.diff(np.pad(is_chosen.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    rows, starts = np.nonzero(edges == 1)
+    _, ends = np.nonzero(edges == -1)
+    bottom = south + rows * side
+    boxes = shapely.box(west + starts * side, bottom, west + ends * side, bottom + side)
+    return outline_parts(shapely.union_all(boxes).simplify(0.0))
 
 
 def outline_parts(area: BaseGeometry) -> tuple[Part, ...]:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import ground_speed
-from flight.autopilots.arduplane.point_mass import PointMass, excess_power
+from flight.autopilots.point_mass import PointMass, excess_power
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
 from world.arrays import Codes, Flags, Floats

@@ -12,12 +12,12 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.point_mass import PointMass, excess_power
-from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.autopilots.arduplane.tecs import (
     MIN_ROLL_LIMIT_RAD,
     load_factor_roll_limit,
 )
+from flight.autopilots.point_mass import PointMass, excess_power
+from flight.autopilots.simulated_returns import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, glide_steps
 from world.arrays import Codes, Floats
@@ -47,7 +47,7 @@ def remaining_glide_altitudes(
 ) -> tuple[Floats, Codes]:
     """Return, for each of n starts, the altitude (m) left on arrival at the best destination, and its cell.
 
-    starts: (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
     airspeed: equivalent airspeed of the glide, m/s.
     bank: bank of the turn, rad; limited to the bank that the airspeed allows.

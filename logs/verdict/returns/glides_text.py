@@ -2,7 +2,7 @@
 
 import math
 
-from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S
+from flight.autopilots.simulated_returns import ENGINE_FAILURE_REACTION_S
 from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
 
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
@@ -51,9 +51,10 @@ def glides_headline(glides: Glides) -> str:
         _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
     )
     if any(glide.own_return.end == "not flown" for glide in glides.each):
-        own_text = "ArduPlane's own return, which would follow the terrain, is not simulated"
+        follows_text = ", which would follow the terrain," if glides.follows_terrain else " without the engine"
+        own_text = f"{glides.autopilot}'s own return{follows_text} is not simulated"
     else:
-        own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
+        own_text = f"{glides.autopilot}'s own return arrives from {glides.arrivals}"
     return f"of {len(glides.each)} positions, {reach_text}; {own_text}"
 
 
@@ -73,13 +74,13 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range: the best destination in reach, the altitude to spare, and ArduPlane's own return."""
+    """Describe a time range: the best destination in reach, the altitude to spare, and the autopilot's own return."""
     time_text = (
         f"{glide_range.first:.0f} s"
         if glide_range.count == 1
         else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
     )
-    return f"{time_text}: {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide)}"
+    return f"{time_text}: {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide, glides)}"
 
 
 def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
@@ -105,24 +106,21 @@ def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
             return "unknown, because this part lies outside the elevation data"
 
 
-def _own_return_text(glide: Glide) -> str:
-    """Describe the outcome of ArduPlane's own return without thrust; return "" if it is not simulated."""
-    name = glide.own_return.target.name
+def _own_return_text(glide: Glide, glides: Glides) -> str:
+    """Describe the outcome of the autopilot's own return without thrust; return "" if it is not simulated."""
+    name, own_text = glide.own_return.target.name, f"; {glides.autopilot}'s own return"
     match glide.own_return.end:
         case "arrives":
-            return f"; ArduPlane's own return arrives over {name}"
+            return f"{own_text} arrives over {name}"
         case "low":
             min_height = min(glide.own_return.arrival_height, glide.own_return.clearance)
-            return (
-                f"; ArduPlane's own return descends to {min_height:.0f} m above ground, below the required"
-                f" {MARGIN:.0f} m"
-            )
+            return f"{own_text} descends to {min_height:.0f} m above ground, below the required {MARGIN:.0f} m"
         case "ground":
-            return f"; ArduPlane's own return comes down {glide.own_return.shortfall / 1000.0:.1f} km from {name}"
+            return f"{own_text} comes down {glide.own_return.shortfall / 1000.0:.1f} km from {name}"
         case "threat":
-            return "; ArduPlane's own return enters a missile's sphere"
+            return f"{own_text} enters a missile's sphere"
         case "unknown":
-            return "; ArduPlane's own return leaves the elevation data"
+            return f"{own_text} leaves the elevation data"
         case "not flown":
             return ""
 
@@ -133,7 +131,7 @@ def glide_notes(glides: Glides) -> list[str]:
         return []
     notes = [
         f"without the engine the aircraft flies on for {ENGINE_FAILURE_REACTION_S:.0f} s, then "
-        f"glides at AIRSPEED_MIN {glides.airspeed:g} m/s, at least {MARGIN:.0f} m above ground, "
+        f"glides at {glides.airspeed_name} {glides.airspeed:g} m/s, at least {MARGIN:.0f} m above ground, "
         "outside missiles' spheres, but also through zones",
         "ground is flat according to the elevation file, which contains no trees, houses or water",
     ]

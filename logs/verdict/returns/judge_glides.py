@@ -1,7 +1,8 @@
-"""Judge which destinations are in reach after an engine failure, by ArduPlane's own RTL and by the best path.
+"""Judge which destinations are in reach after an engine failure, by the autopilot's own RTL and by the best path.
 
 ArduPlane does not detect an engine failure: its return to launch is simulated without thrust by its control law
-(`flight.autopilots.arduplane.rtl_point_mass`), straight to its target and onto its slope.  All destinations in reach
+(`flight.autopilots.arduplane.rtl_point_mass`), straight to its target and onto its slope.  The own returns of other
+autopilots without thrust are not simulated.  All destinations in reach
 are found by backward searches from home, the rally points and the landing places of the mission, and from all ground
 that is flat by the elevation file (`logs.verdict.returns.glide_map`).  Both keep `MARGIN` above ground on the whole
 path, and stay out of kill spheres.
@@ -9,22 +10,16 @@ path, and stay out of kill spheres.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.rtl_point_mass import (
-    RETURN_ARRIVED,
-    RETURN_GROUND_IMPACT,
-    SimulatedReturns,
-    fly_returns,
-)
+from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SimulatedReturns
 from flight.mission.placing import landing_positions
-from flight.mission.return_path import ReturnCircle, ReturnTarget
+from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
 from logs.verdict.returns.glide_map import (
     Cells,
@@ -52,8 +47,9 @@ SiteKind = Literal["home", "rally", "landing"]
 # ground; nothing; or unknown, because the aircraft is beyond the elevation data.
 Reach = Literal["home", "site", "flat", "nothing", "unknown"]
 REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
-# Outcome of ArduPlane's own return without thrust: at its target; at its target, but lower above ground than `MARGIN`;
-# ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the terrain.
+# Outcome of the autopilot's own return without thrust: at its target; at its target, but lower above ground than
+# `MARGIN`; ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the
+# terrain, or because the autopilot's return without thrust is not known.
 EngineOutEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
 # Reason why no glide is judged: there is no elevation file; the model has no trim with the throttle closed; or the
 # mission is too large for a map.
@@ -75,7 +71,7 @@ class GlideSite(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EngineOutReturn:
-    """ArduPlane's return to launch without thrust.
+    """The autopilot's return to launch without thrust.
 
     target: destination of the return.
     end: outcome.
@@ -99,7 +95,7 @@ class Glide:
 
     time: flight time at the start, s.
     start: position of the start, m, (3,).
-    own_return: outcome of ArduPlane's return.
+    own_return: outcome of the autopilot's return.
     home_altitude_left: altitude left on arrival at home, m; negative if the altitude is too low, -inf without a path.
     site_altitude_left: altitude left on arrival at the best rally point or landing place, m; -inf if there is none.
     site: index of that place in `Glides.sites`; -1 if no path leads to one.
@@ -121,7 +117,7 @@ class Glide:
 
 @dataclass(frozen=True, slots=True)
 class GlideRange:
-    """Time range of the flight with the same best destination and the same outcome of ArduPlane's return.
+    """Time range of the flight with the same best destination and the same outcome of the autopilot's return.
 
     first, last: times of the first and the last start, s.
     count: number of glides.
@@ -147,6 +143,9 @@ class Glides:
     fuel: True if the engine burns fuel; the drag of the stopped engine is then unknown.
     not_judged: reason why no glide is judged; "" if glides are judged.
     footprint: the map used for the glides; None if no glide is judged.
+    autopilot: title of the autopilot whose own return is simulated.
+    airspeed_name: parameter of the airspeed; "" if no parameter states it.
+    follows_terrain: True if the autopilot's own returns would follow the terrain.
     """
 
     each: tuple[Glide, ...]
@@ -156,6 +155,9 @@ class Glides:
     fuel: bool = False
     not_judged: NotJudged = ""
     footprint: GlideFootprint | None = field(default=None, repr=False, compare=False)
+    autopilot: str = ""
+    airspeed_name: str = ""
+    follows_terrain: bool = False
 
     def count(self, reach: Reach) -> int:
         """Return the number of glides whose best destination is of this kind."""
@@ -163,7 +165,7 @@ class Glides:
 
     @property
     def arrivals(self) -> int:
-        """Number of ArduPlane's own returns that arrive."""
+        """Number of the autopilot's own returns that arrive."""
         return sum(glide.own_return.end == "arrives" for glide in self.each)
 
     @property
@@ -221,21 +223,20 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     Low starts in take-offs and landings are omitted, because from them the aircraft descends straight ahead.
     """
     starts = starts.subset(np.flatnonzero(~starts.is_low))
-    parameters = world.parameters
-    sites, airspeed = _glide_sites(world), float(parameters.airspeed_min)
-    burns_fuel = world.setup.envelope.volts <= 0.0
+    none = _no_glides(world)
+    sites, airspeed = none.sites, none.airspeed
     terrain, environment, aircraft = world.scenario.terrain, world.environment, world.aircraft
     if terrain is None or not aircraft.glides:
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="terrain" if terrain is None else "trim")
+        return replace(none, not_judged="terrain" if terrain is None else "trim")
     rows = starts.rows
     if not len(rows):
-        return Glides((), sites, airspeed, fuel=burns_fuel)
+        return none
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
     grid = glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="far")
+        return replace(none, not_judged="far")
     own_returns = _simulate_engine_out_returns(world, starts)
-    bank, max_altitude = float(parameters.roll_limit), float(rows["up"].max())
+    bank, max_altitude = float(world.autopilot.turns.max_bank), float(rows["up"].max())
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
     slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
 
@@ -272,7 +273,20 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
             )
         )
     footprint = GlideFootprint(grid, np.minimum(home_min_altitudes, site_min_altitudes), is_landable)
-    return Glides(tuple(glides), sites, airspeed, grid.cell, burns_fuel, footprint=footprint)
+    return replace(none, each=tuple(glides), cell=grid.cell, footprint=footprint)
+
+
+def _no_glides(world: ReturnWorld) -> Glides:
+    """Return a `Glides` with all that does not depend on simulated glides, and without any glide."""
+    return Glides(
+        (),
+        _glide_sites(world),
+        world.min_airspeed,
+        fuel=world.setup.envelope.volts <= 0.0,
+        autopilot=world.autopilot.title,
+        airspeed_name=world.min_airspeed_name,
+        follows_terrain="terrain" in world.unjudged_parts,
+    )
 
 
 def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altitude_left: float) -> Reach:
@@ -305,16 +319,17 @@ def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
 
 
 # ----------------------------------------------------------------------
-# ArduPlane's own return.
+# The autopilot's own return.
 
 
 def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> list[EngineOutReturn]:
-    """Simulate ArduPlane's own return without thrust from each start.
+    """Simulate the autopilot's own return without thrust from each start.
 
-    If returns follow the terrain, none is simulated, and each has the outcome "not flown".
+    If returns follow the terrain, or if the autopilot's return without thrust is not known, none is simulated, and each
+    has the outcome "not flown".
     """
     targets = [world.target(row) for row in starts.rows]
-    if "terrain" in world.unjudged_parts:
+    if not world.is_simulated or not world.autopilot.returns.flies_without_engine:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
     outcomes = fly_without_engine(world, starts, targets).results
     return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
@@ -323,28 +338,14 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
 def fly_without_engine(
     world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], *, store_paths: bool = False
 ) -> SimulatedReturns:
-    """Simulate ArduPlane's own return without thrust from n starts to their targets.
+    """Simulate the autopilot's own return without thrust from n starts to their targets.
 
     A return that continues with a landing is simulated only up to its loiter.
 
     store_paths: True to store the paths.
     """
-    radius = ArduPlane(world.parameters).returns.rules.radius
-    return_circles = [
-        None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
-    ]
-    landing_sequences = [
-        target.landing._replace(next_stops=()) if target.landing and target.straight else None for target in targets
-    ]
-    return fly_returns(
-        starts.rows,
-        return_circles,
-        world.parameters,
-        world.aircraft,
-        world.environment,
-        landings=landing_sequences,
-        store_positions=store_paths,
-        engine_out=True,
+    return world.fly(
+        starts.rows, targets, world.aircraft, world.environment, store_positions=store_paths, engine_out=True
     )
 
 

@@ -1,9 +1,9 @@
-"""Judge whether every return to launch (RTL) is safe: simulate ArduPlane's RTL from each start.
+"""Judge whether every return to launch (RTL) is safe: simulate the autopilot's RTL from each start.
 
-If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to the sequence is judged.
+If the RTL, or a battery failsafe, leads to a landing sequence of the mission, the path to the sequence is judged.
 
-A return is simulated with a point mass (`flight.autopilots.arduplane.rtl_point_mass`), in the mean wind.  Returns whose
-simulation could be wrong are flown again in JSBSim if the caller provides a function for it.  The JSBSim result
+A return is simulated with a point mass (`flight.autopilots.parts.ReturnBehaviour.fly`), in the mean wind.  Returns
+whose simulation could be wrong are flown again in JSBSim if the caller provides a function for it.  The JSBSim result
 replaces the result of the point mass for that return and, if it is worse, for all similar returns.
 """
 
@@ -17,25 +17,22 @@ import numpy as np
 
 from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass, make_point_mass
-from flight.autopilots.arduplane.rtl_point_mass import (
+from flight.autopilots.autopilot import Autopilot, Parameters
+from flight.autopilots.parts import Cause, FlyReturns, ReturnMission
+from flight.autopilots.point_mass import PointMass, make_point_mass
+from flight.autopilots.px4.parameters import FROM_ARDUPILOT, Px4Parameters
+from flight.autopilots.simulated_returns import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
     RETURN_OFF_TERRAIN,
     RETURN_TIMEOUT,
     ReturnEnvironment,
-    fly_returns,
     make_return_environment,
 )
-from flight.autopilots.autopilot import Parameters
-from flight.autopilots.px4.parameters import FROM_ARDUPILOT, Px4Parameters
-from flight.mission.items import LANDINGS, Command
 from flight.mission.placing import landing_starts, return_points
 from flight.mission.return_path import (
     LandingStart,
-    ReturnCircle,
     ReturnPoint,
     ReturnTarget,
     choose_target,
@@ -63,19 +60,17 @@ UNJUDGED: tuple[Kind, ...] = ("unknown", "power", "unsure")
 # Outcomes that are failures of the return.
 UNSAFE = frozenset(KINDS[:5])
 
-# End of a return: it stays in a loiter there; it goes on from the loiter to a landing sequence (RTL_AUTOLAND 1); or it
-# flies straight to a landing sequence (RTL_AUTOLAND 2, and "land" as a battery failsafe action).
+# End of a return: it stays in a loiter there; it goes on from the loiter to a landing sequence (RTL_AUTOLAND 1 of
+# ArduPlane); or it flies straight to a landing sequence (RTL_AUTOLAND 2, and "land" as a battery failsafe action).
 Ending = Literal["circle", "on to land", "straight to land"]
-# Reasons that leave returns undecided, whatever their simulation shows: they follow the terrain; the autopilot has
-# another control law; mode AUTOLAND lands by a pattern of its own; they follow the mission's return path (RTL_AUTOLAND
-# 4); or the landing sequence begins with the landing itself.
-UnjudgedPart = Literal["terrain", "law", "autoland", "return path", "landing"]
 
 # Distance to the ground or the required height within which the point mass could be wrong, m: its least clearance is
-# within 7 m of 38 flights of ArduPlane, and within 4.5 m of 254 flights in JSBSim (`benchmarks.return_differences`).
+# within 7 m of 38 flights of ArduPlane, and in JSBSim (`benchmarks.return_differences`) within 4.5 m of 254 flights of
+# the simulated ArduPlane and within 5.1 m of 555 flights of the simulated PX4.
 POINT_MASS_ERROR_M = 10.0
 # Distance to a kill sphere within which the point mass could be wrong, m: its least distance outside a sphere is within
-# 32 m of 57 flights in JSBSim, and within 18 m where it is below 100 m.
+# 32 m of 57 flights of the simulated ArduPlane in JSBSim, and within 18 m where it is below 100 m; and within 35 m of
+# 97 of 111 flights of the simulated PX4, of which the others turned back to another side.
 POINT_MASS_POSITION_ERROR_M = 35.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
@@ -183,9 +178,13 @@ class Returns:
     flown: True if the returns begin on a flown track, False for the planned path.
     jsbsim_differences: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
     stands_in: True if ArduPlane's return is simulated because the autopilot has no return law.
-    unjudged_parts: parts that are not judged.
-    autoland: RTL_AUTOLAND; None for the mission of another autopilot.
+    unjudged_parts: parts that are not judged, whatever the simulation shows: each a key of
+        `logs.verdict.returns.returns_text.UNJUDGED_PART_TEXTS`, or a clause by the autopilot.
+    autoland: RTL_AUTOLAND; None for returns of another autopilot.
     autoland_assumed: True if this value is assumed, because ArduPlane does not arm with 0.
+    autopilot: title of the autopilot whose return is simulated.
+    path_text: its sentence on the path of its returns; "" if there is nothing to say.
+    trials_text: its parameters that may make its returns safe, in messages.
     landings: the mission's landing sequences.
     omitted_count: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing
         that it sinks to the ground before it can return.
@@ -200,9 +199,12 @@ class Returns:
     flown: bool
     jsbsim_differences: tuple[float, ...] = ()
     stands_in: bool = False
-    unjudged_parts: tuple[UnjudgedPart, ...] = ()
+    unjudged_parts: tuple[str, ...] = ()
     autoland: int | None = None
     autoland_assumed: bool = False
+    autopilot: str = ArduPlane.title
+    path_text: str = ""
+    trials_text: str = ""
     landings: tuple[LandingStart, ...] = ()
     omitted_count: int = 0
 
@@ -287,17 +289,17 @@ def worst_first_key(ret: SimulatedReturn) -> tuple[int, float]:
 class ReturnWorld:
     """Data that determine the outcomes of simulated returns to launch, except the starts of the returns.
 
-    parameters: ArduPlane's parameters.
+    autopilot: simulated autopilot that returns; it has an RTL.
     home, rally: positions on the map.
     aircraft: point-mass model.
     environment: ground and spheres.
     stands_in: as in `Returns`.
-    has_other_law: True if ArduPlane's return replaces the return of an autopilot with its own return law.
+    has_other_law: True if ArduPlane's return replaces the return of an autopilot with parameters of its own.
     landings: the mission's landing sequences.
     """
 
     setup: FlightSetup
-    parameters: ArduPilotParameters
+    autopilot: Autopilot
     home: ReturnPoint
     rally: tuple[ReturnPoint, ...]
     aircraft: PointMass
@@ -318,28 +320,52 @@ class ReturnWorld:
         return self.setup.limits.min_clearance
 
     @property
+    def fly(self) -> FlyReturns:
+        """Function that simulates the autopilot's RTLs.  Raises ValueError for an autopilot without an RTL."""
+        fly = self.autopilot.returns.fly
+        if fly is None:
+            raise ValueError(f"{self.autopilot.title} has no RTL")
+        return fly
+
+    @property
+    def min_airspeed(self) -> float:
+        """Equivalent airspeed of a glide, m/s: the lowest that the autopilot accepts."""
+        limits = self.autopilot.speeds.limits
+        return self.setup.airspeed if limits is None else limits.min
+
+    @property
+    def min_airspeed_name(self) -> str:
+        """Parameter of `min_airspeed`; "" if no parameter states it."""
+        limits = self.autopilot.speeds.limits
+        return "" if limits is None else limits.min_name
+
+    @property
     def is_battery_known(self) -> bool:
         """True if the battery's energy is stated; otherwise energy is not judged."""
         return not self.setup.envelope.battery_guessed or self.scenario.flight.battery_wh is not None
 
     @property
-    def causes(self) -> tuple[Cause, ...]:
-        """Events that can take the aircraft off its mission; unknown, thus empty, for another autopilot."""
-        if self.has_other_law:
-            return ()
+    def mission(self) -> ReturnMission:
+        """Properties of the mission on which the returns depend."""
+        distances = (math.hypot(point.east - self.home.east, point.north - self.home.north) for point in self.rally)
         mission = self.setup.mission
-        return failsafe_causes(
-            self.parameters,
-            has_fence=bool(mission.fences),
-            has_landing=bool(self.landings),
-            ends_landed=any(item.command in LANDINGS for item in mission.items),
+        return ReturnMission(
+            frozenset(item.command for item in mission.items),
+            bool(mission.fences),
+            min(distances, default=math.inf),
+            self.landings,
         )
 
     @property
+    def causes(self) -> tuple[Cause, ...]:
+        """Events that can take the aircraft off its mission; unknown, thus empty, for an autopilot without returns."""
+        return () if self.has_other_law else self.autopilot.returns.causes(self.mission)
+
+    @property
     def ending(self) -> Ending:
-        """End of an RTL, by RTL_AUTOLAND: a circle or a landing sequence."""
-        ending_of_setting: dict[int, Ending] = {1: "on to land", 2: "straight to land"}
-        return ending_of_setting.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
+        """End of an RTL: a circle or a landing sequence."""
+        ending_by_join: dict[str, Ending] = {"circle": "on to land", "straight": "straight to land"}
+        return ending_by_join.get(self.autopilot.returns.rules.landing_join, "circle") if self.landings else "circle"
 
     @property
     def endings(self) -> tuple[Ending, ...]:
@@ -348,28 +374,34 @@ class ReturnWorld:
         return (self.ending, "straight to land") if has_landing else (self.ending,)
 
     @property
-    def unjudged_parts(self) -> tuple[UnjudgedPart, ...]:
-        """Parts of the returns that cannot be judged."""
-        reasons: dict[UnjudgedPart, bool] = {
-            "terrain": self.parameters.rtl_follows_terrain,
-            "law": self.has_other_law,
-            "autoland": any(cause.action == "autoland" for cause in self.causes),
-            "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
-            "landing": any(ending != "circle" for ending in self.endings)
-            and any(landing.is_landing for landing in self.landings),
-        }
-        return tuple(name for name, applies in reasons.items() if applies)
+    def is_simulated(self) -> bool:
+        """True if returns are simulated at all."""
+        return not self.autopilot.returns.unsimulated_text(self.mission)
+
+    @property
+    def unjudged_parts(self) -> tuple[str, ...]:
+        """Parts of the returns that cannot be judged, as in `Returns`."""
+        behaviour = self.autopilot.returns
+        unsimulated_text = behaviour.unsimulated_text(self.mission)
+        begins_with_landing = any(landing.is_landing for landing in self.landings)
+        return (
+            *([unsimulated_text] if unsimulated_text else []),
+            *(["law"] if self.has_other_law else []),
+            *(["autoland"] if any(cause.action == "autoland" for cause in self.causes) else []),
+            *behaviour.unjudged_texts(self.mission),
+            *(["landing"] if begins_with_landing and any(ending != "circle" for ending in self.endings) else []),
+        )
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
-        """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by RTL_AUTOLAND."""
-        rules = ArduPlane(self.parameters).returns.rules
+        """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by its rules."""
+        rules = self.autopilot.returns.rules
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
         ending = ending or self.ending
         if ending == "straight to land" and (landing := nearest_landing_sequence(position, self.landings)) is not None:
             distance = math.dist(position[:2], landing.position[:2])
             name, reason = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
             return ReturnTarget(landing.position, name, reason, distance, landing=landing, straight=True)
-        target = choose_target(rules, position, self.home, self.rally)
+        target = choose_target(rules, position, self.home, self.rally, self.landings)
         return self.with_landing(target) if ending == "on to land" else target
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
@@ -386,49 +418,67 @@ class ReturnWorld:
         return f"item {landing.item} is of the nearest of {len(self.landings)}" if len(self.landings) > 1 else ""
 
     def with_parameters(self, **values: float) -> "ReturnWorld":
-        """Return a copy with other parameters, by ArduPlane's names and in its units."""
-        return replace(self, parameters=self.parameters.changed(**values))
+        """Return a copy with other parameters, by the autopilot's names and in its units."""
+        return replace(self, autopilot=self.autopilot.with_parameters(**values))
 
     def with_rally(self, rally: Sequence[ReturnPoint]) -> "ReturnWorld":
         """Return a copy with other rally points."""
         return replace(self, rally=tuple(rally))
 
 
-def _has_return_path(setup: FlightSetup) -> bool:
-    """Return True if a mission has a landing sequence or a return path (followed by RTL_AUTOLAND 4)."""
-    return any(item.command in (Command.DO_RETURN_PATH_START, Command.DO_LAND_START) for item in setup.mission.items)
+def returning_title(setup: FlightSetup) -> str:
+    """Return the title of the autopilot whose return is simulated: ArduPlane if the setup's autopilot has none."""
+    autopilot = setup.autopilot.model
+    return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
 
 def make_return_world(setup: FlightSetup) -> ReturnWorld:
     """Collect the data with which returns to launch from a setup's mission are simulated.
 
-    The control law is ArduPlane's, with the setup's parameters if it has any, otherwise with the aircraft's parameters.
+    The control law is that of the setup's autopilot, or of ArduPlane if that autopilot has no RTL.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
     """
+    autopilot = setup.autopilot.model
+    if autopilot.returns.fly is not None:
+        return _make_world(setup, autopilot)
+    aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
+    return replace(
+        _make_world(setup, ArduPlane(ArduPilotParameters.load(aircraft))),
+        stands_in=True,
+        has_other_law=autopilot.parameters is not None,
+    )
+
+
+def _make_world(setup: FlightSetup, autopilot: Autopilot) -> ReturnWorld:
+    """Collect the data for simulated returns by an autopilot that has an RTL; see `make_return_world`."""
     return_positions = return_points(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not return_positions:
         source = setup.mission.source
         message = f"{source}: home: not stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
     aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
-    setup_parameters = setup.autopilot.model.parameters
-    parameters = (
-        setup_parameters
-        if isinstance(setup_parameters, ArduPilotParameters)
-        else _with_px4_airspeeds(ArduPilotParameters.load(aircraft), setup_parameters)
-    )
     return ReturnWorld(
         setup,
-        parameters,
+        autopilot,
         return_positions[0],
         return_positions[1:],
         make_point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
         make_return_environment(setup.scenario),
         judged_airspace(setup),
-        setup_parameters is not parameters,
-        setup_parameters is not None and setup_parameters is not parameters,
-        landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
+        landings=landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
     )
+
+
+def without_engine_world(world: ReturnWorld) -> ReturnWorld:
+    """Return the world in which returns without an engine are simulated: by ArduPlane if the autopilot has none.
+
+    ArduPlane's parameters are those of the aircraft, with the airspeeds that the user's PX4 parameter file states.
+    """
+    if world.autopilot.returns.flies_without_engine:
+        return world
+    aircraft = find_logged_aircraft(world.setup.aircraft, world.scenario.flight.aircraft)
+    parameters = _with_px4_airspeeds(ArduPilotParameters.load(aircraft), world.autopilot.parameters)
+    return replace(_make_world(world.setup, ArduPlane(parameters)), stands_in=True, has_other_law=True)
 
 
 def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None) -> ArduPilotParameters:
@@ -470,7 +520,7 @@ def judge_returns(
     omitted_count, total_count = 0, len(world.endings) * len(starts)
     for number, ending in enumerate(world.endings):
         advance(number * len(starts), total_count)
-        if "terrain" in world.unjudged_parts or ("landing" in world.unjudged_parts and ending == "straight to land"):
+        if not world.is_simulated or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
         targets = [world.target(row, ending) for row in starts.rows]
         min_heights = required_heights(world, starts)
@@ -494,21 +544,34 @@ def judge_returns(
         ]
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
         returns += reported_returns
-    return Returns(
+    return replace(
+        _no_returns(world, starts, interval),
         each=tuple(returns),
+        jsbsim_differences=tuple(differences),
+        omitted_count=omitted_count,
+    )
+
+
+def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Returns:
+    """Return a `Returns` with all that does not depend on simulated returns, and without any return."""
+    parameters = world.autopilot.parameters
+    autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
+    return Returns(
+        each=(),
         interval=interval,
         causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
         reserve=ENERGY_RESERVE_FRACTION * world.setup.battery,
         flown=starts.is_flown,
-        jsbsim_differences=tuple(differences),
         stands_in=world.stands_in,
         unjudged_parts=world.unjudged_parts,
-        autoland=None if world.has_other_law else int(world.parameters.rtl_autoland),
-        autoland_assumed="RTL_AUTOLAND" in world.parameters.by_origin("assumed"),
+        autoland=None if world.has_other_law else autoland,
+        autoland_assumed=parameters is not None and "RTL_AUTOLAND" in parameters.by_origin("assumed"),
         landings=world.landings,
-        omitted_count=omitted_count,
+        autopilot=world.autopilot.title,
+        path_text=world.autopilot.returns.path_text,
+        trials_text=world.autopilot.returns.trials.text,
     )
 
 
@@ -545,27 +608,33 @@ def simulate_returns(
 
     Returns the results, (n,) of dtype `RETURN_RESULT`, and the paths; the paths are empty without zones.
 
-    abort_limits: as in `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
+    abort_limits: as in `flight.autopilots.parts.FlyReturns`.
     store_paths: True to return the paths even without zones.
     """
-    radius = ArduPlane(world.parameters).returns.rules.radius
-    circles = [
-        None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
-    ]
-    # A landing is not simulated: a return whose landing sequence begins with the landing ends at its loiter.
-    landings = [target.landing if target.landing and not target.landing.is_landing else None for target in targets]
     store_paths = store_paths or bool(world.airspace.zones)
-    result = fly_returns(
-        starts.rows,
-        circles,
-        world.parameters,
-        world.aircraft,
-        world.environment,
-        landings=landings,
-        store_positions=store_paths,
-        abort_limits=abort_limits,
-    )
-    return result.results, result.tracks
+    if world.scenario.wind.field is None or not len(starts):
+        batches = [(slice(None), world.aircraft)]
+    else:
+        # In a forecast, each return flies in the wind of the time and place at which it starts.
+        places = np.column_stack([starts.rows[name] for name in ("east", "north", "up")])
+        batches = [
+            (slice(k, k + 1), world.aircraft.in_wind(world.scenario.local_wind(places[k].tolist(), float(time))))
+            for k, time in enumerate(starts.time)
+        ]
+    flown = [
+        world.fly(
+            starts.rows[batch],
+            targets[batch],
+            aircraft,
+            world.environment,
+            store_positions=store_paths,
+            abort_limits=None if abort_limits is None else (abort_limits[0][batch], abort_limits[1][batch]),
+        )
+        for batch, aircraft in batches
+    ]
+    if len(flown) == 1:
+        return flown[0].results, flown[0].tracks
+    return np.concatenate([part.results for part in flown]), tuple(path for part in flown for path in part.tracks)
 
 
 def simulate_judged_returns(
@@ -732,7 +801,11 @@ def _recheck_in_jsbsim(
     Returns the corrected returns, and for each flown return the difference in clearance (JSBSim minus point mass, m).
     """
     limit_ratios = [limit_ratio(ret) for ret in returns]
-    reachable = [k for k, row in enumerate(starts.rows) if limit_ratios[k] < 1.0 and can_start_in_jsbsim(world, row)]
+    reachable = [
+        k
+        for k, row in enumerate(starts.rows)
+        if limit_ratios[k] < 1.0 and returns[k].target.landing is None and can_start_in_jsbsim(world, row)
+    ]
     offsets: dict[int, tuple[float, float]] = {}
     differences = []
     for k in sorted(reachable, key=lambda k: limit_ratios[k])[:max_flights]:

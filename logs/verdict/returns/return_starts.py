@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_speed
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_START
+from flight.autopilots.simulated_returns import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.energy import predicted_energy
@@ -29,7 +29,7 @@ class ReturnStarts:
     """Positions and velocities at which returns begin.
 
     time: flight times, s, (n,).
-    rows: states, (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    rows: states, (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     energy_used: energy used before the return, Wh, (n,); NaN if unknown.
     is_flown: True for a flown track, False for the planned path.
     is_low: True for a start in a flown take-off or landing that is lower above ground than the required clearance plus

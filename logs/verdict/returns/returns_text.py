@@ -3,17 +3,18 @@
 import math
 from collections.abc import Sequence
 
-from flight.autopilots.arduplane.failsafes import Cause
+from flight.autopilots.parts import Cause, FailsafeAction
 from flight.mission.return_path import ReturnPoint
 from logs.verdict.returns.judge_returns import (
     KINDS,
     POINT_MASS_ERROR_M,
     POINT_MASS_POSITION_ERROR_M,
+    UNJUDGED,
+    UNSAFE,
     Kind,
     ReturnRange,
     Returns,
     SimulatedReturn,
-    UnjudgedPart,
 )
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
@@ -56,27 +57,40 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "low": "a return comes lower than required",
     "safe": "a return is safe",
 }
-_ACTION_TEXTS = {
+# Texts for the reactions of an autopilot to a failure.
+ACTION_TEXTS: dict[FailsafeAction, str] = {
     "return": "returns",
     "land": "lands by its landing sequence",
+    "land here": "lands where it is",
     "autoland": "lands in mode AUTOLAND if it can, and otherwise returns",
     "on": "continues its mission",
     "circle": "circles where it is",
     "glide": "glides straight ahead without its motor, which is not a return",
     "parachute": "releases its parachute",
     "terminate": "ends its flight there",
+    "disarm": "stops its motor, which ends its flight",
     "level": "flies straight and level, which is not a return",
     "guided": "circles at the fence's return point",
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
 }
-_UNJUDGED_PART_TEXTS: dict[UnjudgedPart, str] = {
+# Clauses on the parts of returns that are not judged, by their names in answers.
+UNJUDGED_PART_TEXTS = {
     "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return is used instead",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
     "return path": "RTL_AUTOLAND 4 returns along the mission's return path",
     "landing": "the landing sequence begins with the landing itself",
 }
+
+
+def unjudged_parts_text(parts: Sequence[str]) -> str:
+    """Describe the parts of returns that are not judged; "" if all are.
+
+    >>> unjudged_parts_text(("autoland", "RTL_LAND_DELAY 0 lands after the return, which is not simulated"))
+    'mode AUTOLAND lands by a pattern of its own; RTL_LAND_DELAY 0 lands after the return, which is not simulated'
+    """
+    return "; ".join(UNJUDGED_PART_TEXTS.get(part, part) for part in parts)
 
 
 def segment_text(kind: Kind) -> str:
@@ -131,7 +145,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
-    reasons = "; ".join(_UNJUDGED_PART_TEXTS[reason] for reason in returns.unjudged_parts)
+    reasons = unjudged_parts_text(returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no position to return from"
     landing_suffix = "; the landing is not judged" if returns.lands else ""
@@ -218,8 +232,8 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     for heading, is_landing in (("it lands", True), ("it does not", False)):
         other_causes: dict[str, list[str]] = {}
         for cause in causes:
-            if not cause.is_return and (cause.action in ("land", "autoland")) == is_landing:
-                other_causes.setdefault(_ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
+            if not cause.is_return and (cause.action in ("land", "autoland", "land here")) == is_landing:
+                other_causes.setdefault(ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
         text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
         lines += [f"{heading}: {'; '.join(text)}"] if text else []
     return lines
@@ -228,13 +242,13 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 def describe_landing(returns: Returns) -> list[str]:
     """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
 
-    Return [] for an autopilot other than ArduPlane.
+    For an autopilot other than ArduPlane, return its sentence on the path of an RTL.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return keeps circling at its target']
     """
     if returns.autoland is None:
-        return []
+        return [returns.path_text] if returns.path_text else []
     loiter_text = "a return keeps circling at its target"
     items_text = (
         f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(landing.item) for landing in returns.landings)}"
@@ -262,7 +276,7 @@ def describe_landing(returns: Returns) -> list[str]:
 
 
 def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Describe a time range: destination and outcome of its returns, and its worst return."""
+    """Describe a time range: whether its returns are safe, their destination and outcome, and its worst return."""
     worst_return = return_range.worst
     time_text = (
         f"{return_range.first:.0f} s"
@@ -271,9 +285,16 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
     )
     reason = f" ({worst_return.target.reason})" if worst_return.target.reason else ""
     return (
-        f"{time_text}: to {worst_return.target.name}{reason}:"
+        f"{time_text}, {_judgement_text(worst_return)}: to {worst_return.target.name}{reason}:"
         f" {_range_outcome_text(worst_return, return_range, returns, scenario)}"
     )
+
+
+def _judgement_text(ret: SimulatedReturn) -> str:
+    """Return the judgement of a return: "safe", "unsafe", "too low" or "not judged"."""
+    if ret.kind in UNJUDGED:
+        return "not judged"
+    return "safe" if ret.safe else "unsafe" if ret.kind in UNSAFE else "too low"
 
 
 def _range_outcome_text(

@@ -1,4 +1,4 @@
-"""Suggest changes that make every return safe: RTL_ALTITUDE, a climb before the turn, or rally points.
+"""Suggest changes that make every return safe: the autopilot's parameters (`ReturnTrials`), or rally points.
 
 The suggested altitude is the lowest, and the number of rally points the smallest that was found.  Each suggestion is
 simulated from all starts, like judged returns.  Plain set cover does not work for rally points: the autopilot goes to
@@ -7,15 +7,14 @@ away from a better point.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.parameters import CLIMB_BEFORE_TURN
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED
-from flight.mission.return_path import ReturnPoint, ReturnTarget
+from flight.autopilots.simulated_returns import RETURN_ARRIVED
+from flight.mission.return_path import ReturnPoint, ReturnTarget, rally_target
 from logs.verdict.returns.judge_returns import (
     KINDS,
     TURN_HEIGHT_LOSS_M,
@@ -34,17 +33,15 @@ from world.kernels import Records
 
 # Margin that is kept beyond each limit, m: twice the error of the point mass.
 MARGIN = 15.0
-# Step of RTL_ALTITUDE, m.
+# Step of the height of a return above its destination, m.
 _ALTITUDE_STEP_M = 25.0
-# Values of RTL_CLIMB_MIN that are tried, m.
-_CLIMBS_M = (20.0, 50.0, 100.0, 200.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
     """Suggested change of parameters or rally points.
 
-    parameters: changed parameters, by ArduPlane's names and in its units.
+    parameters: changed parameters, by the autopilot's names and in its units.
     rally: rally points that replace the mission's; None keeps the mission's.
     """
 
@@ -179,60 +176,74 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest the lowest RTL_ALTITUDE that clears the ground or is safe, or a climb before the turn.
+    """Suggest the lowest height of the returns that clears the ground or is safe, or another change of parameters.
 
-    Altitudes are tried one by one, because a higher altitude may lead through a sphere and so be less safe.
+    Heights are tried one by one, because a higher return may lead through a sphere and so be less safe.
     """
     limits = _return_limits(world, starts)
     trial = _ReturnTrial(starts, limits)
     if trial.passes(world, _meets_all_limits):
         return []
-    remedies = []
-    current_altitude = max(0.0, world.parameters.rtl_altitude)
-    ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
-    max_altitude = (
-        float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
-        if world.environment.known
-        else current_altitude + 500.0
-    )
-    altitude_grid = np.arange(
-        _ALTITUDE_STEP_M * math.ceil(current_altitude / _ALTITUDE_STEP_M),
-        min(9000.0, max_altitude) + _ALTITUDE_STEP_M,
-        _ALTITUDE_STEP_M,
-    )
-    altitude_candidates = [float(altitude) for altitude in altitude_grid]
+    remedies: list[Remedy] = []
+    lowest_values: dict[str, float] = {}
+    for present_values in world.autopilot.returns.trials.altitudes:
+        search = _AltitudeSearch(world, present_values)
+        ground_altitude = search.lowest(0.0, _clears_ground, trial)
+        if ground_altitude is not None and ground_altitude > search.current:
+            lowest_values = lowest_values or search.values(ground_altitude)
+            remedies.append(Remedy(search.values(ground_altitude)))
+        safe_altitude = search.lowest(ground_altitude or 0.0, _meets_all_limits, trial)
+        if safe_altitude is None:
+            # No altitude keeps the margin on all returns: take the lowest that makes them safe.
+            trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, 0.0))
+            safe_altitude = search.lowest(0.0, _meets_all_limits, trial_without_margin)
+        if safe_altitude is not None and safe_altitude not in (ground_altitude, search.current):
+            remedies.append(Remedy(search.values(safe_altitude)))
+        if safe_altitude is not None:
+            return remedies
+    return [*remedies, *_suggest_other_parameters(world, trial, lowest_values)]
 
-    def min_passing_altitude(min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
-        """Return the lowest RTL_ALTITUDE, at least ``min_altitude``, with which all returns pass, or None."""
+
+class _AltitudeSearch:
+    """Search for the lowest height of the returns above their destination, from the present height upwards."""
+
+    def __init__(self, world: ReturnWorld, present_values: Mapping[str, float]) -> None:
+        """Prepare the heights to try.  present_values: as in `ReturnTrials.altitudes`."""
+        self._world, self._present_values = world, present_values
+        self.current = next(iter(present_values.values()))
+        ground_heights = world.environment.heights[np.isfinite(world.environment.heights)]
+        max_altitude = (
+            float(ground_heights.max()) - world.home.up + world.limit + 2.0 * MARGIN
+            if world.environment.known
+            else self.current + 500.0
+        )
+        altitude_grid = np.arange(
+            _ALTITUDE_STEP_M * math.ceil(self.current / _ALTITUDE_STEP_M),
+            min(9000.0, max_altitude) + _ALTITUDE_STEP_M,
+            _ALTITUDE_STEP_M,
+        )
+        self._candidates = [float(altitude) for altitude in altitude_grid]
+
+    def values(self, altitude: float) -> dict[str, float]:
+        """Return the parameters that a height (m) changes, by name."""
+        return {name: altitude for name, present in self._present_values.items() if altitude > present}
+
+    def lowest(self, min_altitude: float, criterion: Criterion, trial: _ReturnTrial) -> float | None:
+        """Return the lowest height, at least ``min_altitude``, with which all returns pass, or None."""
         return first_that_passes(
-            (altitude for altitude in altitude_candidates if altitude >= min_altitude),
-            lambda altitude: trial.passes(world.with_parameters(RTL_ALTITUDE=altitude), criterion),
+            (altitude for altitude in self._candidates if altitude >= min_altitude),
+            lambda altitude: trial.passes(self._world.with_parameters(**self.values(altitude)), criterion),
         )
 
-    ground_altitude = min_passing_altitude(0.0, _clears_ground, trial)
-    if ground_altitude is not None and ground_altitude > current_altitude:
-        remedies.append(Remedy({"RTL_ALTITUDE": ground_altitude}))
-    safe_altitude = min_passing_altitude(ground_altitude or 0.0, _meets_all_limits, trial)
-    if safe_altitude is None:
-        # No altitude keeps the margin on all returns: take the lowest that makes them safe.
-        trial_without_margin = _ReturnTrial(starts, _return_limits(world, starts, 0.0))
-        safe_altitude = min_passing_altitude(0.0, _meets_all_limits, trial_without_margin)
-    if safe_altitude is not None and safe_altitude not in (ground_altitude, current_altitude):
-        remedies.append(Remedy({"RTL_ALTITUDE": safe_altitude}))
-    if safe_altitude is None:
-        remedies += _suggest_climbs(world, trial, ground_altitude)
-    return remedies
 
+def _suggest_other_parameters(world: ReturnWorld, trial: _ReturnTrial, altitudes: dict[str, float]) -> list[Remedy]:
+    """Suggest another change of parameters with which all returns meet the requirements; return [] if none does.
 
-def _suggest_climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | None) -> list[Remedy]:
-    """Suggest a climb before the turn with which all returns meet the requirements; return [] if none does.
-
-    altitude: RTL_ALTITUDE to try in addition, m; None for no change of it.
+    altitudes: parameters of a height to try in addition, m, by name; empty for no change of it.
     """
-    options = float(int(world.parameters.flight_options) | CLIMB_BEFORE_TURN)
-    candidates = [{"RTL_CLIMB_MIN": climb} for climb in _CLIMBS_M] + [{"FLIGHT_OPTIONS": options}]
-    if altitude is not None:
-        candidates += [candidate | {"RTL_ALTITUDE": altitude} for candidate in candidates]
+    candidates = [dict(values) for values in world.autopilot.returns.trials.others]
+    if altitudes:
+        candidates += [candidate | altitudes for candidate in candidates]
     passing_candidate = first_that_passes(
         candidates, lambda candidate: trial.passes(world.with_parameters(**candidate), _meets_all_limits)
     )
@@ -352,6 +363,8 @@ def _rally_candidates(
             break
         spacing *= 1.2
     candidates = []
+    # PX4 ends its return above a rally point, which is a place on the ground; ArduPlane at the point itself.
+    end_height = world.autopilot.returns.rules.rally_height
     for grid_east, grid_north in grid.tolist():
         min_altitude = _highest_ground(world, grid_east, grid_north) + world.limit + MARGIN
         for altitude in (min_altitude, min_altitude + 200.0):
@@ -359,9 +372,18 @@ def _rally_candidates(
                 math.isfinite(altitude)
                 and _sphere_clearance(world, (grid_east, grid_north, altitude)) > _LOITER_RADIUS_M + MARGIN
             ):
-                height = math.ceil(altitude - world.home.up)
+                point_altitude = altitude
+                if end_height > 0.0:
+                    point_altitude = max(_ground_altitude(world, grid_east, grid_north), altitude - end_height)
+                height = math.ceil(point_altitude - world.home.up)
                 candidates.append(ReturnPoint(grid_east, grid_north, world.home.up + height, world.home.up))
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
+
+
+def _ground_altitude(world: ReturnWorld, east: float, north: float) -> float:
+    """Return the altitude of the ground at a point, or home's altitude without terrain, m AMSL."""
+    terrain = world.scenario.terrain
+    return world.home.up if terrain is None else float(terrain.height(east, north))
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
@@ -407,8 +429,13 @@ class _RallySearch:
         self._distances = np.hypot(
             rows["east"][:, None] - positions[None, :, 0], rows["north"][:, None] - positions[None, :, 1]
         )
-        self._home_distances = np.hypot(rows["east"] - world.home.east, rows["north"] - world.home.north)
-        limit = world.parameters.rally_limit
+        # Without rally points the return goes home, or to the mission's landing, which competes with them.
+        other_targets = [world.with_rally(()).target(row) for row in rows]
+        includes_home = world.autopilot.returns.rules.includes_home
+        self._other_distances = np.array(
+            [target.distance if includes_home or target.straight else math.inf for target in other_targets]
+        )
+        limit = world.autopilot.returns.rules.rally_limit
         self._max_rally_distance = limit if limit > 0.0 else math.inf
         self._is_good = np.zeros(self._distances.shape, dtype=np.bool_)
         self._is_simulated = np.zeros(len(starts), dtype=np.bool_)
@@ -450,9 +477,12 @@ class _RallySearch:
         if not pairs:
             return
         start_indices, candidate_indices = (np.array(column) for column in zip(*pairs, strict=True))
-        candidate_places = (self.candidates[candidate] for candidate in candidate_indices.tolist())
+        rules, rows = self._world.autopilot.returns.rules, self._starts.rows
         targets = [
-            self._world.with_landing(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in candidate_places
+            self._world.with_landing(
+                rally_target(rules, (row["east"], row["north"], row["up"]), self.candidates[candidate])
+            )
+            for row, candidate in zip(rows[start_indices], candidate_indices.tolist(), strict=True)
         ]
         starts, limits = self._starts.subset(start_indices), self._limits.subset(start_indices)
         self._is_good[start_indices, candidate_indices] = _meets_criterion(
@@ -467,8 +497,7 @@ class _RallySearch:
         nearest_indices = np.argmin(distances, axis=1)
         min_distances = distances[np.arange(len(searched_starts)), nearest_indices]
         goes_home = min_distances > self._max_rally_distance
-        if self._world.parameters.rally_includes_home > 0.0:
-            goes_home |= self._home_distances[searched_starts] <= min_distances
+        goes_home |= self._other_distances[searched_starts] <= min_distances
         is_good = np.where(
             goes_home,
             self._is_good_from_home[searched_starts],

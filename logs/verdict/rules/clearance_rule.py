@@ -116,11 +116,11 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     k = int(np.argmax(depths))
     if not float(depths[k]) > BELOW_HOME_M:
         return []
-    brief = f"waypoint {k} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
+    lowest_waypoint = requirements.waypoint(k)
+    brief = f"waypoint {lowest_waypoint.number} is {float(depths[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
     fault = message(
         brief, ", and no terrain data confirms that the ground there is so low (--terrain names an elevation file)"
     )
-    lowest_waypoint = requirements.waypoint(k)
     return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
 
 
@@ -305,10 +305,8 @@ def _flown_finding(
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
     terrain, off_text = requirements.setup.scenario.terrain, ""
-    if aligned is not None and aligned.has_flown(leg):
-        # The first leg includes the track before it, the last leg the track after it.
-        first = 0 if leg == 0 else int(aligned.rows[leg])
-        last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
+    first, last = (0, 0) if aligned is None else aligned.leg_segments(leg)
+    if aligned is not None and last > first:
         clearances = aligned.clearance[first:last]
         is_known = np.isfinite(clearances)
         if is_known.any():

@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flight.autopilots.arduplane.go_around_point_mass import count_climb_rows, fly_go_arounds, make_abort_start
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.parts import LandingGlide
+from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
 from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_point, landing_sequence, landing_starts
@@ -347,7 +348,8 @@ def _simulate_go_arounds(
         for start, height_above_ground in zip(starts_on_glide, heights, strict=True)
         if height_above_ground > 0.0
     ]
-    if not airborne:
+    parameters = world.autopilot.parameters
+    if not airborne or not isinstance(parameters, ArduPilotParameters):
         return []
     start_records: Records = np.concatenate(
         [
@@ -360,7 +362,7 @@ def _simulate_go_arounds(
         top_altitude,
         landing.pitch,
         landing.destinations,
-        world.parameters,
+        parameters,
         world.aircraft,
         world.environment,
     )
@@ -393,7 +395,7 @@ def _judge_go_around(
 ) -> _GoAround:
     """Return the go-around with the outcome of its simulated path filled in.
 
-    result: record of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
+    result: record of dtype `flight.autopilots.simulated_returns.RETURN_RESULT`.
     positions: one point a second, m, (n, 3).
     destination: destination of the go-around.
     top_altitude: altitude above which the climb is over, m AMSL.

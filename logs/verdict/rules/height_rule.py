@@ -49,8 +49,7 @@ def height_findings(
         track = aligned.track
         path_heights = _Path(track.position, track.time, *max_segment_heights(terrain, track.position))
         flown_maxima = [
-            _max_heights(path_heights, _leg_segments(requirements, aligned, leg)) if aligned.has_flown(leg) else None
-            for leg in range(requirements.legs)
+            _max_heights(path_heights, np.arange(*aligned.leg_segments(leg))) for leg in range(requirements.legs)
         ]
     return [
         _leg_finding(requirements, leg, limit, planned_maxima[leg], flown_maxima[leg], "flown track")
@@ -116,13 +115,6 @@ def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
     )
     time_and_place = f"at {time:.1f} s, east {position[0]:.0f} m, north {position[1]:.0f} m"
     return _LegMaxima(float(path.max_heights[k]), amsl, time_and_place, bool(is_known.all()))
-
-
-def _leg_segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
-    """Return the track's segments on a leg; the first and last legs include the track before and after the route."""
-    first = 0 if leg == 0 else int(aligned.rows[leg])
-    last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
-    return np.arange(first, last)
 
 
 def _leg_finding(

@@ -5,151 +5,298 @@ autopilot needs to notice the loss and leave the mission.
 """
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flight.autopilots.arduplane.failsafes import Cause
+from flight.autopilots.parts import LinkLossReaction
+from flight.mission.items import LANDINGS, Command
+from flight.simulation.track import Track
 from logs.verdict.findings import Fact, Finding, make_finding, message
 from logs.verdict.measures.link_outages import LinkAlongPath, Outage, link_along_path, station_antenna
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import FLIGHT
-from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, make_return_world
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.returns.judge_returns import FlyAgain, Returns, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.returns_text import ACTION_TEXTS, headline
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.tolerances import LINK_LOSS_REACTION_S
+from logs.verdict.wording import place_text_within
+from world.arrays import Floats
 from world.errors import MissionError
-from world.radio import LinkUse, RadioLink
+from world.radio import RadioLink
 
-# Causes in `flight.autopilots.arduplane.failsafes.failsafe_causes` that the loss of a link triggers.
-_LOSS_CAUSES: dict[LinkUse, tuple[str, ...]] = {
-    "telemetry": ("station lost",),
-    "control": ("RC lost for 1.5 s", "RC lost"),
-}
-# Time between two returns from an outage, s.
-_RETURN_INTERVAL_S = 5.0
+# Greatest number of returns from the outages, of which one begins each second of an outage.
+_MAX_RETURNS = 3000
+# Outages shorter than this are stated to a tenth of a second, s.
+_SHORT_OUTAGE_S = 10.0
+# Least diffraction loss that is stated, dB.
+_MIN_STATED_LOSS_DB = 0.1
 _METHOD = "free-space loss and Bullington's diffraction loss over the terrain, once a second"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedLink:
+    """Radio link along a path, and the finding on it.
+
+    along: the link along the judged path; None if it cannot be computed.
+    antenna: position of the station's antenna, m, (3,); None if `along` is None.
+    leg: leg with the smallest margin; None if no margin is known.
+    returns: returns with which the autopilot reacts to the outages; None if it does not return, or without an outage
+        that it notices.
+    """
+
+    finding: Finding
+    along: LinkAlongPath | None = None
+    antenna: Floats | None = None
+    leg: Place | None = None
+    returns: Returns | None = None
 
 
 def link_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge the scenario's radio link with one finding; [] for a scenario without a link."""
-    setup = requirements.setup
-    link, terrain = setup.scenario.link, setup.scenario.terrain
-    if link is None:
-        return []
+    link = requirements.setup.scenario.link
+    return [] if link is None else [judge_link(requirements, aligned, link, geometric=geometric).finding]
+
+
+def judge_link(
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    link: RadioLink,
+    *,
+    geometric: bool = False,
+    fly_again: FlyAgain | None = None,
+) -> JudgedLink:
+    """Judge a radio link along the planned path if `geometric`, otherwise along the whole flown track.
+
+    fly_again: as for `judge_returns`.
+    """
+    phases = requirements.ground_phases
+    whole_requirements = requirements if phases is None else phases.whole_route
+    setup = whole_requirements.setup
+    terrain = setup.scenario.terrain
     antenna = None if terrain is None else station_antenna(setup, link, terrain)
     if terrain is None or antenna is None:
-        missing = "no terrain was given" if terrain is None else "neither the station's position nor a home is known"
-        return [make_finding("link", FLIGHT, ok=None, reason=missing, unit="s")]
-    planned = link_along_path(link, terrain, antenna, requirements.path.times, requirements.path.points)
-    reaction = _loss_reaction(requirements, link)
-    limit = link.max_outage if reaction is None else min(link.max_outage, LINK_LOSS_REACTION_S)
-    if geometric:
-        return [_link_finding(requirements, None, (planned, planned), limit, reaction)]
-    if aligned is None:
-        return [
-            make_finding("link", FLIGHT, ok=None, reason="nothing was flown", planned=planned.longest_outage, unit="s")
-        ]
-    flown = link_along_path(link, terrain, antenna, aligned.track.time, aligned.track.position)
-    return [_link_finding(requirements, aligned, (planned, flown), limit, reaction)]
+        return JudgedLink(
+            make_finding("link", FLIGHT, ok=None, reason=_unknown_station_text(whole_requirements, link), unit="s")
+        )
+    path = whole_requirements.path
+    planned = link_along_path(link, terrain, antenna, path.times, path.points)
+    track, judged = None, planned
+    if not geometric:
+        track = None if aligned is None else aligned.track if phases is None else phases.track
+        if track is None:
+            unflown_finding = make_finding(
+                "link", FLIGHT, ok=None, reason="nothing was flown", planned=planned.longest_outage, unit="s"
+            )
+            return JudgedLink(unflown_finding)
+        judged = link_along_path(link, terrain, antenna, track.time, track.position)
+    all_reactions = setup.autopilot.returns.after_link_loss(link.use)
+    reactions = [reaction for reaction in all_reactions if reaction.action != "on"]
+    outages = _outages_until(judged.outages, _end_of_reactions(requirements, aligned if not geometric else None))
+    is_noticed = any(outage.duration > reaction.delay for outage in outages for reaction in reactions)
+    returns, reaction_text = None, ""
+    if is_noticed:
+        returns = _judge_reaction_returns(whole_requirements, track, outages, reactions, fly_again)
+        reaction_text = _reaction_text(setup.autopilot.title, reactions, returns)
+    elif judged.outages and not reactions:
+        setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
+        reaction_text = f"; without the link {setup.autopilot.title} continues its mission{setting_text}"
+    leg = None if judged.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged)
+    text = _link_text(judged, leg)
+    finding = _link_finding(link, (planned, judged), outages, reactions, (text, reaction_text), geometric=geometric)
+    return JudgedLink(finding, judged, antenna, leg, returns)
 
 
-def _link_text(link_on_path: LinkAlongPath) -> str:
-    """Describe the smallest margin of the link and its outages."""
-    k = link_on_path.worst
-    if k < 0:
-        return "the terrain below the radio path is unknown"
-    points = link_on_path.points
-    sight_text = "in line of sight" if points.is_visible[k] else "behind the terrain"
-    text = (
-        f"{abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the fade margin"
-        f" at {link_on_path.time[k]:.0f} s, {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
-    )
-    if link_on_path.outages:
-        count = len(link_on_path.outages)
-        times_text = f", {count} times, at most {link_on_path.longest_outage:.0f} s at a time" if count > 1 else ""
-        text += f"; below the fade margin for {link_on_path.time_below_margin:.0f} s{times_text}"
-    return text if link_on_path.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
-
-
-def _loss_reaction(requirements: RouteRequirements, link: RadioLink) -> Cause | None:
-    """Return the failsafe by which ArduPlane leaves its mission when this link is lost.
-
-    Return None if ArduPlane continues its mission, or if its reaction is unknown.
-    """
-    world = _make_return_world(requirements)
-    causes = () if world is None else world.causes
-    reactions = [cause for cause in causes if cause.name in _LOSS_CAUSES[link.use]]
-    return next((cause for cause in reactions if cause.action not in ("on", "never", "landed")), None)
-
-
-def _make_return_world(requirements: RouteRequirements) -> ReturnWorld | None:
-    """Return the conditions for simulated returns, or None for a mission without a home."""
-    try:
-        return make_return_world(requirements.setup)
-    except MissionError:
-        # Without a home nothing returns.
-        return None
-
-
-def _reaction_text(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, outages: tuple[Outage, ...], reaction: Cause | None
-) -> str:
-    """Describe the autopilot's reaction to the outages that it notices, and the result of its returns from them."""
-    world = _make_return_world(requirements)
-    title = requirements.setup.autopilot.title
-    if world is None or world.has_other_law:
-        return f"; the reaction of {title} to the loss is not judged"
-    if reaction is None:
-        return f"; {title} continues its mission without the link"
-    if not reaction.is_return:
-        return f"; {title} then leaves the mission ({reaction.parameter} {reaction.value})"
+def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> str:
+    """Explain why the position of the station's antenna is unknown."""
     setup = requirements.setup
-    starts = (
-        planned_starts(setup, _RETURN_INTERVAL_S)
-        if aligned is None
-        else flown_starts(setup, aligned.track, _RETURN_INTERVAL_S)
-    )
-    returns = judge_returns(world, _starts_in_outages(starts, outages), _RETURN_INTERVAL_S)
-    return f"; {title} then returns ({reaction.parameter} {reaction.value}): {headline(returns)}"
+    if setup.scenario.terrain is None:
+        return "no terrain was given"
+    if link.station is None and setup.mission.home is None:
+        return "neither the station's position nor a home is known"
+    return "the ground at the station is unknown"
 
 
-def _starts_in_outages(starts: ReturnStarts, outages: tuple[Outage, ...]) -> ReturnStarts:
-    """Return the starts of returns that lie in an outage, from the time at which the autopilot notices the outage.
+# ----------------------------------------------------------------------
+# Where and when the autopilot reacts to a loss of the link.
+
+
+def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | None) -> float:
+    """Return the time from which on a loss of the link changes nothing, s; inf without such a time.
+
+    The aircraft then returns in any case, or ArduPlane is in a landing sequence
+    (`Plane::failsafe_in_landing_sequence`).
+
+    aligned: None for the planned path.
+    """
+    phases = requirements.ground_phases
+    setup = requirements.setup if phases is None else phases.whole_route.setup
+    route, waypoints = setup.route, []
+    if route.rtl_start is not None:
+        waypoints.append(route.rtl_start)
+    if setup.autopilot.checks.dialect == "ardupilot":
+        for item in setup.mission.items:
+            is_reached = route.items > item.seq if item.command == Command.DO_LAND_START else route.items == item.seq
+            if item.command in LANDINGS | {Command.DO_LAND_START} and is_reached.any():
+                waypoints.append(max(0, int(np.argmax(is_reached)) - 1))
+    if not waypoints:
+        return math.inf
+    waypoint = min(waypoints)
+    if aligned is not None:
+        is_passed = waypoint < len(aligned.passed) and bool(aligned.passed[waypoint])
+        return float(aligned.track.time[aligned.rows[waypoint]]) if is_passed else math.inf
+    path = requirements.path
+    segment = int(np.searchsorted(path.legs, waypoint))
+    return float(path.times[segment]) if segment < len(path.legs) else math.inf
+
+
+def _outages_until(outages: Sequence[Outage], end_time: float) -> list[Outage]:
+    """Return the parts of outages before a time, s."""
+    return [Outage(outage.start, min(outage.end, end_time)) for outage in outages if outage.start < end_time]
+
+
+def _judge_reaction_returns(
+    requirements: RouteRequirements,
+    track: Track | None,
+    outages: Sequence[Outage],
+    reactions: Sequence[LinkLossReaction],
+    fly_again: FlyAgain | None,
+) -> Returns | None:
+    """Judge the returns that begin in an outage after the autopilot has noticed it, as other returns are judged.
+
+    Return None if no reaction is a return, or for a mission without a home.
+
+    track: None for the planned path.
+    """
+    if not any(reaction.action == "return" for reaction in reactions):
+        return None
+    setup = requirements.setup
+    try:
+        world = make_return_world(setup)
+    except MissionError:
+        return None
+    interval = float(max(1, math.ceil(sum(outage.duration for outage in outages) / _MAX_RETURNS)))
+    starts = planned_starts(setup, interval) if track is None else flown_starts(setup, track, interval)
+    return judge_returns(world, _starts_in_outages(starts, outages, reactions[0].delay, interval), interval, fly_again)
+
+
+def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: float, interval: float) -> ReturnStarts:
+    """Return the starts of returns that lie in an outage after the autopilot has noticed it.
 
     One start before and after this time is included.
+
+    delay: time for which a link is lost before the autopilot notices it, s.
+    interval: time between starts, s.
     """
     is_lost = np.zeros(len(starts), dtype=np.bool_)
     for outage in outages:
-        notice_time = outage.start + LINK_LOSS_REACTION_S
-        is_lost |= (starts.time >= notice_time - _RETURN_INTERVAL_S) & (starts.time <= outage.end + _RETURN_INTERVAL_S)
-    return starts.subset(np.flatnonzero(is_lost))
+        if outage.duration > delay:
+            is_lost |= (starts.time > outage.start + delay - interval) & (starts.time < outage.end + interval)
+    return replace(starts.subset(np.flatnonzero(is_lost)), grounded_count=0)
+
+
+# ----------------------------------------------------------------------
+# The finding.
+
+
+def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
+    """Describe the smallest margin of the link, its place, and the outages.  leg: leg of the smallest margin."""
+    k = along.worst
+    if leg is None:
+        return "the terrain below the radio path is unknown"
+    points, (east, north) = along.points, along.positions[k, :2].tolist()
+    sight_text = "in line of sight" if points.is_visible[k] else "behind the terrain"
+    if points.diffraction_loss[k] >= _MIN_STATED_LOSS_DB:
+        sight_text += f", {points.diffraction_loss[k]:.1f} dB lost by diffraction"
+    text = (
+        f"{abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the fade margin"
+        f" on {place_text_within(leg)} at {along.time[k]:.0f} s, east {east:.0f} m, north {north:.0f} m,"
+        f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
+    )
+    if along.outages:
+        count = len(along.outages)
+        times_text = f", {count} times, at most {duration_text(along.longest_outage)} at a time" if count > 1 else ""
+        text += f"; below the fade margin for {duration_text(along.time_below_margin)}{times_text}"
+    return text if along.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
+
+
+def duration_text(duration: float) -> str:
+    """Return the duration of an outage, s, as text.
+
+    >>> duration_text(0.4), duration_text(123.4)
+    ('0.4 s', '123 s')
+    """
+    return f"{duration:.1f} s" if duration < _SHORT_OUTAGE_S else f"{duration:.0f} s"
+
+
+def period_text(outage: Outage) -> str:
+    """Return the start and the end of an outage as text.
+
+    >>> period_text(Outage(12.34, 12.91)), period_text(Outage(12.34, 99.9))
+    ('12.3 to 12.9 s', '12 to 100 s')
+    """
+    digits = 1 if outage.duration < _SHORT_OUTAGE_S else 0
+    return f"{outage.start:.{digits}f} to {outage.end:.{digits}f} s"
+
+
+def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: Returns | None) -> str:
+    """Describe the autopilot's reactions to the loss of the link, and the outcome of its returns.
+
+    title: name of the autopilot.
+    """
+    texts = [
+        f"{ACTION_TEXTS[reaction.action]} after {reaction.delay:g} s ({reaction.parameter} {reaction.value:g})"
+        for reaction in reactions
+    ]
+    text = f"; without the link {title} {', then '.join(texts)}"
+    if returns is not None:
+        return f"{text}: {headline(returns)}"
+    has_return = any(reaction.action == "return" for reaction in reactions)
+    return f"{text}: not judged, because the mission has no home" if has_return else text
+
+
+def _worst_leg(requirements: RouteRequirements, aligned: AlignedTrack | None, along: LinkAlongPath) -> Place:
+    """Return the leg on which the link has its smallest margin.  aligned: None for the planned path."""
+    time, phases = float(along.time[along.worst]), requirements.ground_phases
+    if aligned is None:
+        path = requirements.path
+        segment = int(np.searchsorted(path.times, time, side="right")) - 1
+        return requirements.leg(int(path.legs[min(max(segment, 0), len(path.legs) - 1)]))
+    approach = None if phases is None else phases.procedures.approach
+    if phases is not None and approach is not None and time > phases.track.time[phases.landing_start_row]:
+        return phases.whole_route.leg(approach.leg)
+    return requirements.leg(aligned.leg_at(int(np.searchsorted(aligned.track.time, time))))
 
 
 def _link_finding(
-    requirements: RouteRequirements,
-    aligned: AlignedTrack | None,
+    link: RadioLink,
     paths: tuple[LinkAlongPath, LinkAlongPath],
-    limit: float,
-    reaction: Cause | None,
+    noticeable_outages: Sequence[Outage],
+    reactions: Sequence[LinkLossReaction],
+    texts: tuple[str, str],
+    *,
+    geometric: bool,
 ) -> Finding:
     """Judge the radio link along a path by its longest outage.
 
     paths: link along the planned path and along the judged path; both are the planned path before a flight.
-    limit: longest accepted outage, s.
-    reaction: failsafe by which the autopilot leaves the mission, or None.
+    noticeable_outages: parts of the outages in which the autopilot reacts.
+    texts: texts on the link, and on the reactions to its loss.
     """
     planned, judged = paths
-    ok: bool | None = judged.longest_outage <= limit
+    limits = [(link.max_outage, judged.longest_outage, "scenario")]
+    if reactions and noticeable_outages:
+        limits.append((reactions[0].delay, max(outage.duration for outage in noticeable_outages), "autopilot"))
+    limit, duration, source = min(limits, key=lambda entry: entry[0] - entry[1])
+    # An outage at a single point has no duration, but no outage is accepted.
+    ok: bool | None = duration <= limit and not (link.max_outage == 0.0 and judged.outages)
     if ok and not judged.is_known:
         ok = None
-    text, reason, points = _link_text(judged), _link_text(judged), judged.points
-    if judged.longest_outage >= LINK_LOSS_REACTION_S:
-        reason += _reaction_text(requirements, aligned, judged.outages, reaction)
-    facts = []
+    (text, reaction_text), points, facts = texts, judged.points, []
     if judged.worst >= 0:
         facts = [
             Fact("smallest margin left after the fade margin", float(points.margin[judged.worst]), "dB"),
@@ -161,14 +308,14 @@ def _link_finding(
         "link",
         FLIGHT,
         ok=ok,
-        reason=reason,
-        faults=[] if ok else [message(text, reason[len(text) :])],
+        reason=text + reaction_text,
+        faults=[] if ok else [message(text, reaction_text)],
         planned=planned.longest_outage,
-        flown=math.nan if aligned is None else judged.longest_outage,
+        flown=math.nan if geometric else duration,
         limit=limit,
-        source="scenario",
+        source=source,
         tolerance=0.0,
-        margin=None if ok is None else limit - judged.longest_outage,
+        margin=None if ok is None else limit - duration,
         unit="s",
         method=_METHOD,
         facts=facts,
@@ -177,7 +324,6 @@ def _link_finding(
 
 RULE = Rule(
     name="link",
-    tolerances=("LINK_LOSS_REACTION_S",),
     judge=link_findings,
     judges_whole_flight=True,
     log=LogNeeds(("heights",)),

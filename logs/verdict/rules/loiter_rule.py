@@ -11,15 +11,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import stated_loiter
-from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, finding_reason, make_finding, message, worst_first_key
+from logs.verdict.findings import (
+    UNKNOWN_AIRCRAFT,
+    UNKNOWN_PATH,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+    worst_first_key,
+)
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
+from logs.verdict.suggestions import suggest_stating_bank
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
+    LOITER_LAPS_TOLERANCE,
     LOITER_RADIUS_TOLERANCE_M,
     LOITER_SWING_RADII,
     LOITER_WIDENING_FRACTION,
@@ -184,7 +195,9 @@ def _loiter_finding(
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
-    facts = [f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
+    open_texts = [fault.text for fault in faults if _may_pass(requirements, circle)]
+    faults = [] if open_texts else faults
+    facts = [*open_texts, f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
     hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
@@ -197,25 +210,23 @@ def _loiter_finding(
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
             facts.append(f"{parameter_name}, held with {math.degrees(bank):.0f}° of bank")
-    if aligned is not None and failed_corners:
-        faults.append(_unheld_corners_message(circle, failed_corners))
-    elif failed_corners and not faults:
-        faults.append(_failed_corner_message(requirements, circle, failed_corners[0]))
+    faults += _corner_faults(requirements, aligned, circle, failed_corners, has_faults=bool(faults))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
-    if radii.size:
-        facts.append(f"flown at {radii.min():.1f} to {radii.max():.1f} m from the center")
-        max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
-        if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
-            faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
+    max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+    if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
+        faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
     ok: bool | None = not (faults or failed_corners)
-    if ok and any(finding.ok is None for finding in corner_findings):
+    facts += _flown_facts(requirements, aligned, circle, radii)
+    has_unjudged = any(finding.ok is None and finding.check != UNKNOWN_AIRCRAFT for finding in corner_findings)
+    if ok and has_unjudged and not _is_whole(requirements, aligned, circle):
         ok = None
-        is_complete = aligned is not None and bool(aligned.passed[-1])
+        is_complete = aligned is not None and bool(aligned.passed[circle.last])
         facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
-    if ok and hazards_text:
+    check = UNKNOWN_AIRCRAFT if open_texts else UNKNOWN_PATH if hazards_text else ""
+    if ok and check:
         ok = None
-        facts.append(hazards_text)
+        facts += [hazards_text] if hazards_text else []
     return make_finding(
         "loiter",
         requirements.waypoint(circle.first),
@@ -231,16 +242,40 @@ def _loiter_finding(
         margin=circle.radius - min_radius,
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
-        check=UNKNOWN_PATH if ok is None and hazards_text else "",
+        check=check if ok is None else "",
     )
 
 
-def _min_radius(requirements: RouteRequirements, circle: LoiterCircle) -> float:
+def _may_pass(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
+    """Return True if a loiter that is too small may be held, because the aircraft's bank limit is a guess."""
+    return circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M
+
+
+def _corner_faults(
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    circle: LoiterCircle,
+    failed_corners: list[Finding],
+    *,
+    has_faults: bool,
+) -> list[Message]:
+    """Return a message on failed corners; without a flight, only if the loiter has no fault of its own."""
+    if not failed_corners or (aligned is None and has_faults):
+        return []
+    if aligned is not None:
+        return [_unheld_corners_message(circle, failed_corners)]
+    return [_failed_corner_message(requirements, circle, failed_corners[0])]
+
+
+def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
     """Return the radius of a loiter at the bank limit, for the courses of its arcs, m.
 
     A loiter without end meets every course, also if the route follows it for a part of a lap only.
+
+    possible: True for the largest bank limit that the aircraft may have.
     """
-    min_radius = float(requirements.min_radius[circle.first : circle.last + 1].max())
+    radii = requirements.possible_min_radius if possible else requirements.min_radius
+    min_radius = float(radii[circle.first : circle.last + 1].max())
     setup = requirements.setup
     item = next((item for item in setup.mission.items if item.seq == setup.route.items[circle.first]), None)
     loiter = None if item is None else stated_loiter(item)
@@ -250,10 +285,14 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle) -> float:
         float(requirements.points[circle.first, 2]),
         float(requirements.route.leg_airspeeds[circle.first - 1]),
     )
+    bank_ratio = math.tan(requirements.limits.max_bank) / math.tan(requirements.possible_bank) if possible else 1.0
     # Two half laps cover all courses.
     return max(
         min_radius,
-        *(setup.limits.turn_radius(course, course + math.pi, altitude, airspeed) for course in (0.0, math.pi)),
+        *(
+            bank_ratio * setup.limits.turn_radius(course, course + math.pi, altitude, airspeed)
+            for course in (0.0, math.pi)
+        ),
     )
 
 
@@ -268,6 +307,42 @@ def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
         return np.zeros(0)
     offsets = aligned.track.position[first : last + 1, :2] - circle.center
     return np.asarray(np.hypot(offsets[:, 0], offsets[:, 1]))
+
+
+def _flown_facts(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, radii: Floats
+) -> list[str]:
+    """Return texts on how a loiter was flown: its number of laps, if known, and its radii (m, (n,))."""
+    laps = _flown_laps(requirements, aligned, circle)
+    laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
+    return [f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center"] if radii.size else []
+
+
+def _flown_laps(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> float:
+    """Return the number of laps that an aircraft flew around a loiter's center between the stops before and after it.
+
+    The result is NaN without a flight, if the flight did not reach the loiter's last corner, and for an autopilot that
+    follows the corners as they are drawn.
+    """
+    follows_corners = not requirements.setup.autopilot.loiters.steers_to_center
+    if aligned is None or follows_corners or not aligned.passed[circle.last]:
+        return math.nan
+    rows = slice(int(aligned.rows[circle.first - 1]), int(aligned.rows[min(circle.last + 1, requirements.legs)]) + 1)
+    east, north = (aligned.track.position[rows, :2] - circle.center).T
+    is_on_circle = np.hypot(east, north) <= circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+    steps = np.diff(np.unwrap(np.arctan2(east, north)))[is_on_circle[1:] & is_on_circle[:-1]]
+    return abs(float(steps.sum())) / (2.0 * math.pi)
+
+
+def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> bool:
+    """Return True if all laps of a loiter are known to be flown.
+
+    A loiter that ends at an altitude needs no number of laps.
+    """
+    seq = int(requirements.setup.route.items[circle.first])
+    loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    is_to_altitude, laps = loiter is not None and loiter.to_altitude, _flown_laps(requirements, aligned, circle)
+    return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
@@ -365,12 +440,15 @@ RULE = Rule(
     name="loiter",
     tolerances=(
         "LOITER_RADIUS_TOLERANCE_M",
+        "LOITER_LAPS_TOLERANCE",
         "WAYPOINT_PASS_MARGIN_M",
         "BANK_TOLERANCE_RAD",
+        "POSSIBLE_BANK_RAD",
         "LOITER_SWING_RADII",
         "LOITER_WIDENING_FRACTION",
     ),
     judge=end_loiter_findings,
     merge=merge_loiter_findings,
+    suggest=suggest_stating_bank,
     log=LogNeeds(needs_aircraft=True),
 )

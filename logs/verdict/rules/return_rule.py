@@ -30,6 +30,7 @@ from logs.verdict.returns.judge_returns import (
     heights_above_ground,
     judge_returns,
     make_return_world,
+    returning_title,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, flown_end, flown_starts, planned_end, planned_starts
 from logs.verdict.returns.returns_text import headline, measured_text, outcome_text
@@ -124,7 +125,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
             ok=ok,
             reason=fault.text,
             faults=[] if ok else [fault],
-            method=_METHOD,
+            method=_method_text(returning_title(setup)),
             check=check,
         )
     ]
@@ -146,7 +147,8 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
         answers = [judge(world, return_starts, interval) for judge in judges]
     except MissionError as error:
         # Without a home no RTL is safe, and the places that a glide reaches are unknown.
-        answers = [_RequirementResult(False if "rtl" in requirement.require else None, str(error), _METHOD)]
+        ok_without_home = False if "rtl" in requirement.require else None
+        answers = [_RequirementResult(ok_without_home, str(error), _method_text(returning_title(setup)))]
     results = {answer.ok for answer in answers}
     ok = False if False in results else None if None in results else True
     # Failures come first, then unknown answers.
@@ -162,8 +164,12 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     ]
 
 
-_METHOD = "by the simulated ArduPlane flying a point-mass model"
 _NOT_KNOWN = "it is not fully known whether the aircraft gets home as the scenario requires"
+
+
+def _method_text(autopilot: str) -> str:
+    """Describe how returns are judged.  autopilot: title of the autopilot that returns."""
+    return f"by the simulated {autopilot} flying a point-mass model"
 
 
 class _RequirementResult(NamedTuple):
@@ -178,7 +184,9 @@ def _judge_rtl(world: ReturnWorld, starts: ReturnStarts, interval: float) -> _Re
     """Judge whether every RTL is safe."""
     judged_returns = judge_returns(world, starts, interval)
     return _RequirementResult(
-        None if judged_returns.undecided else judged_returns.safe, headline(judged_returns), _METHOD
+        None if judged_returns.undecided else judged_returns.safe,
+        headline(judged_returns),
+        _method_text(judged_returns.autopilot),
     )
 
 

@@ -1,13 +1,13 @@
 """The slope rule: judge whether each leg can be climbed or descended at its speed, and how it was flown."""
 
 import math
+from dataclasses import replace
 
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_gentler_slope
 from logs.verdict.tolerances import (
@@ -34,8 +34,7 @@ def slope_findings(
     """Judge the slope of each leg; if ``geometric``, judge only the route, without a flight."""
     findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
-        # Without a flight the path of a climb that cannot be flown is unknown.
-        if leg in turnaround_legs and not geometric:
+        if leg in turnaround_legs:
             continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
@@ -183,11 +182,12 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     place = requirements.waypoint(corner)
     length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
     verb = "climbs" if arc.tangent > 0.0 else "descends"
-    legs = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
+    slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
+    first, second = requirements.leg(leg).number, requirements.leg(corner).number
     slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
-        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} "
-        f"and {corner} have {legs}: the fly-by arc is shorter than the "
+        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {first} "
+        f"and {second} have {slopes}: the fly-by arc is shorter than the "
         f"{2.0 * float(requirements.length_before[corner]):.0f} m of leg that it replaces"
     )
     side = "below" if arc.tangent > 0.0 else "above"
@@ -198,7 +198,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     # A headline names the waypoint, not its item.
     return [
         Message(
-            arc_text + limit, arc_text if place.item is None else f"the arc at {place_text(Place('waypoint', corner))}"
+            arc_text + limit, arc_text if place.item is None else f"the arc at {place_text(replace(place, item=None))}"
         )
     ]
 
@@ -218,7 +218,8 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
         height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
     limit_texts = [_limit_text(requirements, leg, limit, source), _certain_limit_text(requirements, leg, limit, source)]
-    return message(f"leg {leg} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
+    number = requirements.leg(leg).number
+    return message(f"leg {number} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
@@ -230,7 +231,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     condition = f"at {speed:.0f} m/s and {altitude:.0f} m AMSL"
     if limit <= 0.0:
         return f"{condition} the aircraft cannot fly steadily on this course"
-    wind = requirements.setup.scenario.wind
+    wind = requirements.wind_on(leg)
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"

@@ -273,7 +273,8 @@ def _level_speed_range(
     )
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
-        faults.append(message(f"the wind is too strong to hold the course of leg {leg} at {commanded:.0f} m/s"))
+        number = requirements.leg(leg).number
+        faults.append(message(f"the wind is too strong to hold the course of leg {number} at {commanded:.0f} m/s"))
     max_altitude = max(altitudes)
     if math.isnan(min_speed) or math.isnan(max_speed):
         faults.append(message(f"no level flight at {max_altitude:.0f} m"))

@@ -77,7 +77,7 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     if worst_margin is None:
         return []
     _, corner, margin = worst_margin
-    return [_stall_finding(margin, f"at waypoint {corner}", 0.0, geometric=True)]
+    return [_stall_finding(margin, f"at waypoint {requirements.waypoint(corner).number}", 0.0, geometric=True)]
 
 
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:

@@ -11,20 +11,32 @@ import numpy as np
 from flight.mission.surveys import PhotoLine, Survey
 from logs.verdict.findings import UNKNOWN_PATH, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import find_hazards
-from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
-from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
+from logs.verdict.measures.photo_lines import (
+    LineMeasure,
+    OverlapMeasure,
+    heights_over_ground,
+    measure_line,
+    measure_overlap,
+)
+from logs.verdict.measures.route_requirements import RouteRequirements, slope_limits, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.tolerances import (
+    CLEARANCE_TOLERANCE_M,
     MAX_PHOTO_BANK_RAD,
+    MIN_PHOTO_HEIGHT_ERROR_M,
     PHOTO_COVERAGE_FRACTION,
+    PHOTO_HEIGHT_FRACTION,
     PHOTO_OVERLAP_FRACTION,
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
 from world.wording import count_text
+
+# Limit of a slope where neither the aircraft nor the scenario has one.
+_MAX_SLOPE_RAD = math.radians(89.0)
 
 
 def survey_findings(
@@ -32,18 +44,18 @@ def survey_findings(
 ) -> list[Finding]:
     """Judge each photo line and the overlap of each survey's photos.
 
-    If ``geometric``, judge a line by the part that the turns at its ends leave straight, and report turnarounds that
-    are too tight.
+    If ``geometric``, judge a line by the part that the turns at its ends and the climb or descent before it leave, and
+    report turnarounds that cannot be flown as drawn.
     """
     findings = []
     for survey in requirements.surveys:
-        for number, line in enumerate(survey.lines, 1):
+        for number, (line, transition) in enumerate(zip(survey.lines, survey.transitions(), strict=False), 1):
             if geometric:
-                findings.append(_planned_finding(requirements, survey, line, number))
+                findings.append(_planned_finding(requirements, survey, line, number, transition[0]))
             else:
                 findings.append(_flown_finding(requirements, aligned, survey, line, number))
         if geometric:
-            findings += _tight_turnaround_findings(requirements, survey)
+            findings += _unflyable_turnaround_findings(requirements, survey)
         if geometric or aligned is not None:
             findings += _overlap_findings(requirements, None if geometric else aligned, survey)
     return findings
@@ -114,8 +126,8 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     return text if required is None else f"{text}, {100.0 * required:.0f} % required"
 
 
-def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report each turnaround that is too tight to be flown as drawn and has hazards within reach.
+def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
+    """Report each turnaround that is too tight or too steep to be flown as drawn and has hazards within reach.
 
     Only a flight shows the path of such a turnaround.  The turns onto the first line and off the last line are included
     as turnarounds.
@@ -123,18 +135,20 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
     findings = []
     turnarounds = survey.transitions()
     for number, (first, last) in enumerate(turnarounds):
-        if not any(_is_too_tight(requirements, i) for i in range(first, last + 1)):
+        is_tight = any(_is_too_tight(requirements, i) for i in range(first, last + 1))
+        catch_up_length = _off_altitude_length(requirements, first, last, requirements.legs, CLEARANCE_TOLERANCE_M)
+        if not is_tight and not catch_up_length:
             continue
         points, radii = requirements.points[first : last + 1], requirements.min_radius[first : last + 1]
         center = points[:, :2].mean(axis=0)
         radius = float(radii[np.isfinite(radii)].max(initial=0.0))
-        reach = float(np.hypot(*(points[:, :2] - center).T).max()) + TURN_AROUND_RADII * radius
+        reach = float(np.hypot(*(points[:, :2] - center).T).max()) + TURN_AROUND_RADII * radius + catch_up_length
         min_altitude, max_altitude = float(points[:, 2].min()), float(points[:, 2].max())
         if hazards := find_hazards(requirements, center, min_altitude, max_altitude, reach):
             end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
-                f"{end_names.get(number, f'turn-around {number}')} is too tight to be flown as "
-                f"drawn, and within {reach:.0f} m of it {'; '.join(hazards)}: only a simulated "
+                f"{end_names.get(number, f'turn-around {number}')} is too {'tight' if is_tight else 'steep'} to be "
+                f"flown as drawn, and within {reach:.0f} m of it {'; '.join(hazards)}: only a simulated "
                 "flight shows whether it is safe"
             )
             place, method = requirements.leg(first), "its surroundings"
@@ -148,6 +162,39 @@ def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
     return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE_RAD
 
 
+def _off_altitude_length(requirements: RouteRequirements, first: int, last: int, end: int, tolerance: float) -> float:
+    """Return the length of route beyond a turnaround on which an aircraft is still off the planned altitude, m.
+
+    The aircraft is at the planned altitude at waypoint `first`, where the turnaround begins, and climbs or descends
+    from there no steeper than its limits.
+
+    last: waypoint at which the turnaround ends.
+    end: waypoint up to which the length is measured.
+    tolerance: altitude error at which the aircraft is back at the planned altitude, m.
+    """
+    altitude, length = float(requirements.points[first, 2]), 0.0
+    for leg in range(first, end):
+        start, target, run = (
+            float(requirements.points[leg, 2]),
+            float(requirements.points[leg + 1, 2]),
+            requirements.runs[leg],
+        )
+        climb, dive = (
+            run * math.tan(min(max(limit, 0.0), _MAX_SLOPE_RAD)) for limit in slope_limits(requirements, leg)
+        )
+        error = start - altitude
+        if leg >= last:
+            if abs(error) <= tolerance:
+                break
+            # Part of the altitude error that the aircraft makes up on this leg.
+            gain = climb - (target - start) if error > 0.0 else dive + (target - start)
+            if gain >= abs(error) - tolerance:
+                return length + run * (abs(error) - tolerance) / gain
+            length += run
+        altitude += min(max(target - altitude, -dive), climb)
+    return length
+
+
 def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> str:
     """Name a photo line by its number from 1 and its mission items."""
     items = [int(requirements.setup.route.items[i]) for i in (line.first, line.last)]
@@ -159,24 +206,35 @@ def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
     return requirements.leg(line.first)
 
 
-def _planned_finding(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
-    """Judge the fraction of a photo line that remains straight between the turns at its ends."""
+def _planned_finding(
+    requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int, before: int
+) -> Finding:
+    """Judge the fraction of a photo line that remains straight between the turns at its ends, and at its altitude.
+
+    before: waypoint at which the turnaround before the line begins.
+    """
     length = float(requirements.runs[line.first : line.last].sum())
     # The turns may use the leads before and after the line.
     lead_in = float(requirements.runs[line.begins : line.first].sum())
     lead_out = float(requirements.runs[line.last : line.ends].sum())
-    cut_in = _clip_to_length(float(requirements.length_after[line.begins]) - lead_in, length)
+    turn_in = _clip_to_length(float(requirements.length_after[line.begins]) - lead_in, length)
+    height = float(heights_over_ground(requirements, requirements.points[line.first][None])[0])
+    tolerance = max(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * height)
+    off_altitude = _off_altitude_length(requirements, before, line.first, line.last, tolerance)
+    cut_in = max(turn_in, off_altitude)
     cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     ok = straight_fraction >= PHOTO_COVERAGE_FRACTION
     name = _line_text(requirements, survey, line, number)
     faults, facts = [], [f"{name}: its turns leave {100.0 * straight_fraction:.0f} % of its {length:.0f} m straight"]
     if not ok:
+        what, how = ("the turns at its ends leave", "straight")
+        if off_altitude > turn_in:
+            what, how = ("the climb or descent before it leaves", "at its planned height above ground")
         faults.append(
             message(
-                f"{name}: the turns at its ends leave only {100.0 * straight_fraction:.0f} % of its {length:.0f} m"
-                " straight",
-                f" (they take {cut_in:.0f} m at the start and {cut_out:.0f} m at the end)",
+                f"{name}: {what} only {100.0 * straight_fraction:.0f} % of its {length:.0f} m {how}",
+                f" ({cut_in:.0f} m are lost at the start and {cut_out:.0f} m at the end)",
             )
         )
     return _line_finding(requirements, line, ok, faults, facts, straight_fraction, geometric=True)
@@ -296,7 +354,7 @@ RULE = Rule(
             "MIN_PHOTO_HEIGHT_ERROR_M",
             "MAX_PHOTO_COURSE_ERROR_RAD",
         ),
-        *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII"),
+        *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII", "CLEARANCE_TOLERANCE_M"),
     ),
     judge=survey_findings,
     log=LogNeeds(("attitude",), needs_planned_heights=True, needs_full_leg=True),

@@ -6,7 +6,7 @@ import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
-from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink_distance
 from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
@@ -63,23 +63,13 @@ def _turn_finding(
     if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
-    turn_text = f"turns {math.degrees(planned_turn):.1f}°"
-    faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
+    faults, facts, check, judged_turn = _judge_planned_turn(requirements, i, limit, source)
     # If the aircraft's limits are known, the planned turn is judged by them, and the flown turn is only described.
     is_judged_as_planned = measure is None or bool(requirements.envelope)
-    judged_turn: float | None = planned_turn
-    if planned_turn > limit + PLAN_TOLERANCE_RAD:
-        lateral = negligible_kink_distance(requirements, i)
-        if lateral is None:
-            # The message already states the turn and its limit.
-            faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []
-        else:
-            judged_turn = None
-            facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
     facts += _fly_over_notes(requirements, i, planned_turn)
-    method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
+    angle = None if measure is None else measure.angle
+    tolerance = PLAN_TOLERANCE_RAD
     if measure is not None:
-        angle = measure.angle
         if not is_judged_as_planned:
             tolerance = measure.tolerance or PLAN_TOLERANCE_RAD
             judged_turn = planned_turn if angle is None else angle
@@ -87,12 +77,10 @@ def _turn_finding(
         facts += [text for name, text in _flown_facts(requirements, i, measure) if name not in flown_faults]
         facts += [fault.brief for fault in flown_faults.values()] if is_judged_as_planned else []
         faults += [] if is_judged_as_planned else flown_faults.values()
-        fit = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
-        method = "not flown" if angle is None else fit
-    ok: bool | None = not faults
+    ok: bool | None = False if faults else None if check else True
     if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, i, measure, aligned))
-        ok = None if ok else False
+        ok = None if ok is not False else False
     return make_finding(
         "turn",
         requirements.waypoint(i),
@@ -106,9 +94,42 @@ def _turn_finding(
         tolerance=math.degrees(tolerance),
         margin=None if judged_turn is None else math.degrees(limit - judged_turn),
         unit="deg",
-        method=method,
+        method=_method_text(measure),
+        check=check if ok is None else "",
         facts=_measured_facts(measure),
     )
+
+
+def _judge_planned_turn(
+    requirements: RouteRequirements, i: int, limit: float, source: str
+) -> tuple[list[Message], list[str], str, float | None]:
+    """Judge the planned turn at waypoint i by its limit (rad).
+
+    Return faults and facts, `UNKNOWN_AIRCRAFT` or "", and the turn (rad), or None for a negligible kink.
+    """
+    turn = abs(float(requirements.turns[i]))
+    turn_text = f"turns {math.degrees(turn):.1f}°"
+    facts = [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
+    if turn <= limit + PLAN_TOLERANCE_RAD:
+        return [], facts, "", turn
+    lateral = negligible_kink_distance(requirements, i)
+    if lateral is not None:
+        facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
+        return [], facts, "", None
+    # The message states the turn and its limit.
+    sharp_turn = _sharp_turn_message(requirements, i, turn, limit, source)
+    # The aircraft's bank limit may be a guess.
+    if source == "aircraft" and turn <= float(requirements.possible_turn_limit[i]) + PLAN_TOLERANCE_RAD:
+        return [], [sharp_turn.text], UNKNOWN_AIRCRAFT, turn
+    return [sharp_turn], [], "", turn
+
+
+def _method_text(measure: TurnMeasure | None) -> str:
+    """Describe how the course change of a turn was obtained; the measure is None before a flight."""
+    if measure is None:
+        return "route"
+    fit_text = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
+    return "not flown" if measure.angle is None else fit_text
 
 
 def _unflown_turn_text(
@@ -290,6 +311,8 @@ RULE = Rule(
             "U_TURN_RAD",
             "MAX_FLY_BY_OFFSET_RADII",
             "BANK_TOLERANCE_RAD",
+            "POSSIBLE_BANK_RAD",
+            "POSSIBLE_BANK_RAD",
             "OVERSHOOT_TOLERANCE_M",
             "SETTLED_CROSS_TRACK_M",
         ),

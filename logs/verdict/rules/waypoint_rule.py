@@ -6,6 +6,8 @@ The rule ignores altitude, because other rules judge the harm that a wrong altit
 """
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_f
 from logs.verdict.measures.acceptance import AcceptanceCondition, acceptance_condition
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
+from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text, place_text_within
@@ -185,6 +188,36 @@ def _closest_approach(
     return float(distance.min()), float(heights[np.argmin(np.abs(heights))])
 
 
+def explain_by_circles(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
+) -> tuple[Finding, ...]:
+    """Add to the reason of each failed finding the circles that the autopilot flew there at a waypoint's altitude."""
+    circles = [] if aligned is None else waypoint_circles(requirements, aligned)
+    if aligned is None or not circles:
+        return tuple(findings)
+    legs_of_lines = {
+        line.first: range(transition[0], line.ends)
+        for survey in requirements.surveys
+        for line, transition in zip(survey.lines, survey.transitions(), strict=False)
+    }
+    explained = []
+    for finding in findings:
+        place, waypoints = finding.place, range(0)
+        if finding.ok is False and place.index is not None and place.kind == "leg":
+            legs = legs_of_lines.get(place.index) if finding.rule == "survey" else None
+            legs = range(place.index, place.index + 1) if legs is None else legs
+            waypoints = range(legs.start, legs.stop + 1)
+        elif finding.ok is False and place.index is not None and place.kind == "waypoint":
+            waypoints = range(place.index, place.index + 1)
+        elif finding.ok is False and finding.rule == "completion" and not aligned.passed[-1]:
+            # The waypoint that the aircraft did not leave, or did not reach.
+            last = int(np.argmin(aligned.passed))
+            waypoints = range(last - 1, last + 1)
+        text = circles_text(requirements, [circle for circle in circles if circle.waypoint in waypoints])
+        explained.append(replace(finding, reason=f"{finding.reason}; {text}") if text else finding)
+    return tuple(explained)
+
+
 RULE = Rule(
     name="waypoint",
     tolerances=(
@@ -198,4 +231,5 @@ RULE = Rule(
         "CHORD_TIME_S",
     ),
     judge=waypoint_findings,
+    merge=explain_by_circles,
 )

@@ -23,6 +23,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from logs.verdict.returns.glides_text import reached_text
 from logs.verdict.returns.returns_text import outcome_text, segment_text
+from logs.views.returns import path_by_outcome, path_by_reach
 from world.airspace.zones_on_map import zone_parts
 from world.arrays import Floats
 from world.frames import to_geo
@@ -126,23 +127,27 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 # Returns and glides, in colours.
 
 
-def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapLine]:
+def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> list[MapLine]:
     """Return lines of a flight's returns and glides.
 
     They are the path coloured by the outcome of a return from there, the paths of the worst returns, and the path
     coloured by the destination that a glide reaches.
+
+    track: the flown track; None for returns from the planned path.
     """
     limit, lines = drawn_returns.returns.limit, []
-    for kind, segment in drawn_returns.segments_by_outcome:
+    for kind, segment in path_by_outcome(setup, drawn_returns, track):
         name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
-        lines.append(_make_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
+        positions = [point.position for point in segment]
+        lines.append(_make_line(setup, name, positions, "returns to launch", f"return-{kind}"))
     for number, worst in enumerate(drawn_returns.worst, 1):
         ret = worst.simulated
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
         lines.append(_make_line(setup, name, worst.path, "the worst returns", "return-way"))
-    for reach, glides in drawn_returns.segments_by_reach:
-        name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
-        lines.append(_make_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
+    for reach, glide_segment in path_by_reach(setup, drawn_returns, track):
+        name = f"{glide_segment[0].time:.0f} to {glide_segment[-1].time:.0f} s: {reached_text(reach)}"
+        positions = [point.position for point in glide_segment]
+        lines.append(_make_line(setup, name, positions, "without its engine", f"reach-{reach}"))
     return lines
 
 

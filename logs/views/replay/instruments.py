@@ -86,7 +86,7 @@ class Instruments:
         route = log.setup.route
         step = route.positions[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
         leg_text = (
-            f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)},"
+            f"leg {route.leg_numbers[leg]} of {route.leg_numbers[-1] + 1}, to {waypoint_name(route, leg + 1)},"
             f" {_metres_text(float(np.hypot(*step)))} to go"
         )
         if leg >= route.legs:

@@ -137,9 +137,10 @@ class _MovingParts:
         """Return the caption of a row: time, leg, airspeed, altitude, height above ground and bank."""
         track = self._track
         roll, _, _ = track.attitude[k].tolist()
+        leg_numbers = self._setup.route.leg_numbers
         parts = [
             f"{float(track.time[k]):7.1f} s",
-            f"leg {int(track.leg[k])} of {self._setup.route.legs}",
+            f"leg {leg_numbers[min(int(track.leg[k]), len(leg_numbers) - 1)]} of {leg_numbers[-1] + 1}",
             f"{signed_number(float(track.airspeed[k]), 1)} m/s",
             f"{signed_number(float(track.position[k, 2]), 0)} m AMSL",
             f"{signed_number(float(self._above[k]), 0)} m above ground",

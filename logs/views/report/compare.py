@@ -247,7 +247,8 @@ def _wind_text(setup: FlightSetup) -> str:
     """Return wind speed, direction and turbulence as text."""
     wind = setup.scenario.wind
     direction_text = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
-    return f"{wind.speed:g} m/s{direction_text}, turbulence {wind.turbulence}"
+    forecast_text = "" if wind.forecast is None else f" (mean of {wind.forecast.describe()})"
+    return f"{wind.speed:g} m/s{direction_text}{forecast_text}, turbulence {wind.turbulence}"
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:

@@ -206,6 +206,8 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     if wind.gradient:
         gradient_text = number(100.0 * wind.gradient, signed=True)
         wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gradient_text} m/s per 100 m of height"
+    if wind.forecast is not None:
+        wind_text = f"{wind.forecast.describe()}; mean profile {wind_text}"
     return [
         (
             "Limits",

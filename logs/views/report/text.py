@@ -359,17 +359,19 @@ def refly_lines(reflight: Reflight) -> list[str]:
     >>> refly_lines(again)[0]
     'AUTO from 0.0 s to 36.5 s, legs 0 to 1: flown / simulated'
     """
+    route = reflight.setup.route
+    leg_numbers, stops = route.leg_numbers.tolist(), route.stops.tolist()
     leg_table: list[tuple[str, ...]] = [_HEAD]
     for pair in reflight.legs:
         numbers = (pair.cross_track, pair.height_error, pair.ground_speed, pair.bank, pair.energy)
-        leg_table.append((f"leg {pair.leg}", *map(_pair_text, numbers)))
+        leg_table.append((f"leg {leg_numbers[pair.leg - reflight.first]}", *map(_pair_text, numbers)))
     turn_table: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
     for turn in reflight.turns:
-        name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
+        name = f"waypoint {stops[turn.waypoint - reflight.first]} ({turn.turn:+.1f}°)"
         turn_table.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
     stretch = reflight.stretch
     stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
-    legs_text = f", legs {reflight.first} to {reflight.first + len(reflight.legs) - 1}"
+    legs_text = f", legs {leg_numbers[0]} to {leg_numbers[len(reflight.legs) - 1]}"
     lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(leg_table)]
     if reflight.turns:
         lines += ["", *_format_columns(turn_table)]

@@ -8,6 +8,8 @@ const $ = (id) => document.getElementById(id);
 const TABS = ["verdict", "items", "plan", "settings", "files"];
 const FORMS = [["waypoints", ".waypoints", "QGC WPL 110: Mission Planner, QGroundControl, MAVProxy"], ["plan", ".plan", "QGroundControl, with fence and rally points"], ["plan.json", "plan.json", "planfly, with scenario and certificate"], ["kml", ".kml", "a map for Google Earth and others"]];
 const MOST_ROWS = 600;
+// Questions that take many flights: kind of the message, and title of its answer.
+export const QUESTIONS = { returns: "Return to launch", campaign: "Flights in this weather", battery: "Battery", ground_risk: "Ground risk", window: "Times of take-off" };
 // Ways that one search looks for.
 const WAYS = 6;
 
@@ -47,6 +49,7 @@ export class Panel {
     this.shown = "verdict";
     this.files = [];
     this.saveForm = "waypoints";
+    this.answers = {};
   }
 
   show(name) {
@@ -82,7 +85,8 @@ export class Panel {
 
   // Another mission was opened: what was found of the one before is of no use.
   forget() {
-    this.flight = this.home = this.odds = undefined;
+    this.flight = undefined;
+    this.answers = {};
   }
 
   sheet(sheet) {
@@ -148,10 +152,12 @@ export class Panel {
     const long = element("div", { class: "asks" },
       element("h2", {}, "Ask more"),
       this.ask("returns", "Can it return home?", "a return to launch from every point of the route"),
-      this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"));
+      this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"),
+      this.ask("battery", "How large a battery?", "24 flights with their returns; the reserve is kept in 95 of 100"),
+      this.ask("ground_risk", "Whom does it fly over?", "12 flights: volumes by SORA 2.5"),
+      this.about.settings.forecast ? this.ask("window", "When can I take off?", "10 flights at each hour of the next 12 in the forecast") : null);
     box.append(long);
-    if (this.home) box.append(this.result("Return to launch", this.home));
-    if (this.odds) box.append(this.result("Flights in this weather", this.odds));
+    for (const [job, title] of Object.entries(QUESTIONS)) if (this.answers[job]) box.append(this.result(title, this.answers[job]));
     return undefined;
   }
 
@@ -353,22 +359,16 @@ export class Panel {
     for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) delete button.dataset.share;
   }
 
-  returns(message) {
-    this.stopped("returns");
-    this.home = message;
-    this.drawVerdict();
-  }
-
-  campaign(message) {
-    this.stopped("campaign");
-    this.odds = message;
+  answered(job, message) {
+    this.stopped(job);
+    this.answers[job] = message;
     this.drawVerdict();
   }
 
   result(title, { rev, state, headline, lines }) {
     const stale = rev !== this.now.rev;
     return element("section", { class: stale ? "card stale" : "card", "data-state": state }, element("h2", {}, title),
-      stale ? element("p", { class: "more" }, "before the last change") : null, element("p", {}, headline), ...lines.slice(0, 6).map((line) => element("p", { class: "line" }, line)));
+      stale ? element("p", { class: "more" }, "before the last change") : null, element("p", {}, headline), ...lines.slice(0, 16).map((line) => element("p", { class: "line" }, line)));
   }
 }
 

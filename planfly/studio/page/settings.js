@@ -50,6 +50,7 @@ function flown(settings, offered, send) {
     field("Airspeed, m/s", number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
     field("Wind, m/s", number("set-wind_speed", settings.wind_speed, 0.5, need("wind_speed"))),
     field("Wind from, °", number("set-wind_from", settings.wind_from, 5, need("wind_from"))),
+    ...(settings.forecast ? [element("p", { class: "more" }, `The wind is that of the ${settings.forecast}; its mean at the start stands above. A wind entered here replaces it.`)] : []),
     field("Turbulence", list("set-turbulence", same(offered.turbulence, settings.turbulence), settings.turbulence, need("turbulence"))),
   ];
 }

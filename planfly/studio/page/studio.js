@@ -5,7 +5,7 @@ import { Hands } from "/hands.js";
 import { drawCompass, drawLegend } from "/legend.js";
 import { Link } from "/link.js";
 import { MapView } from "/map.js";
-import { Panel, answerText } from "/panel.js";
+import { Panel, QUESTIONS, answerText } from "/panel.js";
 import { Profile } from "/profile.js";
 import { Scene } from "/scene.js";
 
@@ -517,8 +517,7 @@ const link = new Link({
   choices: (message) => panel.choices(message),
   ways: (message) => { now.work.plan = null; progress(); panel.ways(message); answers(); },
   saved: (message) => { complain(""); showName(now.sheet.name, message.unsaved); panel.saved(message); },
-  returns: (message) => { now.work.returns = null; progress(); panel.returns(message); },
-  campaign: (message) => { now.work.campaign = null; progress(); panel.campaign(message); },
+  ...Object.fromEntries(Object.keys(QUESTIONS).map((job) => [job, (message) => { now.work[job] = null; progress(); panel.answered(job, message); }])),
   fault: onFault,
   stale: () => { app.refused(); complain("Another page has changed the mission; this is its current state."); },
   picture: (picture) => { now.picture = picture; setGround(); },

@@ -306,7 +306,7 @@ def test_a_height_that_is_never_flown_is_refused() -> None:
 
 
 def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
-    rules = ReturnRules(holds_height=True)
+    rules = ReturnRules(holds_height=True, transit_height=100.0)
     begin = [STOP.at((0.0, 9000.0, 900.0)), STOP.at((0.0, 8000.0, 900.0))]
     target = choose_target(rules, begin[-1].map_position, HOME, ())
     ups = [point.map_position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
@@ -317,6 +317,23 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     )
     low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
     assert ", climbing 50 m first, to 400 m AMSL" in rtl_note(low, rules, 350.0)
+
+
+def test_a_return_climbs_first_and_descends_over_its_target_to_another_height() -> None:
+    """Home is 300 m up: it climbs to 300 m over it, and descends to 100 m; it never ends higher than it flew."""
+    rules = ReturnRules(holds_height=True, transit_height=300.0)
+    begin = [STOP.at((0.0, 9000.0, 350.0)), STOP.at((0.0, 8000.0, 350.0))]
+    target = choose_target(rules, begin[-1].map_position, HOME, ())
+    assert (target.transit_altitude, target.position[2]) == (600.0, 400.0)
+    ups = [point.map_position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
+    assert (max(ups), ups[-1]) == (600.0, 400.0)
+    assert ", climbing 250 m first, to 600 m AMSL, and sinking 200 m in circles there, to 400 m AMSL;" in rtl_note(
+        target, rules, 350.0
+    )
+    lower = choose_target(
+        ReturnRules(height=200.0, holds_height=True, transit_height=50.0), (0.0, 8000.0, 320.0), HOME, ()
+    )
+    assert (lower.transit_altitude, lower.position[2]) == (350.0, 350.0)
 
 
 def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:

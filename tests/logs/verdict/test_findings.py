@@ -17,7 +17,7 @@ from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.document import SCHEMA
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, closest_to_limit, make_finding
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, closest_to_limit, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.places import (
     FLIGHT,
@@ -296,25 +296,31 @@ def made_verdict() -> Verdict:
         make_finding("slope", Place("leg", 1), ok=False, reason="too steep", margin=-1.5, tolerance=1.0, unit="deg"),
         make_finding("turn", Place("turn", 1), ok=True, reason="", unit="deg"),
         make_finding("corridor", Place("leg", 0), ok=None, reason="off the map", unit="m"),
+        make_finding("threat", FLIGHT, ok=True, reason="", margin=0.0, unit="s", facts=[Fact("nearest", 18.0, "m")]),
     )
     return Verdict(findings, flyable=False, complete=True, lines=("not flyable",), level="flown")
 
 
 def test_the_closest_of_each_rule() -> None:
     closest = made_verdict().closest
-    assert {rule: (one.place.index, one.margin) for rule, one in closest.items()} == {"slope": (1, -1.5)}
+    assert {rule: (one.place.index, one.margin) for rule, one in closest.items()} == {
+        "slope": (1, -1.5),
+        "threat": (None, 0.0),
+    }
+    assert closest["threat"].nearest == 18.0
 
 
 def test_a_table_has_a_row_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     table = made_verdict().to_pandas()
-    assert table["rule"].tolist() == ["slope", "slope", "turn", "corridor"]
-    assert table["index"].tolist() == [0, 1, 1, 0]
-    assert table["ok"].tolist() == [True, False, True, None]
+    assert table["rule"].tolist() == ["slope", "slope", "turn", "corridor", "threat"]
+    assert table["index"].tolist()[:4] == [0, 1, 1, 0]
+    assert table["ok"].tolist() == [True, False, True, None, True]
+    assert (table["nearest"].min(), table["nearest"].count()) == (18.0, 1)
     assert table.loc[table["ok"] == False, "reason"].tolist() == ["too steep"]  # noqa: E712
     # Numbers of which there are none are NaN, so that a column can be reckoned with.
     assert table["margin"].min() == -1.5
-    assert table["margin"].isna().tolist() == [False, False, True, True]
-    assert table.dtypes[["planned", "flown", "limit", "tolerance", "margin"]].unique().tolist() == [float]
+    assert table["margin"].isna().tolist() == [False, False, True, True, False]
+    assert table.dtypes[["planned", "flown", "limit", "tolerance", "margin", "nearest"]].unique().tolist() == [float]
     empty = Verdict((), flyable=True, complete=True, lines=(), level="flown").to_pandas()
     assert list(empty.columns) == list(table.columns)
     monkeypatch.setitem(sys.modules, "pandas", None)

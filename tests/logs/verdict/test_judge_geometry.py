@@ -1,5 +1,7 @@
 """A plan that is not feasible has a verdict without a flight."""
 
+from dataclasses import replace
+
 from flight.simulation.setup import FlightSetup
 from logs.recording.example_log import example_log
 from logs.verdict.judge_flight import judge_plan_only
@@ -20,6 +22,16 @@ def test_a_plan_that_is_not_feasible(setup: FlightSetup) -> None:
     assert failing(verdict) == {("slope", PLAN), ("completion", PLAN)}
     assert "slope" in verdict.summary.split("\n")[0]
     assert "leg 2: slope 16.6 deg" in verdict.summary
+
+
+def test_a_leg_that_is_too_short_for_its_turns_is_named_instead_of_the_margin_that_turns_keep(
+    setup: FlightSetup,
+) -> None:
+    plan = bad_plan(setup)
+    short = replace(plan, certificate=replace(plan.certificate, available_length=-31.2))
+    finding = next(item for item in judge_plan_only(short).findings if item.rule == "turn")
+    assert not finding.ok
+    assert finding.reason == "the plan's turn limit is exceeded, a leg is 31 m too short for its turns"
 
 
 def test_rules_come_in_the_verdicts_order() -> None:

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
@@ -12,6 +13,7 @@ from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import (
     FLIGHT,
     MISSION,
@@ -24,7 +26,8 @@ from logs.verdict.places import (
 )
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
-from tests.logs.verdict.judging import leg
+from tests.logs.verdict.judging import judge, leg
+from tests.mission_lines import setup_of, wp
 from tests.synthetic import bump, fly_path, make_setup
 
 
@@ -116,6 +119,23 @@ def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: 
     said = aside(real, 70.0, ReferenceFlights(PASSED, DECIDING)).lines[1]
     assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the simulated flight")
     assert aside(real, 70.0, ReferenceFlights(PASSED)).lines[1].endswith("with these parameters cannot")
+
+
+def test_levels_that_find_the_worst_at_other_corners_of_a_circle_are_compared() -> None:
+    """25 m above ground are drawn, 30 m are required; flown is from 60 m above that at its begin down to 20 m."""
+    lines = (wp(0, 500, 25), wp(0, 2500, 25, command=18, p="2 0 200 0"), wp(2500, 2500, 25))
+    setup = setup_of(*lines, home="36.5 -84.2 100")
+    radii = [float(radius) for radius in route_requirements(setup).radius[1:-1]]
+    verdict = judge(setup, fly_path(setup, radius=radii, up=lambda s: np.maximum(20.0, 60.0 - 0.01 * s)))
+    (planned,) = [
+        item for item in judge_geometry(setup).findings if item.rule == "clearance" and item.place.number == 0
+    ]
+    (flown,) = [item for item in verdict.findings if item.rule == "clearance" and item.place.number == 0]
+    assert (planned.ok, flown.ok) == (False, True)
+    assert planned.place.index != flown.place.index
+    found = [(item.rule, item.place.number, item.there, item.here) for item in verdict.levels[0].disagreements]
+    assert ("clearance", 0, False, True) in found
+    assert "clearance at leg 0, to item 2, fails by geometry and passes in flight" in verdict.summary
 
 
 def test_where_the_aircraft_fails_too_no_parameter_is_blamed(autopilot: FlightSetup) -> None:

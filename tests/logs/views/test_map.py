@@ -11,7 +11,7 @@ from logs.verdict.places import Place
 from logs.views.charts import Layer, legend_entries
 from logs.views.draw_map import draw_compass, draw_ground, draw_map
 from logs.views.drawing import WIDTH, draw_legend, legend_handle, new_figure
-from logs.views.map import NamedWind, flight_map, map_json
+from logs.views.map import NamedWind, end_labels, flight_map, map_json
 from tests.logs.views.figure_data import ALL, FAILED, ROUTE, drawn_map, make_scenario, make_track, make_verdict
 from world.wind import Wind
 
@@ -245,3 +245,11 @@ def test_a_way_that_ends_where_it_began_has_one_label_there() -> None:
     loop = np.concatenate([ROUTE, ROUTE[:1]])
     made = map_json(flight_map(back, plan_waypoints=None, route_waypoints=loop, track=None, verdict=None))
     assert [label[0] for label in made["labels"]] == ["0 start, 4 destination", "1", "2", "3"]
+
+
+def test_ends_have_the_numbers_of_their_stops() -> None:
+    """The last of five waypoints is the third stop of a mission with a loiter of three corners."""
+    scenario = make_scenario()
+    middle = np.linspace(scenario.start, scenario.destination, 5)
+    labels = end_labels(scenario, middle, [0, 1, 1, 1, 2])
+    assert [label.text for label in labels] == ["0 start", "2 destination"]

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from logs.verdict.returns.returns_text import segment_text
 from logs.views.charts import Layer, legend_entries
 from logs.views.figures import return_views, view_json
 from logs.views.glides import glide_chart
-from logs.views.returns import return_heights_chart, returns_map, worst_returns_chart
+from logs.views.returns import judged_path, return_heights_chart, returns_map, worst_returns_chart
+from tests.logs.made_flight import make_setup, make_track
 from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
 
 
@@ -46,24 +48,29 @@ def test_every_kind_has_a_look_and_a_name_of_its_own() -> None:
 
 def test_the_way_is_coloured_where_returns_begin(shown: tuple[FlightSetup, DrawnReturns]) -> None:
     setup, drawn = shown
-    layers = returns_map(setup, drawn).panel.layers
+    layers = returns_map(setup, drawn, None).panel.layers
+    starts = {one.start[0]: one for one in drawn.worst_by_start}
     for kind in KINDS:
         ones = [one for found, group in drawn.segments_by_outcome for one in group if found == kind]
         found = by_role(layers, f"return-{kind}")
         assert len(found) == bool(ones)
         for layer in found:
-            known = np.isfinite(layer.x)
-            assert layer.x[known].tolist() == [one.start[0] for one in ones]
-            assert layer.y[known].tolist() == [one.start[1] for one in ones]
+            # The path leads straight along a circle of latitude: each point has the look of the nearest start.
+            known = np.flatnonzero(np.isfinite(layer.x))
+            assert np.abs(layer.y[known]).max() < 4.0
             assert len(layer.hover_texts) == len(layer.x)
-            assert layer.hover_texts[0].startswith(f"{ones[0].time:.0f} s: to home: ")
+            for k in known[:-1]:
+                nearest = starts[min(starts, key=lambda east: abs(east - layer.x[k]))]
+                begins = layer.hover_texts[k].startswith(f"{nearest.time:.0f} s: to home: ")
+                # A segment reaches to the next one, half way between two starts.
+                assert (nearest.kind == kind and begins) or k + 2 not in known
     kinds = {kind for kind, _ in drawn.segments_by_outcome}
     assert {"safe", "ground", "threat"} <= kinds
 
 
 def test_the_worst_are_numbered_where_they_go_wrong(shown: tuple[FlightSetup, DrawnReturns]) -> None:
     setup, drawn = shown
-    panel = returns_map(setup, drawn).panel
+    panel = returns_map(setup, drawn, None).panel
     assert len(by_role(panel.layers, "return-way")) == len(drawn.worst) == 2
     numbers = [(label.text, label.x, label.y) for label in panel.labels if label.rank == "number"]
     assert numbers == [
@@ -108,7 +115,10 @@ def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightS
     coloured = [layer for layer in heights.layers if layer.role.startswith("return-")]
     at = np.vstack([np.column_stack([layer.x, layer.y]) for layer in coloured])
     at = at[np.isfinite(at[:, 0])]
-    assert set(at[:, 0].tolist()) == {one.time for one in drawn.returns.each}
+    times = [one.time for one in drawn.returns.each]
+    assert at[:, 0].min() == min(times)
+    # The last start is less than 10 s before the end, and stands for at most 5 s after it.
+    assert max(times) - 0.3 <= at[:, 0].max() <= max(times) + 5.0
     assert at[:, 1] == pytest.approx(600.0)
     (home,), (flat,) = by_role(left.layers, "left-home"), by_role(left.layers, "left-flat")
     lefts = [one.home_altitude_left if math.isfinite(one.home_altitude_left) else math.nan for one in drawn.glides.each]
@@ -120,7 +130,7 @@ def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightS
 
 def test_the_glides_map_has_its_footprint_under_the_way(shown: tuple[FlightSetup, DrawnReturns]) -> None:
     setup, drawn = shown
-    chart = glide_chart(setup, drawn)
+    chart = glide_chart(setup, drawn, None)
     assert chart is not None
     roles = [layer.role for layer in chart.panel.layers]
     assert roles.index("glide-near") < roles.index("landable") < roles.index("reach-home")
@@ -130,6 +140,36 @@ def test_the_glides_map_has_its_footprint_under_the_way(shown: tuple[FlightSetup
     assert np.nanmin(near.x) == pytest.approx(-1270.0, abs=150.0)
     entries = [entry.text for entry in legend_entries([chart.panel])]
     assert "home in reach from 150 m above ground" in entries
+
+
+def test_lines_that_coincide_are_one_and_others_are_both_seen(shown: tuple[FlightSetup, DrawnReturns]) -> None:
+    """A landing at home has the same altitude to spare as home; another place has its own line, below and wider."""
+    setup, drawn = shown
+    sites = (*drawn.glides.sites, drawn.glides.sites[0]._replace(kind="landing"))
+    for shift, names in ((0.0, ["left-home", "left-flat"]), (10.0, ["left-site", "left-home", "left-flat"])):
+        each = tuple(replace(one, site_altitude_left=one.home_altitude_left + shift) for one in drawn.glides.each)
+        chart = return_heights_chart(setup, replace(drawn, glides=replace(drawn.glides, each=each, sites=sites)), None)
+        assert chart is not None
+        layers = chart.panels[1].layers
+        assert [layer.role for layer in layers] == names
+        assert ("and for a rally point or landing place there" in layers[0].name) is (shift == 0.0)
+    assert theme.LOOKS["left-site"].width > 2.0 * theme.LOOKS["left-home"].width
+    assert not theme.LOOKS["left-site"].dash
+
+
+def test_a_flown_path_is_drawn_where_it_was_flown() -> None:
+    """A track around a quarter of a circle of 100 m, with returns from its ends: its first half is the first's."""
+    setup, track = make_setup(), make_track()
+    angle = np.linspace(0.0, 0.5 * math.pi, len(track))
+    circle = 100.0 * np.column_stack([np.sin(angle), np.cos(angle), np.full(len(track), 3.0)])
+    flown = replace(track, position=circle)
+    ends = [float(track.time[0]), float(track.time[-1])]
+    (first, first_points), (second, second_points) = judged_path(setup, flown, ends, lambda time: time, str)
+    assert (first, second) == (str(ends[0]), str(ends[1]))
+    for points in (first_points, second_points):
+        positions = np.array([point.position for point in points])
+        assert np.hypot(positions[:, 0], positions[:, 1]) == pytest.approx(100.0)
+    assert first_points[-1].time == pytest.approx(0.5 * sum(ends), abs=0.1)
 
 
 def test_figures_that_have_no_data_are_left_out(shown: tuple[FlightSetup, DrawnReturns], tmp_path: Path) -> None:

@@ -51,6 +51,14 @@ def legend(figure: Any) -> set[str]:
     return {text.get_text() for text in figure.legends[0].get_texts()}
 
 
+def test_waypoints_have_the_numbers_of_their_stops() -> None:
+    setup = make_setup()
+    setup = replace(setup, route=setup.route.with_fields(stop=[0, 1, 1, 2]))
+    names = {text.get_text() for text in drawn(setup, make_track(), None).axes[0].texts}
+    assert {"0 start", "1", "2 destination"} <= names
+    assert not {"2", "3 destination"} & names
+
+
 def test_what_is_there_is_drawn_and_named() -> None:
     flown = drawn(make_setup(), make_track(), make_verdict(("slope", Place("leg", 1))))
     # From (-900, -400) to (700, 400): seen from the south-south-east, the nearest of eight names of which is the south.

@@ -41,6 +41,12 @@ def test_bank_and_height_above_ground_are_those_of_track_and_terrain() -> None:
     assert (chart.along, chart.unit, chart.timed) == ("time since the start", "s", True)
 
 
+def test_legs_to_one_stop_have_one_number() -> None:
+    """As around a loiter: the second waypoint belongs to the first stop, so that leg 1 begins with the third leg."""
+    setup = replace(SETUP, route=SETUP.route.with_fields(stop=[0, 1, 1, 2]))
+    assert time_chart(setup, TRACK).marks == ((0.0, "leg 0"), (72.0, "leg 1"))
+
+
 def test_without_terrain_there_is_no_panel_of_clearance() -> None:
     chart = time_chart(make_setup(terrain={"kind": "none"}, threats=[]), TRACK)
     assert len(chart.panels) == 7

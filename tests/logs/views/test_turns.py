@@ -1,6 +1,8 @@
 """Turn by turn: each finding's numbers stand at its place's number, and what fails is ringed."""
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,6 +36,23 @@ def test_values_are_in_the_order_of_their_places_and_the_flights_own_are_left_ou
     assert [value.ok for value in values] == [True, False, None]
     assert [value.number for value in place_values(FINDINGS, "turn")] == [1]
     assert place_values(FINDINGS, "threat") == []
+
+
+def test_places_have_the_numbers_of_the_texts() -> None:
+    """Leg 7 of a route with a loiter is what the texts call leg 2."""
+    place = Place("leg", 7, to_item=5, number=2)
+    (value,) = place_values([replace(slope(7, 4.0, 4.5, True), place=place)], "slope")
+    assert value.number == 2
+
+
+def test_numbers_of_many_places_do_not_touch() -> None:
+    """Of 120 legs each third fails: the labels keep a gap of half a digit, in the picture as in print."""
+    findings = tuple(slope(k, 9.0 if k % 3 else 4.0, None, bool(k % 3 == 0)) for k in range(120))
+    figure = draw_chart(turn_chart("a flight", Verdict(findings, False, True, ("not flyable",), "plan")))
+    figure.canvas.draw()
+    boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels() if label.get_text()]
+    assert len(boxes) > 15
+    assert all(second.x0 - first.x1 > 1.0 for first, second in pairwise(boxes))
 
 
 def test_bars_dots_and_dashes_stand_at_the_findings_numbers() -> None:

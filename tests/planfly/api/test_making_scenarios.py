@@ -9,7 +9,7 @@ import pytest
 
 import planfly
 from tests.world.made.elevation_files import MIDDLE, made_tile, write_geotiff
-from world.scenario import load_scenario
+from world.scenario import embedded_names, load_scenario
 
 ROWS = [
     {"name": "a", "east_m": 900.0, "north_m": 90.0, "kill_radius_m": 60.0, "kill_scale_m": 20.0},
@@ -67,9 +67,21 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"threats": [[1.0, 2.0]]}, "threats list: expected a data frame"),
+        ({"threats": [[1.0, 2.0]]}, r"threats of shape \(1, 2\): expected a data frame"),
+        ({"threats": np.zeros((4, 3))}, r"threats of shape \(4, 3\): expected a data frame .*array \(n, 4\)"),
+        ({"threats": (0.0, 0.0, 100.0, 200.0)}, r"threats of shape \(4,\): expected a data frame"),
+        ({"threats": [[9.0, np.nan, 60.0, 0.0]]}, "threats row 0: north_m nan: expected a position"),
+        ({"threats": [("a", 0, 100, 0)]}, "threats list: expected a data frame"),
         ({"threats": 7}, "threats int: expected a data frame"),
-        ({"threats": {"east_m": [1.0, 2.0], "north_m": [1.0]}}, "threats dict: expected a data frame"),
+        (
+            {"threats": {"east_m": [1.0, 2.0], "north_m": [1.0]}},
+            r"threats east_m of shape \(2,\), north_m of shape \(1,\): expected columns \(n,\) of equal length",
+        ),
+        (
+            {"threats": {"lat_deg": [46.0, np.nan], "lon_deg": [8.0, 8.0], "kill_radius_m": [60.0, 60.0]}},
+            r"threats\.1: lat_deg: missing; a position needs lat_deg and lon_deg",
+        ),
+        ({"threats": [{"kill_radius_m": 60.0}]}, r"threats\.0: position: missing; give east_m and north_m, or lat_deg"),
         ({"threats": [{"east_m": 900.0, "north_m": 90.0}]}, "a threat has a missile, a radar, or both"),
         ({"threats": [{**ROWS[0], "colour": "red"}]}, "colour"),
         ({"wind": {"speed_mps": 400.0}}, "wind.speed_mps: 400"),
@@ -145,6 +157,28 @@ def test_a_notebook_shows_a_scenario_as_a_line_or_a_table() -> None:
     assert "<td>destination</td><td>east 2600 m, north 0 m, 75 m AMSL</td>" in table
 
 
+def test_the_table_of_a_notebook_names_what_decides_a_flight() -> None:
+    """Of `tight`, flown by planfly's guidance, which knows its place, in a corridor of 15 m."""
+    rows = (
+        ("aircraft", "aerosonde"),
+        ("airspeed", "25 m/s"),
+        ("autopilot", "planfly, path"),
+        ("navigation", "perfect"),
+        ("corridor", "15 m to each side"),
+    )
+    table = planfly.make_scenario("tight", flight={"airspeed_mps": 25.0}, limits={"corridor_m": 15.0})._repr_html_()
+    for name, text in rows:
+        assert f"<td>{name}</td><td>{text}</td>" in table
+    table = load_scenario("jacksboro")._repr_html_()
+    rows = (
+        ("autopilot", "ardupilot"),
+        ("navigation", "gnss"),
+        ("corridor", "as wide as the autopilot needs"),
+    )
+    for name, text in rows:
+        assert f"<td>{name}</td><td>{text}</td>" in table
+
+
 def test_an_elevation_file_of_ones_own_replaces_the_terrain_as_a_whole(tmp_path: Path) -> None:
     """A digest or an origin of another file, and keys of another kind, are not carried over."""
     tile = write_geotiff(tmp_path / "own.tif", np.full_like(made_tile(), 120.0))
@@ -168,3 +202,69 @@ def test_an_elevation_file_of_ones_own_replaces_the_terrain_as_a_whole(tmp_path:
     }
     changes = {"terrain": {"kind": "dem", "path": str(tile)}, "origin": {"lat_deg": 46.061, "lon_deg": 8.05}}
     assert planfly.make_scenario("tight", area=area, threats=[], **changes, **ends).origin.lat_deg == 46.061
+
+
+# ----------------------------------------------------------------------
+# A scenario made in Python, in a file and in other functions.
+
+
+@pytest.mark.parametrize("name", embedded_names())
+def test_a_written_scenario_is_read_as_the_same(name: str, tmp_path: Path) -> None:
+    zone = {
+        "name": 'a "b"\\c',
+        "kind": "exclusion",
+        "east_m": 1e3,
+        "north_m": 0.1,
+        "radius_m": 5.0,
+        "floor_amsl_m": 9e3,
+    }
+    for scenario in (load_scenario(name), planfly.make_scenario(name, name=f"Täl {name}", zones=[zone])):
+        scenario.to_toml(tmp_path / "mine.toml")
+        again = load_scenario(str(tmp_path / "mine.toml"))
+        assert again.to_json() == scenario.to_json()
+        assert (again.start.tolist(), again.bounds.tolist()) == (scenario.start.tolist(), scenario.bounds.tolist())
+
+
+def test_a_scenario_of_a_mission_is_not_written(tmp_path: Path) -> None:
+    planfly.export(planfly.plan("tight", seed=1), tmp_path / "m.waypoints")
+    scenario = planfly.judge(tmp_path / "m.waypoints", geometry=True).setup.scenario
+    with pytest.raises(planfly.ScenarioError, match=r"made around a mission.*planfly\.make_scenario"):
+        scenario.to_toml(tmp_path / "mine.toml")
+    assert not (tmp_path / "mine.toml").exists()
+
+
+@pytest.fixture(scope="module")
+def windy() -> planfly.Scenario:
+    return planfly.make_scenario("paper-07", name="windy", wind={"speed_mps": 3.0, "from_deg": 250.0})
+
+
+def test_a_mission_is_flown_and_judged_in_a_scenario_made_in_python(windy: planfly.Scenario, tmp_path: Path) -> None:
+    path = planfly.plan("paper-07", seed=1)
+    mission = tmp_path / "m.waypoints"
+    planfly.export(path, mission)
+    for what in (path, mission):
+        assert planfly.judge(what, geometry=True, scenario=windy).setup.scenario.name == "windy"
+    assert planfly.fly(mission, scenario=windy).setup.scenario.wind.speed == 3.0
+    assert planfly.check(mission, geometry=True, scenario=windy).conditions.wind_mps == 3.0
+    assert planfly.export(path, tmp_path / "n.plan", scenario=windy).files
+    assert planfly.returns(path, scenario=windy, every=200.0).setup.scenario.name == "windy"
+    link = {"frequency": 868.0, "power": 27.0, "sensitivity": -110.0}
+    assert planfly.link(path, scenario=windy, **link).setup.scenario.name == "windy"
+
+
+def test_a_campaign_flies_in_a_scenario_made_in_python(windy: planfly.Scenario, tmp_path: Path) -> None:
+    """Its workers are processes of their own; the command on its page names the scenario as a file."""
+    done = planfly.campaign(windy, flights=2, workers=2, seed=1, out=tmp_path / "a")
+    assert done.summary.estimate.tally.flown == 2
+    file = tmp_path / "a" / "scenario.toml"
+    assert load_scenario(str(file)).to_json() == windy.to_json()
+    assert f"planfly campaign {file} " in (tmp_path / "a" / "report.html").read_text(encoding="utf-8")
+    # As by the command, which finds the plan in the folder.
+    again = planfly.campaign(file, flights=3, workers=1, seed=1, out=tmp_path / "a", resume=True)
+    assert again.summary.estimate.tally.flown == 3
+    mission = planfly.plan("paper-07", seed=1, out=tmp_path / "p.json") and tmp_path / "p.json"
+    named = planfly.campaign(mission, scenario=windy, flights=1, workers=1, out=tmp_path / "b")
+    assert named.summary.estimate.tally.flown == 1
+    assert f"--scenario {tmp_path / 'b' / 'scenario.toml'}" in (tmp_path / "b" / "report.html").read_text(
+        encoding="utf-8"
+    )

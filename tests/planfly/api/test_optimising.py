@@ -167,29 +167,30 @@ def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(planfly.ArgumentError, match=words):
         planfly.optimise(*arguments)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"population": 2}, "even number from 4"),
-        ({"population": 5}, "even number from 4"),
-        ({"model": "ga"}, "allowed umda, emna, multistart, partial, differential"),
+        ({"population": 2}, "population 2: expected an even whole number from 4"),
+        ({"population": 5}, "population 5: expected an even whole number from 4"),
+        ({"model": "ga"}, "model ga: expected umda, emna, multistart, partial, differential"),
+        ({"seed": np.nan}, "seed nan: expected a whole number"),
         ({"initial": [[0.5]]}, r"shape \(1, 1\): expected finite numbers of shape \(100, 1\)"),
         ({"initial": [[np.nan]] * 100}, "finite"),
     ],
 )
 def test_options_that_are_none_are_refused(options: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises(planfly.ArgumentError, match=words):
         planfly.optimise([0.0], [1.0], **options)
 
 
 def test_values_of_another_shape_are_refused() -> None:
     search = planfly.optimise([0.0], [1.0], population=4)
-    for values in ([1.0, 2.0], 1.0, np.zeros((4, 1, 1)), np.zeros((4, 0))):
-        with pytest.raises(ValueError, match=r"values"):
+    for values in ([1.0, 2.0], 1.0, np.zeros((4, 1, 1)), np.zeros((4, 0)), ["a"] * 4):
+        with pytest.raises(planfly.ArgumentError, match=r"values"):
             search.tell(values)
     search.tell(np.zeros(4))
     with pytest.raises(ValueError, match="differ from the previous call"):
@@ -205,3 +206,29 @@ def test_before_anything_is_told_there_is_no_best() -> None:
         _ = search.best
     search.minimise(lambda points: points[:, 0] * 0.0 + 2.0, 1)
     assert repr(search) == "<Optimiser Umda: 1 variables, 100 evaluations, best 2>"
+
+
+def test_the_least_of_a_cost_of_ones_own_is_a_safe_plan() -> None:
+    """The recipe of docs/planner-and-paper.md: to pass far from a place, with samples that leave the terrain."""
+    path = planfly.plan("jacksboro-air", seed=1)
+    waves = np.sin(np.outer(np.linspace(0.0, np.pi, len(path.waypoints)), [1, 2]))
+
+    def planned(x: np.ndarray) -> planfly.Plan:
+        moved = np.array(path.waypoints)
+        # The last tenth of the box leads off the map.
+        moved[1:-1, 1] += (waves @ np.where(x > 2700.0, 60_000.0, x))[1:-1]
+        return planfly.plan(path.scenario, waypoints=moved)
+
+    def nearness(plan: planfly.Plan) -> float:
+        return float(-np.abs(plan.waypoints[5, 1] - path.waypoints[5, 1]))
+
+    search, off_terrain = planfly.optimise([-3000.0] * 2, [3000.0] * 2, population=40, seed=1), 0
+    for _ in range(12):
+        plans = [planned(x) for x in search.ask()]
+        off_terrain += sum(np.isnan(plan.certificate.clearance) for plan in plans)
+        search.tell([nearness(plan) for plan in plans], [-np.minimum(plan.margins, 0.0).sum() for plan in plans])
+    found = planned(search.best.x)
+    assert off_terrain
+    assert search.best.feasible
+    assert found.safe
+    assert search.best.value == nearness(found) < 0.0

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import planfly
+from flight.mission_files.formats import mission_text
 from planfly.campaigns.battery_text import answer_line, battery_lines
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
@@ -15,9 +17,13 @@ from planfly.campaigns.find_battery import (
     BatteryResult,
     CapacityRange,
     EnergyRow,
+    find_battery,
     fly_for_energy,
     quantile_of_capacities,
 )
+from planfly.campaigns.worker_pool import Workers
+from tests.logs.verdict.returns import hill
+from tests.mission_lines import mission, wp
 
 _DRAW = draw_flight(default_dispersions(), 1, 0)
 
@@ -134,6 +140,61 @@ def test_a_flight_uses_what_its_track_says(base: CampaignBase) -> None:
     assert row.battery_factor == draw_flight(base.dispersions, base.seed, 0).values["battery"]
     heavier = fly_for_energy(base, 0, interval=5.0, mass_factor=1.3)
     assert heavier.mission_energy > 1.02 * row.mission_energy
+
+
+def px4_base(folder: Path, stated: str) -> CampaignBase:
+    """Open a mission behind the hill for PX4, which returns over it."""
+    (folder / "hill.toml").write_text(hill.SCENARIO, encoding="utf-8")
+    (folder / "behind.waypoints").write_text(hill.mission_text(5000.0, 6500.0, amsl=200.0), encoding="utf-8")
+    (folder / "mine.params").write_text(f"# Stack: PX4 Pro\n{stated}\n", encoding="utf-8")
+    options = {"seed": 1, "scenario": str(folder / "hill.toml"), "params": str(folder / "mine.params")}
+    return open_campaign(str(folder / "behind.waypoints"), default_dispersions(), options)  # type: ignore[arg-type]
+
+
+def test_a_higher_return_of_px4_needs_a_larger_battery(tmp_path: Path) -> None:
+    rows = {}
+    for height in (450, 650):
+        base = px4_base(tmp_path, f"RTL_RETURN_ALT {height}")
+        rows[height] = fly_for_energy(base, 0, interval=20.0, mass_factor=1.0)
+        assert rows[height].is_decided_by_return
+    # 11 kg are lifted by 200 m.
+    assert rows[650].return_energy - rows[450].return_energy > 11.0 * 9.81 * 200.0 / 3600.0
+    lines = battery_lines(battery_result(base, [energy_row(80.0)] * 20, own=888.0))
+    assert "returns to launch by the simulated PX4 flying a point-mass model" in lines
+    assert any("RTL_RETURN_ALT 650 m above that place" in line for line in lines)
+    assert not any("ArduPlane" in line for line in lines)
+
+
+def test_a_battery_without_simulated_returns_is_not_compared(tmp_path: Path) -> None:
+    base = px4_base(tmp_path, "RTL_TYPE 2")
+    result = replace(battery_result(base, [energy_row(80.0)] * 100, own=888.0), has_returns=False)
+    assert result.is_enough is None
+    assert "in the mission (without returns)" in answer_line(result)
+    assert "the returns are not judged at all: RTL_TYPE 2 returns along the mission, which is not simulated" in (
+        battery_lines(result)
+    )
+    found = find_battery(base, BatteryGoal(flights=2, interval=60.0), Workers(1), lambda *_: None)
+    assert not found.has_returns
+
+
+def test_the_legs_around_a_loiter_are_one_in_the_energies_and_in_the_lines(tmp_path: Path) -> None:
+    """A loiter of two laps between two legs has many corners: people count a leg to it and one from it."""
+    file = tmp_path / "loiter.waypoints"
+    lines = (wp(0, 500), wp(0, 2500, command=18, p="2 0 200 0"), wp(2500, 2500))
+    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    base = open_campaign(str(file), default_dispersions(), {"seed": 1})
+    assert base.nominal_setup().route.legs > 4
+    row = fly_for_energy(base, 0, interval=10.0, mass_factor=1.0)
+    assert row.ended == "completed"
+    assert len(row.leg_energies) == 2
+    assert sum(row.leg_energies) == pytest.approx(row.mission_energy, rel=1e-3)
+    assert row.return_leg in (0, 1)
+    # Two returns from different corners of the loiter decide at one place, which has one line.
+    rows = [replace(row, return_energy=2.0 * row.mission_energy, return_leg=0, return_time=30.0 + k) for k in range(2)]
+    lines_on_it = [line for line in battery_lines(battery_result(base, rows, own=888.0)) if "the return that" in line]
+    assert lines_on_it == [
+        "decided by the return that starts at 30 s (leg 0, to item 2): in 2 of 2 flights",
+    ]
 
 
 def test_a_found_battery_keeps_the_reserve_in_other_flights(base: CampaignBase) -> None:

@@ -9,6 +9,8 @@ import pytest
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.campaigns.find_ground_risk import (
@@ -159,6 +161,18 @@ def test_lines_and_table_say_what_counts_and_what_it_is_not(base: CampaignBase) 
     assert "| width S_CV by formula | 207.7 m |" in table
     assert "3 + 3 + 1 + 31.0 + 169.7 m" in table
     assert DISCLAIMER in table
+
+
+def test_the_autopilot_whose_returns_count_is_named(base: CampaignBase) -> None:
+    rows = [row(50.0, 40.0, 60.0)] * 20
+    assert any("returns to launch by ArduPlane's law every 10 s" in line for line in risk_lines(volumes(base, rows)))
+    autopilot = Px4(Px4Parameters.load(base.airframe.aircraft))
+    px4 = replace(base, airframe=replace(base.airframe, autopilot=autopilot))
+    lines = risk_lines(volumes(px4, rows, glide_ratio=10.0))
+    assert any("returns to launch by PX4's law every 10 s" in line for line in lines)
+    assert "glides without the engine by ArduPlane's law, because PX4's is not simulated" in lines
+    assert any(line.startswith("RTL_TYPE 1: a return goes to ") for line in lines)
+    assert not any("ArduPlane" in line for line in risk_lines(volumes(px4, rows)))
 
 
 def test_flights_faster_than_the_stated_speed_are_told(base: CampaignBase) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
+from logs.recording.reader import read_log
 from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, UNKNOWN_PATH, Finding, make_finding
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
@@ -32,6 +33,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup
+from world.scenario import with_threats
 
 CHECKS = (GROUND_PATH, UNKNOWN_AIRCRAFT)
 
@@ -186,6 +188,28 @@ def test_a_flight_is_that_of_fly_in_the_same_wind(base: CampaignBase, tmp_path: 
     assert row.duration == float(flown.track.time[-1])
     assert dict(row.margins) == dict(find_minimum_margins(flown.verdict.findings))
     assert len(row.margins) > 5
+
+
+@pytest.mark.parametrize("radius", [200.0, 290.0, 400.0])
+def test_the_distance_to_a_missile_is_that_of_the_logged_positions(
+    base: CampaignBase, radius: float, tmp_path: Path
+) -> None:
+    """A missile 300 m beside the first leg, which its sphere nearly reaches, or covers in part; and a radar."""
+    start, end = base.nominal_setup().route.positions[:2, :2]
+    step = (end - start) / np.hypot(*(end - start))
+    place = 0.5 * (start + end) + 300.0 * np.array([-step[1], step[0]])
+    threats: list[dict[str, Any]] = [
+        {"east_m": float(place[0]), "north_m": float(place[1]), "kill_radius_m": radius, "height_m": 100.0},
+        {"east_m": float(place[0]), "north_m": float(place[1]), "detection_radius_m": 900.0},
+    ]
+    watched = replace(base, scenario=with_threats(base.scenario, threats, "threats"))
+    row = fly_one(watched, 0, log=tmp_path / "a.mcap")
+    position = read_log(tmp_path / "a.mcap").track.position
+    centre = watched.scenario.threats.position[-2]
+    assert row.missile_distance == pytest.approx(
+        float(np.linalg.norm(position - centre, axis=1).min()) - radius, abs=0.5
+    )
+    assert fly_one(base, 0).missile_distance is None
 
 
 def test_the_same_index_gives_the_same_flight_and_log(base: CampaignBase, tmp_path: Path) -> None:

@@ -160,6 +160,27 @@ def test_the_edge_of_the_search_is_no_limit() -> None:
     assert not any("no limit" in text.get_text() for text in without.legends[0].get_texts())
 
 
+def test_nothing_is_known_next_to_a_direction_that_is_not_judged() -> None:
+    """Of north, east, south and west the south is not judged: areas and line end at east and west."""
+    spokes = [replace(one, is_judged=one.from_deg != 180.0) for one in SPOKES]
+    axes = draw_go_no_go(spokes, 20.0, 0.99, 0.95, "demo", None).axes[0]
+    [outline] = [line for line in axes.lines if len(line.get_xdata()) > 100]
+    angle, speed = (np.asarray(data, float) for data in (outline.get_xdata(), outline.get_ydata()))
+    between = (angle > np.radians(91.0)) & (angle < np.radians(269.0))
+    assert np.isnan(speed[between]).all()
+    assert np.isfinite(speed[(angle < np.radians(90.0)) | (angle > np.radians(270.0))]).all()
+    go = axes.collections[0].get_paths()
+    corners = np.concatenate([path.vertices for path in go])
+    assert not ((corners[:, 0] > np.radians(91.0)) & (corners[:, 0] < np.radians(269.0)) & (corners[:, 1] > 0.1)).any()
+
+
+def test_without_a_judged_direction_nothing_is_a_go() -> None:
+    figure = draw_go_no_go([replace(one, is_judged=False) for one in SPOKES], 20.0, 0.99, 0.95, "demo", None)
+    assert not any(path.vertices.size for area in figure.axes[0].collections[:3] for path in area.get_paths())
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["not judged", "flown, all flyable", "flown, some not flyable"]
+
+
 def test_the_legend_of_the_fan_leaves_its_title_free() -> None:
     rows = np.linspace(60.0, 90.0, 40 * 50).reshape(40, 50)
     figure = draw_clearance_fan(rows, np.arange(40) > 30, np.full(50, 100.0), 4000.0, 60.0)

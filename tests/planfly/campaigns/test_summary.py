@@ -149,3 +149,10 @@ def test_what_ends_a_flight_comes_before_what_it_then_misses() -> None:
     assert [failures.rule for failures in count_failures([flight])] == [
         *("launch", "departure", "completion", "slope", "waypoint")
     ]
+
+
+def test_corners_of_one_loiter_are_one_place() -> None:
+    """Flights fail at different corners; a person reads of one leg to the loiter."""
+    flights = [[("clearance", Place("leg", index, to_item=4, number=2))] for index in (2, 5, 9)]
+    (clearance,) = count_failures(flights)
+    assert [(place.number, count) for place, count in clearance.places] == [(2, 3)]

@@ -1,16 +1,25 @@
 """``planfly link``: a flight's link by options and by a scenario; what it prints and answers; bad input."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+import rasterio
 
 import planfly
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.mission.items import Home
 from logs.recording.example_log import example_log, write_example_log
 from logs.verdict.judge_flight import judge_flight
 from planfly.cli import main
+from tests.logs.verdict.rules.flown_circuits import flown_circuit
 from world.errors import PlanflyError
+from world.frames import to_map
 from world.scenario import with_link
 
 RADIO = {"frequency": 1000.0, "power": 20.0, "sensitivity": -100.0}
@@ -54,13 +63,73 @@ def test_a_weaker_receiver_keeps_less_margin() -> None:
     ("options", "message"),
     [
         ({"frequency": 900.0, "power": 20.0}, r"sensitivity missing: expected a number, or a scenario with \[link\]"),
-        ({**RADIO, "frequency": 5.0}, "frequency 5.0: expected a frequency from 30 to 100,000 MHz"),
-        ({**RADIO, "station": (99.0, 0.0)}, "link"),
+        ({**RADIO, "frequency": 29.9}, "frequency 29.9: expected a frequency from 30 to 15,000 MHz"),
+        ({**RADIO, "frequency": 15_001.0}, "frequency 15001.0: expected a frequency from 30 to 15,000 MHz"),
+        ({**RADIO, "power": math.nan}, "power nan: expected a power from -30 to 60 dBm"),
+        ({**RADIO, "station_gain": 61.0}, "station_gain 61.0: expected a gain from -20 to 60 dBi"),
+        ({**RADIO, "aircraft_gain": -21.0}, "aircraft_gain -21.0: expected a gain from -20 to 60 dBi"),
+        ({**RADIO, "cable_loss": -1.0}, "cable_loss -1.0: expected a loss from 0 to 60 dB"),
+        ({**RADIO, "max_outage": 3601.0}, "max_outage 3601.0: expected a time from 0 to 3,600 s"),
+        ({**RADIO, "use": "smoke"}, "use smoke: expected telemetry, control"),
+        ({**RADIO, "station": (99.0, 0.0)}, r"lat_deg: 99\.0: allowed -89\.\.89"),
+        (
+            {**RADIO, "station": (1.0, 2.0, 3.0)},
+            r"station \(1\.0, 2\.0, 3\.0\): expected latitude and longitude, degrees",
+        ),
+        ({**RADIO, "station": "46"}, "station 46: expected latitude and longitude, degrees"),
+        ({**RADIO, "station": (0.0, 0.0)}, "the elevation file has no data there"),
     ],
 )
-def test_bad_input_is_refused(options: dict[str, float], message: str) -> None:
-    with pytest.raises(PlanflyError, match=message):
+def test_bad_input_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(PlanflyError, match=message) as refused:
         planfly.link(example_log(), **options)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--frequency", "60000"],
+        ["--frequency", "nan"],
+        ["--max-outage", "-1"],
+        ["--station-gain", "high"],
+        ["--use", "smoke"],
+        ["--station", "99,0"],
+        ["--station", "46"],
+        ["--station", "0,0"],
+        ["--antenna", "0"],
+        ["--out", "flight.mcap"],
+    ],
+    ids=" ".join,
+)
+def test_a_bad_option_is_one_line(options: list[str], log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    radio = ["--frequency", "915", "--power", "20", "--sensitivity", "-100"]
+    try:
+        code: object = main(["link", str(log), *radio, *options, "--quiet"])
+    except SystemExit as stopped:
+        code = stopped.code
+    assert code == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_each_entry_of_the_budget_counts() -> None:
+    """Gains add to the margin at every point; losses and the fade margin are taken from it."""
+    flight = example_log()
+    origin = flight.setup.scenario.origin
+
+    def margins(**options: float) -> Any:
+        found = planfly.link(flight, **RADIO, station=(origin.lat_deg, origin.lon_deg), **options)
+        assert found.along is not None
+        return found.along.points.margin
+
+    bare = margins()
+    for options, change in (
+        ({"station_gain": 6.0}, 6.0),
+        ({"aircraft_gain": 2.0}, 2.0),
+        ({"cable_loss": 3.0}, -3.0),
+        ({"fade_margin": 14.0}, -4.0),
+    ):
+        assert margins(**options) == pytest.approx(bare + change)
 
 
 @pytest.mark.usefixtures("blank_pictures")
@@ -70,10 +139,65 @@ def test_the_command_prints_answers_and_draws(log: Path, capsys: pytest.CaptureF
     place = ["--station", f"{origin.lat_deg},{origin.lon_deg}"]
     assert main(["link", str(log), *radio, *place, "--out", "drawn", "--json", "answer.json"]) == 4
     out = capsys.readouterr().out
-    assert "dB below the fade margin" in out
+    assert "dB below the fade margin on leg 0, to item 2, at 0 s" in out
     answer = json.loads(Path("answer.json").read_text(encoding="utf-8"))
-    assert (answer["ok"], answer["exit_code"]) == (False, 4)
-    assert answer["files"] == [str(Path("drawn") / name) for name in ("link.png", "link-map.png")]
+    assert (answer["ok"], answer["exit_code"], answer["where"]) == (False, 4, "leg 0, to item 2")
+    names = ("link.png", "link-map.png", "link-coverage.tif")
+    assert answer["files"] == [str(Path("drawn") / name) for name in names]
     assert all(Path(name).exists() for name in answer["files"])
+    # The whole flight is one outage, at its worst at its start.
+    (outage,) = answer["outages"]
+    track = example_log().track
+    east, north = to_map(origin, outage["lat_deg"], outage["lon_deg"])
+    assert (outage["first_s"], outage["last_s"]) == (0.0, float(track.time[-1]))
+    assert (float(east), float(north)) == pytest.approx(track.position[0, :2].tolist(), abs=0.1)
+    assert outage["margin_db"] == pytest.approx(answer["facts"]["smallest margin left after the fade margin"], abs=0.01)
     assert main(["link", str(log), *radio[:4]]) == 2
     assert "--sensitivity missing: expected a number, or a scenario with [link]" in capsys.readouterr().err
+
+
+def test_the_coverage_has_the_margin_of_the_path_below_it(log: Path) -> None:
+    """The flight is level: in the cell of a point of the path the margin is that of the path, within the cell."""
+    flight = example_log()
+    origin = flight.setup.scenario.origin
+    found = planfly.link(log, **RADIO, station=(origin.lat_deg, origin.lon_deg), out="drawn")
+    assert found.along is not None
+    assert found.antenna is not None
+    with rasterio.Env(), rasterio.open("drawn/link-coverage.tif") as file:
+        far = found.along.points.distance > 400.0
+        places = [tuple(place) for place in found.along.positions[far, :2].tolist()]
+        values = np.array([value[0] for value in file.sample(places)])
+        cell = file.res[0]
+    # Half a cell's diagonal at 400 m is so many dB of free space.
+    assert cell < 40.0
+    assert values == pytest.approx(found.along.points.margin[far], abs=20.0 * math.log10(1.0 + 0.75 * cell / 400.0))
+
+
+def test_the_returns_from_an_outage_are_those_of_planfly_returns() -> None:
+    """Where ArduPlane returns without the link, each return is judged as `planfly returns` judges it."""
+    flight = example_log()
+    parameters = ArduPilotParameters.of_text("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n", "mine.param")
+    origin = flight.setup.scenario.origin
+    mission = replace(flight.setup.mission, home=Home(origin.lat_deg, origin.lon_deg, 0.0))
+    setup = replace(flight.setup, autopilot=ArduPlane(parameters), mission=mission)
+    flight = replace(flight, setup=setup)
+    found = planfly.link(flight, **{**RADIO, "power": -30.0, "sensitivity": -30.0}, max_outage=3600.0)
+    assert found.finding.ok is False
+    assert found.returns is not None
+    every = {ret.time: ret for ret in planfly.returns(flight).returns.each}
+    assert len(found.returns.each) > 20
+    assert [repr(every[ret.time]) for ret in found.returns.each] == [repr(ret) for ret in found.returns.each]
+    assert found.return_lines
+    assert all(line.startswith("return from ") for line in found.return_lines)
+
+
+def test_a_link_by_options_is_judged_as_the_verdict_judges_a_mission_from_the_ground() -> None:
+    """Take-off and landing are part of the link."""
+    flown = flown_circuit()
+    log = replace(example_log(), setup=flown.setup, track=flown.track, ended=flown.flight.ended)
+    origin = flown.setup.scenario.origin
+    found = planfly.link(log, **RADIO, station=(origin.lat_deg, origin.lon_deg))
+    verdict = judge_flight(found.setup, flown.track, flown.flight.ended)
+    assert found.finding in verdict.findings
+    assert found.along is not None
+    assert (found.along.time[0], found.along.time[-1]) == (flown.track.time[0], flown.track.time[-1])

@@ -55,6 +55,8 @@ def test_a_scenario_over_ones_own_ground(here: Path, capsys: pytest.CaptureFixtu
     assert scenario.terrain is not None
     assert scenario.start[2] - scenario.terrain.height(*scenario.start[:2]) == pytest.approx(150.0)
     assert 1400.0 <= scenario.ceiling <= 1600.0
+    text = (here / "site" / "site.toml").read_text(encoding="utf-8")
+    assert re.search(r"^# kill_scale_m = \d+ +# where the exposure \(scale/distance\)\^4 is 1$", text, re.MULTILINE)
     # The folder is moved with its ground.
     (here / "elsewhere").mkdir()
     for name in ("site", "dem.tif"):

@@ -9,6 +9,7 @@ import pytest
 
 import planfly
 from planfly.cli import main
+from tests.autopilots import write_fake
 from tests.logs.verdict.returns.hill import SCENARIO, mission_text
 from tests.own_aircraft import change_model
 
@@ -129,24 +130,67 @@ def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.C
     assert "ArduPlane's own return, which would follow the terrain, is not simulated" in out
 
 
-def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (hill / "short.waypoints").write_text(mission_text(0.0, 2000.0), encoding="utf-8")
-    asked = ["returns", "short.waypoints", "--scenario", "hill.toml", "--every", "20", "--autopilot"]
-    # From before the hill all returns are safe by ArduPlane's law, which is planfly's own guidance's too.
-    assert main([*asked, "planfly"]) == 0
-    assert "it returns: the pilot's RTL" in capsys.readouterr().out
-    assert main([*asked, "px4", "--json", "px4.json"]) == 3
+# Names and words of ArduPlane that no answer for PX4 has.
+ARDUPLANES = ("ArduPlane", "RTL_ALTITUDE", "RTL_AUTOLAND", "RTL_CLIMB_MIN", "RALLY_", "FS_LONG", " AIRSPEED_MIN")
+
+
+@pytest.fixture
+def behind(hill: Path) -> Path:
+    """A mission behind the hill, below its top, to which PX4 has to return over the hill."""
+    (hill / "behind.waypoints").write_text(mission_text(5000.0, 6500.0, amsl=200.0), encoding="utf-8")
+    for height in (100, 400, 450):
+        text = f"# Stack: PX4 Pro\nRTL_RETURN_ALT {height}\nRTL_DESCEND_ALT 100\n"
+        (hill / f"rtl{height}.params").write_text(text, encoding="utf-8")
+    return hill
+
+
+def test_px4_returns_by_its_own_parameters(behind: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["returns", "behind.waypoints", "--scenario", "hill.toml", "--every", "20", "--suggest", "--params"]
+    answers = {}
+    for height, code in ((100, 4), (450, 0)):
+        assert main([*asked, f"rtl{height}.params", "--json", f"{height}.json"]) == code
+        out = capsys.readouterr().out
+        assert not any(name in out for name in ARDUPLANES)
+        assert "it returns: the pilot's RTL, RC lost (NAV_RCL_ACT 2)" in out
+        assert f"it first climbs in a circle to RTL_RETURN_ALT {height} m above that place" in out
+        assert "by the simulated PX4 flying a point-mass model" in out
+        assert "PX4's own return without the engine is not simulated" in out
+        assert ("would help: RTL_RETURN_ALT 4" in out) is (height == 100)
+        answers[height] = json.loads((behind / f"{height}.json").read_text(encoding="utf-8"))
+    low, high = answers[100], answers[450]
+    assert (low["ranges"][0]["kind"], high["ranges"][0]["kind"]) == ("ground", "safe")
+    assert (high["safe"], high["not_judged"], high["rtl_autoland"]) == (True, [], None)
+    assert {one["own"] for one in high["engine_out"]["ranges"]} == {"not flown"}
+    # 11 kg need at least 10.5 Wh to be lifted by 350 m.
+    energy_wh = {one: max(each["energy_wh"] for each in answer["ranges"]) for one, answer in answers.items()}
+    assert energy_wh[450] - energy_wh[100] > 10.0
+
+
+def test_returns_of_px4_along_the_mission_end_with_3(behind: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (behind / "along.params").write_text("RTL_TYPE 2\nRTL_RETURN_ALT 450\nNAV_ACC_RAD 30\n", encoding="utf-8")
+    asked = ["returns", "behind.waypoints", "--scenario", "hill.toml", "--every", "20", "--autopilot", "px4"]
+    assert main([*asked, "--params", "along.params", "--suggest"]) == 3
     out = capsys.readouterr().out
-    assert (
-        "not judged in full"
-        " (the autopilot's own return is not simulated; ArduPlane's return is used instead): all " in out
-    )
-    assert "the return of PX4 is not simulated; ArduPlane's return is used instead" in out
-    for words in ("FS_", "RTL_AUTOLAND", "it returns:", "it does not:"):
-        assert words not in out
-    answer = json.loads((hill / "px4.json").read_text(encoding="utf-8"))
-    assert (answer["exit_code"], answer["safe"], answer["causes"]) == (3, False, [])
-    assert (answer["rtl_autoland"], answer["not_judged"]) == (None, ["law"])
+    assert out.startswith("returns   not judged: RTL_TYPE 2 returns along the mission, which is not simulated")
+    assert not any(name in out for name in ARDUPLANES)
+
+
+def test_a_verdict_of_px4_agrees_with_itself_on_the_return(behind: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its return as an item of the mission, and the line of its returns from everywhere, are by the same law."""
+    (behind / "back.waypoints").write_text(mission_text(5000.0, 6500.0, amsl=200.0, back=True), encoding="utf-8")
+    asked = ["fly", "back.waypoints", "--scenario", "hill.toml", "--params", "rtl450.params"]
+    main(asked)
+    out = capsys.readouterr().out
+    assert "  return           1 of 1 ok" in out
+    assert "climbing 250 m first, to 450 m AMSL, and sinking 350 m in circles there, to 100 m AMSL" in out
+    assert "returns   all " in out
+    assert "not simulated" not in out.partition("returns   all ")[2]
+
+
+def test_arduplanes_program_does_not_fly_returns_of_px4(behind: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["returns", "behind.waypoints", "--scenario", "hill.toml", "--params", "rtl450.params"]
+    assert main([*asked, "--sitl", str(write_fake(behind))]) == 2
+    assert "ArduPlane's program does not fly the returns of PX4" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import planfly
-from flight.mission.items import MissionItem
+from flight.mission.items import Camera, MissionItem, SurveyPlan
 from flight.mission_files.formats import mission_text, read_mission
 from flight.simulation.setup import FlightSetup
 from logs.verdict.verdict import Verdict
@@ -130,7 +130,21 @@ def test_a_layout_for_a_plan_is_a_plan_with_all_that_it_holds(
     Path("field.plan").write_text(mission_text(whole, "plan"), encoding="utf-8")
     options = ["--aircraft", "x8", "--suggest", "--out", "better", "--camera", "23.5x15.6,16,75,60"]
     assert main(["survey", "field.plan", *options]) == 4
-    assert "next      planfly survey better/turn-around.plan with the same options" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "next      planfly survey better/turn-around.plan with the same options" in out
+    # Of a plan of plain items nothing is lost, so that nothing is said of it; a survey of a ground station is.
+    assert "  written better/turn-around.plan\n" in out
+    opened = surveying.open_flight
+
+    def with_survey_item(*how: Any) -> FlightSetup:
+        setup = opened(*how)
+        plans = (SurveyPlan(20.0, 0.0, Camera(1.0, 1.0)),)
+        return replace(setup, mission=replace(setup.mission, survey_plans=plans))
+
+    monkeypatch.setattr(surveying, "open_flight", with_survey_item)
+    assert main(["survey", "field.plan", *options, "--overwrite"]) == 4
+    note = "  written better/turn-around.plan (the survey as plain items, without its camera)\n"
+    assert note in capsys.readouterr().out
     written = read_mission(Path("better/turn-around.plan"))
     assert (len(written.items), len(written.fences), len(written.rally)) == (len(mission.items) - 1, 3, 1)
     assert written.autopilot == "px4"

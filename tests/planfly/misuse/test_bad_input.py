@@ -28,6 +28,7 @@ amsl_m = 320
 """
 
 HOME, LANDING = '[home]\nplace = "start"\n', "[landing]\neast_m = 4000\nnorth_m = 4000\n"
+LINK = "[link]\nfrequency_mhz = {}\npower_dbm = 20\nsensitivity_dbm = -100\n"
 ZONE = '[[zones]]\nname = "town"\nkind = "exclusion"\n{}\n'
 YARD = "polygon_m = [[2000, 2000], [3000, 2000], [3000, 3000]]\n"
 
@@ -81,6 +82,14 @@ SCENARIOS = {
     "a landing by a course that is none": SCENARIO + HOME + LANDING + 'course_deg = "downwind"\n',
     "home off the map": SCENARIO + "[home]\neast_m = 500\nnorth_m = -500\n",
     "a rally point in the ground": SCENARIO + "[returns]\nrally = [{ east_m = 900, north_m = 900, amsl_m = 90 }]\n",
+    "a link without its frequency": SCENARIO + "[link]\npower_dbm = 20\nsensitivity_dbm = -100\n",
+    "a link of light": SCENARIO + LINK.format(60_000),
+    "a link with half a position": SCENARIO + LINK.format(915) + "lat_deg = 46\n",
+    "a link with two positions": SCENARIO + LINK.format(915) + "lat_deg = 46\nlon_deg = 8\neast_m = 0\nnorth_m = 0\n",
+    "a link to a station off the terrain": SCENARIO + LINK.format(915) + "east_m = 90000\nnorth_m = 0\n",
+    "a link below the ground": SCENARIO + LINK.format(915) + "antenna_m = -2\n",
+    "a link of smoke": SCENARIO + LINK.format(915) + 'use = "smoke"\n',
+    "a link that may be lost for ever": SCENARIO + LINK.format(915) + "max_outage_s = inf\n",
     "a return below home": SCENARIO + "[returns]\nrtl_altitude_m = -20\n",
     "control character in a name": edited('name = "small"', 'name = "sm\\u0007all"'),
     "a zone that crosses itself": SCENARIO + ZONE.format("polygon_m = [[1, 1], [900, 900], [900, 1], [1, 900]]"),

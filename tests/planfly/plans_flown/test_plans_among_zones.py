@@ -67,6 +67,7 @@ def test_a_way_between_many_zones_of_many_corners() -> None:
     places = sampled(plan.waypoints)[:, :2]
     rings = [np.array(zone.polygon_m) for zone in scenario.spec.zones or ()]
     least = min(float(ring_distance(ring, places).min()) for ring in rings)
-    assert least >= plan.certificate.zone_distance - 0.01 >= 10.0 - 0.02
+    # A plan stays 10 m outside, which its margin does not include.
+    assert least - 10.0 >= plan.certificate.zone_distance - 0.01 >= -0.01
     straight = np.linspace(scenario.start[:2], scenario.destination[:2], 4000)
     assert min(float(ring_distance(ring, straight).min()) for ring in rings) < 0.0

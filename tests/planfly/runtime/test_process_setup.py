@@ -1,15 +1,21 @@
 """A process of planfly's own collects garbage seldom, and so do those that it starts; a script's own does not."""
 
 import os
+import re
 import resource
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import planfly
 from planfly.runtime import process_setup
 from planfly.runtime.process_setup import address_space_limit, prepare_process, watch_address_space, with_large_stack
+from tests.soak import some
 from world.address_space import AddressSpaceGuard
+
+ROOT = Path(planfly.__file__).parents[1]
 
 LIMIT = 480_000 * 1024
 
@@ -74,3 +80,29 @@ def test_the_limit_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:
     for given, found in (((LIMIT, resource.RLIM_INFINITY), LIMIT), ((resource.RLIM_INFINITY,) * 2, None)):
         monkeypatch.setattr(resource, "getrlimit", lambda _, given=given: given)
         assert address_space_limit() == found
+
+
+SCRIPTS = {
+    "campaign": "planfly.campaign('p.json', flights=1, workers=1)",
+    "paper": "planfly.paper_tables((7,), runs=2, jobs=2)",
+    "serve": "planfly.serve('p.json', bind='127.0.0.1:0')",
+}
+
+
+@pytest.mark.parametrize("name", some(SCRIPTS, 2))
+def test_a_script_without_its_guard_is_one_error_that_names_the_line(name: str, tmp_path: Path) -> None:
+    """Its processes import it, and end without a word instead of starting others."""
+    planfly.plan("tight", seed=1, out=tmp_path / "p.json")
+    (tmp_path / "mine.py").write_text(f"import planfly\n{SCRIPTS[name]}\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "mine.py"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.count("Traceback") == 1, done.stderr
+    line = done.stderr.splitlines()[-1]
+    assert re.match(r"world\.errors\.PlanflyError: .*mine\.py: .*`if __name__ == \"__main__\":`", line)

@@ -11,6 +11,7 @@ import pytest
 
 from flight.mission.items import Command, Mission
 from flight.mission.survey_layout import min_turn_around
+from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import corridor_line
 from logs.verdict.findings import Finding, make_finding
@@ -23,6 +24,7 @@ from planfly.surveys.survey_remedies import TriedRemedies
 from planfly.surveys.survey_text import near_miss_text, remedy_text
 from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.open_flight import open_flight
+from tests.mission_lines import mission, wp
 
 FIELD = Path(__file__).parents[1] / "commands" / "field.waypoints"
 # Whether lines can be used, and what else fails with what margin, of a flight with these turn-arounds, m.
@@ -258,3 +260,36 @@ def test_the_surveys_of_a_setup_are_searched_once(monkeypatch: pytest.MonkeyPatc
     assert len(searches) == 1
     assert judged_surveys(opened(FIELD)) == found
     assert len(searches) == 2
+
+
+def test_gates_at_the_ends_of_lines_that_lose_their_photos_to_the_acceptance_radius(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Three lines of 1 km with leads of 300 m: PX4 flies past gates, and ArduPlane knows none."""
+    lines = []
+    for k in range(3):
+        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
+        points = [wp(100.0 * k, value, 100.0) for value in north]
+        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
+    file = tmp_path / "gated.waypoints"
+    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+    flown: list[Mission] = []
+
+    def fly(setup: FlightSetup, *_: Any) -> Any:
+        flown.append(setup.mission)
+        gates = [item.seq for item in setup.mission.items if item.command == Command.CONDITION_GATE]
+        return SimpleNamespace(setup=setup, flight_verdict=verdict_of(setup, lambda _: (len(gates) == 6, {})))
+
+    monkeypatch.setattr(remedies, "Trial", fly)
+    for autopilot, kinds in (("px4", ["gates"]), ("ardupilot", [])):
+        setup = open_flight(file, {"aircraft": "x8", "autopilot": autopilot})
+        verdict = verdict_of(setup, lambda _: (False, {}))
+        found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict)
+        assert [one.kind for one in found.remedies] == kinds
+    setup = open_flight(file, {"aircraft": "x8", "autopilot": "px4"})
+    found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict_of(setup, lambda _: (False, {})))
+    [gated] = found.remedies
+    assert [item.seq for item in gated.mission.items if item.command == Command.CONDITION_GATE] == [
+        *(2, 4, 8, 10, 14, 16)
+    ]
+    assert remedy_text(gated, 5000.0).startswith("gates (CONDITION_GATE, a setting of QGroundControl) instead of ")

@@ -7,7 +7,7 @@ import pytest
 
 from logs.recording.reader import read_log
 from logs.verdict.conditions import judging_conditions
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Change, Place
 from logs.verdict.verdict import Verdict
 from planfly.cli import main
@@ -110,6 +110,26 @@ def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.C
         "          also at leg 7 (16°); leg 6 (15°); leg 5 (14°); leg 4 (13°); leg 3 (12°); leg 2 (11°); 2 more"
     )
     assert not any(line.startswith("  failed") for line in lines[2:])
+
+
+def test_a_failure_by_other_evidence_than_its_number_states_its_reason_instead(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A level leg fails by the arc at its end: 0 degrees alone would be no reason."""
+    arc = message("the arc at waypoint 1", " descends 9.9°")
+    level = make_finding(
+        "slope",
+        Place("leg", 0),
+        ok=False,
+        reason=arc.text,
+        faults=[arc],
+        planned=0.0,
+        limit=5.0,
+        margin=5.0,
+        unit="deg",
+    )
+    lines = printed(capsys, Verdict((slope(2, 9.0, 8.0), level), False, True, ("not flyable",), "flown"))
+    assert "          also at leg 0 (the arc at waypoint 1)" in lines
 
 
 def test_warnings_do_not_mix_with_results(capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,7 +20,7 @@ from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, slow
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow.data_sheets import factor_effect, make_data_sheet_folder, stated_parameters, with_parameters
 from tests.setups import setup_maker
-from world.errors import FlightError
+from world.errors import FlightError, ParameterError
 
 FOAM = DataSheet(mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
 FILES = {
@@ -141,11 +141,18 @@ def test_a_battery_that_nobody_stated_is_a_guess(tmp_path: Path, energy: float) 
     assert load_envelope(made).battery_guessed is (energy == 0.0)
 
 
+@pytest.mark.parametrize("bank_deg", [0.0, 40.0])
+def test_a_bank_limit_that_nobody_stated_is_a_guess(tmp_path: Path, bank_deg: float) -> None:
+    made = make_data_sheet_folder(tmp_path / "foam", replace(FOAM, bank=math.radians(bank_deg)))
+    assert load_envelope(made).bank_guessed is (bank_deg == 0.0)
+    assert math.degrees(made.max_bank) == pytest.approx(bank_deg or 35.0)
+
+
 def test_parameters_are_data(tmp_path: Path) -> None:
     file = tmp_path / "mine.parm"
     # TRIM_THROTTLE 45 is ArduPlane's own value and says nothing.
     file.write_text("AIRSPEED_CRUISE 16\nARSPD_FBW_MIN 12\nTECS_CLMB_MAX 4\nTRIM_THROTTLE 45\nLIM_ROLL_CD 3000\n")
-    stated = stated_parameters(file)
+    stated = stated_parameters(file).values
     assert stated == {"AIRSPEED_CRUISE": 16.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 4.0, "ROLL_LIMIT_DEG": 30.0}
     made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
     assert (made.airspeed, made.stall_speed) == (16.0, 10.0)
@@ -160,11 +167,55 @@ def test_parameters_are_data(tmp_path: Path) -> None:
     assert "TECS_CLMB_MAX 4\n" in (made.folder / "ardupilot.parm").read_text()
 
 
+def test_parameters_of_px4_are_the_same_data_by_its_own_names(tmp_path: Path) -> None:
+    """FW_AIRSPD_TRIM 15 and FW_R_LIM 50 are PX4's own values and say nothing; its stall speed is stated as such."""
+    file = tmp_path / "mine.params"
+    lines = ("FW_AIRSPD_TRIM 16", "FW_AIRSPD_MIN 13", "FW_AIRSPD_STALL 10", "FW_T_CLMB_MAX 4", "FW_R_LIM 40")
+    file.write_text("".join(f"1\t1\t{line.replace(' ', chr(9))}\t9\n" for line in lines), encoding="ascii")
+    stated = stated_parameters(file)
+    assert stated.values == {
+        "AIRSPEED_CRUISE": 16.0,
+        "AIRSPEED_MIN": 13.0,
+        "AIRSPEED_STALL": 10.0,
+        "TECS_CLMB_MAX": 4.0,
+        "ROLL_LIMIT_DEG": 40.0,
+    }
+    assert set(stated.texts.values()) == set(lines)
+    made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
+    assert (made.airspeed, made.stall_speed) == (16.0, 10.0)
+    assert math.degrees(made.max_bank) == pytest.approx(40.0)
+    assert "From the parameter file: FW_AIRSPD_TRIM 16, " in (made.folder / "README.md").read_text()
+    file.write_text("1\t1\tFW_AIRSPD_TRIM\t15\t9\n1\t1\tFW_R_LIM\t50\t9\n", encoding="ascii")
+    assert stated_parameters(file).values == {}
+
+
+def test_a_parameter_file_of_no_aeroplane_is_refused(tmp_path: Path) -> None:
+    for text in ("MPC_XY_CRUISE 5\nMC_ROLL_P 6\n", "FOO 1\nBAR 2\n"):
+        file = tmp_path / "other.params"
+        file.write_text(text, encoding="ascii")
+        with pytest.raises(ParameterError, match=r"^[^\n]+$"):
+            stated_parameters(file)
+
+
+def test_what_the_sheet_states_applies_instead_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.parm"
+    file.write_text("AIRSPEED_CRUISE 19\nROLL_LIMIT_DEG 50\nAIRSPEED_MIN 13\n", encoding="ascii")
+    made = make_data_sheet_folder(tmp_path / "mine", replace(FOAM, cruise=18.0, stall=10.0), file)
+    readme, parameters = (made.folder / "README.md").read_text(), (made.folder / "ardupilot.parm").read_text()
+    assert made.airspeed == 18.0
+    assert "AIRSPEED_CRUISE 18\n" in parameters
+    # The autopilot's own minimum stays, above the stall that the sheet states.
+    assert "AIRSPEED_MIN 13\n" in parameters
+    assert "From the parameter file: ROLL_LIMIT_DEG 50.\n" in readme
+    told = "because the data sheet states it: AIRSPEED_CRUISE 19 (cruise 18 m/s), AIRSPEED_MIN 13 (stall 10 m/s).\n"
+    assert told in readme
+
+
 def test_the_climb_of_a_parameter_file_is_that_at_its_throttle_limit(tmp_path: Path) -> None:
     """ArduPlane's reference: TECS_CLMB_MAX is the best climb rate with the throttle at THR_MAX, at cruise speed."""
     file = tmp_path / "mine.parm"
     file.write_text("AIRSPEED_CRUISE 16\nAIRSPEED_MIN 12\nTECS_CLMB_MAX 3\nTHR_MAX 75\n")
-    assert stated_parameters(file)["THR_MAX"] == 75.0
+    assert stated_parameters(file).values["THR_MAX"] == 75.0
     made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
     fdm = Fdm(made, is_tested=True)
     # 3 m/s at 16 m/s take three quarters of the throttle.

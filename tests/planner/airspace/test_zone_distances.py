@@ -120,6 +120,10 @@ DEPTHS.setflags(write=False)
 ZoneMargin = Callable[..., np.void]
 
 
+def satisfied(found: np.void) -> bool:
+    return bool(found["excess"] >= 0.0)
+
+
 @pytest.fixture
 def zone_margin() -> ZoneMargin:
     def made(
@@ -135,39 +139,37 @@ def zone_margin() -> ZoneMargin:
     return made
 
 
-@pytest.mark.parametrize(("off", "satisfied"), [(10.1, True), (9.9, False), (-30.0, False)])
-def test_beside_an_exclusion_and_into_it(zone_margin: ZoneMargin, off: float, satisfied: bool) -> None:
+@pytest.mark.parametrize(("off", "ok"), [(10.1, True), (9.9, False), (-30.0, False)])
+def test_beside_an_exclusion_and_into_it(zone_margin: ZoneMargin, off: float, ok: bool) -> None:
     for shape in (Cylinder(400.0, 400.0, 400.0), SQUARE):
         found = zone_margin([Zone("it", "exclusion", shape)], [-900.0, 800.0 + off, 90.0], [1700.0, 800.0 + off, 90.0])
-        assert bool(found["satisfied"]) == satisfied
+        assert satisfied(found) == ok
         assert float(found["nearest"]) == pytest.approx(off, abs=1e-6)
 
 
-@pytest.mark.parametrize(("off", "satisfied"), [(10.1, True), (9.9, False), (-30.0, False)])
-def test_inside_an_inclusion_and_out_of_it(zone_margin: ZoneMargin, off: float, satisfied: bool) -> None:
+@pytest.mark.parametrize(("off", "ok"), [(10.1, True), (9.9, False), (-30.0, False)])
+def test_inside_an_inclusion_and_out_of_it(zone_margin: ZoneMargin, off: float, ok: bool) -> None:
     for shape in (Cylinder(400.0, 400.0, 400.0), SQUARE):
         found = zone_margin([Zone("it", "inclusion", shape)], [400.0, 400.0, 90.0], [400.0, 800.0 - off, 90.0])
-        assert bool(found["satisfied"]) == satisfied
+        assert satisfied(found) == ok
         assert float(found["nearest"]) == pytest.approx(off, abs=1e-6)
 
 
-@pytest.mark.parametrize(("up", "satisfied"), [(94.9, True), (95.1, False)])
-def test_below_a_floor(zone_margin: ZoneMargin, up: float, satisfied: bool) -> None:
+@pytest.mark.parametrize(("up", "ok"), [(94.9, True), (95.1, False)])
+def test_below_a_floor(zone_margin: ZoneMargin, up: float, ok: bool) -> None:
     zone = Zone("it", "exclusion", SQUARE, floor=ZoneLevel(100.0, "amsl"))
     found = zone_margin([zone], [-900.0, 400.0, up], [1700.0, 400.0, up])
-    assert bool(found["satisfied"]) == satisfied
+    assert satisfied(found) == ok
     assert float(found["nearest"]) == pytest.approx(100.0 - up)
-    assert (
-        bool(zone_margin([zone], [-900.0, 400.0, up - 7.0], [1700.0, 400.0, up - 7.0], above=7.0)["satisfied"])
-        == satisfied
-    )
+    higher = zone_margin([zone], [-900.0, 400.0, up - 7.0], [1700.0, 400.0, up - 7.0], above=7.0)
+    assert satisfied(higher) == ok
 
 
 def test_a_climb_that_is_above_a_ceiling_where_it_comes_to_the_zone(zone_margin: ZoneMargin) -> None:
     """20 m above it there, and below it before: heights and places belong together."""
     zone = Zone("it", "exclusion", SQUARE, ceiling=ZoneLevel(100.0, "amsl"))
     found = zone_margin([zone], [-1000.0, 400.0, 20.0], [1000.0, 400.0, 220.0])
-    assert bool(found["satisfied"])
+    assert satisfied(found)
     # Where it is 0.1 m above for each m that it is nearer, the distance on the map decides until the edge.
     assert 10.0 < float(found["nearest"]) <= 20.0
 
@@ -176,18 +178,18 @@ def test_a_floor_above_the_slope_is_exact(zone_margin: ZoneMargin) -> None:
     zone = Zone("it", "exclusion", SQUARE, floor=ZoneLevel(100.0, "ground"))
     # Along the slope, 94 m above it.
     found = zone_margin([zone], [-1000.0, 400.0, -6.0], [1000.0, 400.0, 194.0])
-    assert bool(found["satisfied"])
+    assert satisfied(found)
     assert float(found["nearest"]) == pytest.approx(6.0, abs=1e-3)
     # A flight 20 m beside a northbound leg is 2 m higher over lower ground.
-    assert bool(zone_margin([zone], [400.0, 200.0, 134.0], [400.0, 600.0, 134.0])["satisfied"])
-    assert not bool(zone_margin([zone], [400.0, 200.0, 134.0], [400.0, 600.0, 134.0], (20.0, 20.0))["satisfied"])
+    assert satisfied(zone_margin([zone], [400.0, 200.0, 134.0], [400.0, 600.0, 134.0]))
+    assert not satisfied(zone_margin([zone], [400.0, 200.0, 134.0], [400.0, 600.0, 134.0], (20.0, 20.0)))
 
 
 def test_what_a_flight_may_be_beside_grows_along_a_piece(zone_margin: ZoneMargin) -> None:
     zone = Zone("it", "exclusion", Cylinder(0.0, 40.0, 20.0))
     near, far = ([-100.0, 0.0, 90.0], [900.0, 0.0, 90.0]), (0.0, 20.0)
-    assert bool(zone_margin([zone], *near, far)["satisfied"])
-    assert not bool(zone_margin([zone], *near, (20.0, 20.0))["satisfied"])
+    assert satisfied(zone_margin([zone], *near, far))
+    assert not satisfied(zone_margin([zone], *near, (20.0, 20.0)))
 
 
 def test_nearest_zone_and_the_one_that_is_too_near(zone_margin: ZoneMargin) -> None:
@@ -195,11 +197,13 @@ def test_nearest_zone_and_the_one_that_is_too_near(zone_margin: ZoneMargin) -> N
     tower = Zone("tower", "exclusion", Cylinder(0.0, 30.0, 14.0), floor=ZoneLevel(111.0, "amsl"))
     path = [-1000.0, 0.0, 105.0], [1000.0, 0.0, 105.0]
     found = zone_margin([tower, fence], *path)
-    # 12 m within the fence and 6 m below its top; 16 m beside the tower and 6 m below it.
-    assert (bool(found["satisfied"]), float(found["nearest"])) == (True, pytest.approx(6.0))
+    # 12 m within the fence and 6 m below its top; 16 m beside the tower and 6 m below it.  5 m below are required.
+    assert (float(found["excess"]), float(found["nearest"])) == (pytest.approx(1.0), pytest.approx(6.0))
     close = Zone("close", "exclusion", Cylinder(500.0, 30.0, 21.0))
     found = zone_margin([tower, fence, close], *path)
-    assert (bool(found["satisfied"]), int(found["zone"]), float(found["nearest"])) == (False, 2, pytest.approx(6.0))
+    # 9 m beside the third, of 10 m.
+    assert (float(found["excess"]), float(found["nearest"])) == (pytest.approx(-1.0), pytest.approx(6.0))
+    assert int(found["zone"]) == 2
 
 
 def test_random_polygons_against_fine_samples(zone_margin: ZoneMargin) -> None:
@@ -216,4 +220,4 @@ def test_random_polygons_against_fine_samples(zone_margin: ZoneMargin) -> None:
             assert float(found["nearest"]) == pytest.approx(away, abs=0.5)
         else:
             assert float(found["nearest"]) <= 0.5
-        assert bool(found["satisfied"]) == (away >= 10.0) or abs(away - 10.0) < 0.5
+        assert satisfied(found) == (away >= 10.0) or abs(away - 10.0) < 0.5

@@ -53,10 +53,10 @@ def certificate(problem: Problem, path: np.ndarray) -> Certificate:
 def test_a_zone_beside_the_way(made: Made, more: float, ok: bool) -> None:
     result = certificate(made(zones=tower(CERTIFIED_ZONE_MARGIN_M + more)), STRAIGHT)
     assert result.ok == ok
-    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN_M + more, abs=1e-6)
+    assert result.zone_distance == pytest.approx(more, abs=1e-6)
     result = certificate(made({"across": 12.0}, zones=tower(CERTIFIED_ZONE_MARGIN_M + 12.0 + more)), STRAIGHT)
     assert result.ok == ok
-    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN_M + more, abs=1e-6)
+    assert result.zone_distance == pytest.approx(more, abs=1e-6)
 
 
 def test_what_fails_names_the_zone_and_the_leg(made: Made) -> None:
@@ -88,14 +88,14 @@ def test_a_zone_inside_a_turn_is_what_the_arc_comes_near(made: Made) -> None:
     result = certificate(problem, TURNED)
     assert result.problems[0].startswith("turn at waypoint 1")
     legs = [piece for piece in airspace_pieces(problem.certified, TURNED) if not piece["of_corner"]]
-    assert all(piece["zones"]["satisfied"] for piece in legs)
+    assert all(piece["zones"]["excess"] >= 0.0 for piece in legs)
 
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
 def test_a_floor_over_the_way(made: Made, more: float, ok: bool) -> None:
     result = certificate(made(zones=tower(-200.0, floor_amsl_m=150.0 + CERTIFIED_BUFFER_M + more)), STRAIGHT)
     assert result.ok == ok
-    assert result.zone_distance == pytest.approx(CERTIFIED_BUFFER_M + more)
+    assert result.zone_distance == pytest.approx(more)
 
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
@@ -104,16 +104,16 @@ def test_a_greatest_height(made: Made, more: float, ok: bool) -> None:
     limits = {"max_height_m": 180.0 + CERTIFIED_BUFFER_M + more, "min_clearance_m": 30}
     result = certificate(made(limits=limits), path)
     assert result.ok == ok
-    assert result.headroom == pytest.approx(CERTIFIED_BUFFER_M + more, abs=1e-3)
+    assert result.headroom == pytest.approx(more, abs=1e-3)
     assert ok or "m above ground at its highest" in result.problems[0]
 
 
 def test_a_flight_that_follows_late_is_high_on_the_way_down(made: Made) -> None:
-    """3 s late at 25 m/s down a slope of 1 in 50 is 1.5 m high."""
+    """3 s late at 25 m/s down a slope of 1 in 50 is 1.5 m high; at the top, 210 m, 300 m less 5 m are allowed."""
     path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 210.0], [6000.0, 0.0, 150.0]])
     limits = {"max_height_m": 300.0, "min_clearance_m": 30}
     problem = made({"lag": 3.0}, limits=limits)
-    assert certificate(problem, path).headroom == pytest.approx(90.0, abs=0.2)
+    assert certificate(problem, path).headroom == pytest.approx(85.0, abs=0.2)
     pieces = airspace_pieces(problem.certified, path)
     last = [piece for piece in pieces if piece["number"] == 1 and not piece["of_corner"]][-2]
     # It ends 100 m before the destination, where the leg is at 152 m.
@@ -122,14 +122,17 @@ def test_a_flight_that_follows_late_is_high_on_the_way_down(made: Made) -> None:
 
 
 def test_the_ground_beside_the_way_is_what_a_flight_is_high_over(made: Made) -> None:
-    """Midway the ground is 140 exp(-2.5^2 / 4.5) = 34.9 m high, 50 m south of it 140 exp(-2.55^2 / 4.5) = 33.0."""
+    """Midway the ground is 140 exp(-2.5^2 / 4.5) = 34.9 m high, 50 m south of it 140 exp(-2.55^2 / 4.5) = 33.0.
+
+    A plan keeps 5 m below the greatest height.
+    """
     hill = {"kind": "peaks", "peak": [{"east_m": 3000, "north_m": 2500, "height_m": 140, "sigma_m": 1500}]}
     limits = {"max_height_m": 400.0, "min_clearance_m": 1}
     tables = {"terrain": hill, "limits": limits}
     exact, wide = made(**tables), made({"across": 50.0}, **tables)
     path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 250.0], [6000.0, 0.0, 150.0]])
-    assert certificate(exact, path).headroom == pytest.approx(400.0 - 250.0 + 34.9, abs=0.1)
-    assert certificate(wide, path).headroom == pytest.approx(400.0 - 250.0 + 33.0, abs=0.1)
+    assert certificate(exact, path).headroom == pytest.approx(400.0 - 5.0 - 250.0 + 34.9, abs=0.1)
+    assert certificate(wide, path).headroom == pytest.approx(400.0 - 5.0 - 250.0 + 33.0, abs=0.1)
 
 
 def test_without_zones_and_greatest_height_there_is_nothing_to_tell(made: Made) -> None:

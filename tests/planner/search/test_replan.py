@@ -22,9 +22,14 @@ def old(scenario: Scenario, limits: Limits) -> Plan:
     return plan_path(scenario, limits, seed=1)
 
 
-def in_the_way(plan: Plan, leg: int) -> tuple[float, float, float, float]:
+def in_the_way(plan: Plan, leg: int) -> dict[str, float]:
     middle = 0.5 * (plan.waypoints[leg] + plan.waypoints[leg + 1])
-    return float(middle[0]), float(middle[1]), 400.0, 700.0
+    return {
+        "east_m": float(middle[0]),
+        "north_m": float(middle[1]),
+        "kill_radius_m": 400.0,
+        "detection_radius_m": 700.0,
+    }
 
 
 def test_pop_up_threat_is_avoided_and_what_is_flown_stays(old: Plan, limits: Limits) -> None:
@@ -57,7 +62,8 @@ def test_turn_counts_from_the_present_course(
 
 def test_a_leg_that_begins_in_reach_is_refused_by_its_own_name(old: Plan, limits: Limits) -> None:
     east, north = old.waypoints[3, :2]
-    now = with_threats(old.scenario, [(float(east), float(north), 2000.0, 2500.0)], "test")
+    threat = {"east_m": float(east), "north_m": float(north), "kill_radius_m": 2000.0, "detection_radius_m": 2500.0}
+    now = with_threats(old.scenario, [threat], "test")
     with pytest.raises(MissionError, match=r"leg 3: its first waypoint, 3, is \d+ m inside .* pop-up 1") as caught:
         replan(now, limits, old, 3, seed=1)
     assert "\n" not in str(caught.value)
@@ -78,7 +84,7 @@ def test_legs_that_are_not_there_and_other_missions_are_refused(
     with pytest.raises(MissionError, match="destination: 1000 m"):
         replan(other, limits, old, 1, seed=1)
     with pytest.raises(ScenarioError, match="kill_radius_m: -5"):
-        with_threats(old.scenario, [(0.0, 0.0, -5.0, 0.0)], "--add-threat")
+        with_threats(old.scenario, [{"east_m": 0.0, "north_m": 0.0, "kill_radius_m": -5.0}], "--add-threat")
 
 
 def test_longest_legs_are_split() -> None:

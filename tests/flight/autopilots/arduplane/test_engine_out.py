@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.rtl_point_mass import (
-    RETURN_ARRIVED,
-    RETURN_GROUND_IMPACT,
-    SimulatedReturns,
-    fly_returns,
-)
+from flight.autopilots.arduplane.rtl_point_mass import fly_returns
+from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SimulatedReturns
 from flight.mission.return_path import LandingStart, ReturnCircle
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde, around, flat, parameters, start

@@ -2,7 +2,7 @@
 
 import pytest
 
-from flight.autopilots.arduplane.failsafes import failsafe_causes
+from flight.autopilots.arduplane.failsafes import failsafe_causes, link_loss_reactions
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
 # A battery that is watched, with both thresholds.
@@ -103,3 +103,46 @@ def test_a_mission_that_ends_on_the_ground_does_not_return() -> None:
 def test_a_lost_station() -> None:
     assert does("station lost", FS_LONG_ACTN=1.0) == "on"
     assert does("station lost", FS_GCS_ENABL=1.0, FS_LONG_ACTN=1.0) == "return"
+
+
+@pytest.mark.parametrize(
+    ("values", "reactions"),
+    [
+        ({}, []),
+        ({"FS_LONG_ACTN": 1.0}, []),
+        ({"FS_GCS_ENABL": 1.0}, []),
+        ({"FS_GCS_ENABL": 1.0, "FS_LONG_ACTN": 1.0}, [("return", 5.0)]),
+        ({"FS_GCS_ENABL": 3.0, "FS_LONG_ACTN": 2.0, "FS_LONG_TIMEOUT": 20.0}, [("glide", 20.0)]),
+    ],
+)
+def test_the_time_until_a_lost_station_is_noticed(values: dict[str, float], reactions: list[tuple[str, float]]) -> None:
+    """`Plane::check_long_failsafe`: FS_LONG_TIMEOUT after the last heartbeat."""
+    found = link_loss_reactions(ArduPilotParameters.defaults().changed(**values), "telemetry")
+    leaving = [(reaction.action, reaction.delay) for reaction in found if reaction.action != "on"]
+    assert (leaving, len(found)) == (reactions, max(1, len(reactions)))
+
+
+@pytest.mark.parametrize(
+    ("values", "reactions"),
+    [
+        ({}, []),
+        # The long failsafe counts from the short one, which changes nothing in AUTO.
+        ({"FS_LONG_ACTN": 1.0}, [("return", 6.5)]),
+        # There is no short failsafe.
+        ({"FS_SHORT_ACTN": 3.0, "FS_LONG_ACTN": 1.0}, [("return", 5.0)]),
+        ({"FS_SHORT_ACTN": 2.0, "FS_LONG_TIMEOUT": 30.0}, [("glide", 1.5), ("return", 31.5)]),
+        ({"FS_SHORT_ACTN": 1.0, "FS_SHORT_TIMEOUT": 4.0, "FS_LONG_ACTN": 4.0}, [("circle", 4.0)]),
+        ({"FS_SHORT_ACTN": 1.0, "FS_LONG_ACTN": 1.0, "THR_FAILSAFE": 0.0}, []),
+        ({"FS_SHORT_ACTN": 1.0, "FS_LONG_ACTN": 1.0, "THR_FAILSAFE": 2.0}, []),
+    ],
+)
+def test_the_time_until_a_lost_transmitter_is_noticed(
+    values: dict[str, float], reactions: list[tuple[str, float]]
+) -> None:
+    found = link_loss_reactions(ArduPilotParameters.defaults().changed(**values), "control")
+    leaving = [(reaction.action, reaction.delay) for reaction in found if reaction.action != "on"]
+    assert (leaving, len(found)) == (reactions, max(1, len(reactions)))
+
+
+def test_the_name_of_the_short_failsafe_states_its_timeout() -> None:
+    assert does("RC lost for 4 s", FS_SHORT_ACTN=1.0, FS_SHORT_TIMEOUT=4.0) == "circle"

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.go_around_point_mass import fly_go_arounds, make_abort_start
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_START
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT, RETURN_START
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
 from logs.verdict.returns.judge_returns import make_return_world
@@ -111,7 +112,9 @@ def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Re
     places = landing_sequence(setup.mission, setup.scenario.origin, setup.scenario.terrain, 6)
     landing = places[0]._replace(next_stops=places[1:])
     top = world.home.up + height
-    found = fly_go_arounds(start, top, pitch, [landing], world.parameters, world.aircraft, world.environment)
+    parameters = world.autopilot.parameters
+    assert isinstance(parameters, ArduPilotParameters)
+    found = fly_go_arounds(start, top, pitch, [landing], parameters, world.aircraft, world.environment)
     return found.results[0], found.tracks[0]
 
 

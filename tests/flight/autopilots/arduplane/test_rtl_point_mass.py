@@ -8,8 +8,9 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass, make_point_mass
-from flight.autopilots.arduplane.rtl_point_mass import (
+from flight.autopilots.arduplane.rtl_point_mass import fly_returns
+from flight.autopilots.point_mass import PointMass, make_point_mass
+from flight.autopilots.simulated_returns import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
     RETURN_OFF_TERRAIN,
@@ -17,7 +18,6 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_TIMEOUT,
     ReturnEnvironment,
     SimulatedReturns,
-    fly_returns,
     make_return_environment,
 )
 from flight.mission.return_path import ReturnCircle, ReturnPoint, choose_target

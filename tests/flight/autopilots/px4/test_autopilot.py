@@ -104,19 +104,21 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
 @pytest.mark.parametrize(
     ("kind", "name", "up"),
     [
-        # Home is 1 km away at 300 m, the rally point 3 km at 450 m; RTL_RETURN_ALT is over either.
-        ("", "rally point 1", 570.0),
-        ("RTL_TYPE 0", "home", 420.0),
-        ("RTL_TYPE 1", "rally point 1", 570.0),
-        ("RTL_TYPE 5", "rally point 1", 570.0),
-        ("RTL_TYPE 3", "home", 420.0),
+        # Home is 1 km away at 300 m, the rally point 3 km at 450 m; RTL_RETURN_ALT 120 is over either.
+        ("", "rally point 1", 450.0),
+        ("RTL_TYPE 0", "home", 300.0),
+        ("RTL_TYPE 1", "rally point 1", 450.0),
+        ("RTL_TYPE 5", "rally point 1", 450.0),
+        ("RTL_TYPE 3", "home", 300.0),
     ],
 )
 def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> None:
     rules = Px4(Px4Parameters.of_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).returns.rules
     home, rally = ReturnPoint(0.0, 0.0, 300.0), ReturnPoint(0.0, 4000.0, 450.0)
-    target = choose_target(rules, (0.0, 1000.0, 800.0), home, [rally])
-    assert (target.name, target.position[2]) == (name, up)
+    # It begins lower, and climbs first; it begins higher, and stays there until it descends to RTL_DESCEND_ALT 100.
+    low, high = (choose_target(rules, (0.0, 1000.0, begin), home, [rally]) for begin in (350.0, 800.0))
+    assert (low.name, low.transit_altitude, low.position[2]) == (name, up + 120.0, up + 100.0)
+    assert (high.name, high.transit_altitude, high.position[2]) == (name, 800.0, up + 100.0)
     assert choose_target(rules, (0.0, 1000.0, 800.0), home, []).name == "home"
     assert bool(rules.deviation_note) is (kind == "RTL_TYPE 3")
 

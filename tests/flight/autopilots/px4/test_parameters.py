@@ -52,7 +52,7 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
     file.write_text(QGC, encoding="utf-8")
     made = Px4Parameters.load(aerosonde, file, "1.16")
     assert made.by_origin("file") == {"FW_R_LIM": 30.0, "NAV_ACC_RAD": 25.0}
-    assert (made.unused, made.source, made.version) == (("BAT1_N_CELLS",), str(file), "1.16")
+    assert (made.unused, made.source, made.version) == (("BAT1_N_CELLS", "FW_T_F_ALT_ERR"), str(file), "1.16")
     assert made.by_origin("default")["NPFG_PERIOD"] == 10.0
     # What the aircraft's folder states for ArduPlane: 25 m/s, 77 and 55 % of throttle, 5.6 and 3.3 m/s.
     assert made.by_origin("aircraft") == {
@@ -74,6 +74,8 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
 def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
     made = Px4Parameters.of_text("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
     assert set(made.by_origin("file")) == {"RTL_LAND_DELAY"}
+    # Each name of the file is used or named as not used.
+    assert made.unused == ("FW_T_F_ALT_ERR",)
     assert {"FW_T_F_ALT_ERR", "RTL_LAND_DELAY"} <= set(NOT_SIMULATED)
     assert NOT_SIMULATED[0] == "FW_USE_AIRSPD"
 

@@ -1,5 +1,7 @@
 """Each leg gets the rows of its own passage."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from logs.verdict.measures.route_requirements import route_requirements
@@ -22,3 +24,15 @@ def test_routes_that_come_back_are_laid_leg_by_leg() -> None:
     assert flown is not None
     assert (np.diff(flown.rows) > 800).all()
     assert flown.apex_distance.max() < 3.0
+
+
+def test_a_short_leg_within_a_turn_has_the_segment_at_which_both_of_its_waypoints_are_passed() -> None:
+    setup = make_setup([[0, 0, 300], [0, 1500, 300], [0, 3000, 300], [0, 4500, 300]])
+    flown = align_track(route_requirements(setup), fly_path(setup, rate=20.0))
+    assert flown is not None
+    last = len(flown.track) - 1
+    at = replace(flown, rows=np.array([5, 400, 400, last - 3]))
+    assert [at.leg_segments(leg) for leg in range(3)] == [(0, 400), (400, 401), (400, last)]
+    # A flight that ended on leg 1 never passed its end.
+    ended = replace(at, rows=np.array([0, 400, last, last]), passed=np.array([True, True, False, False]))
+    assert [ended.leg_segments(leg) for leg in range(3)] == [(0, 400), (400, last), (0, 0)]

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from flight.autopilots.arduplane.point_mass import POINT_MASS, PointMass
+from flight.autopilots.point_mass import POINT_MASS, PointMass
 from logs.verdict.returns.glide_map import GlideMap, glide_map
 from world.kernels import Record
 from world.terrain import Terrain, make_gridded_terrain

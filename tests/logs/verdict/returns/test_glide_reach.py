@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_START, ReturnEnvironment
+from flight.autopilots.simulated_returns import RETURN_START, ReturnEnvironment
 from logs.verdict.returns.glide_map import glide_map, glide_slopes, search_glide_altitudes
 from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND, jacksboro

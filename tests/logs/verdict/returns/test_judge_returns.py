@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Command, Frame, MissionItem
@@ -22,6 +23,7 @@ from logs.verdict.returns.judge_returns import (
     judge_returns,
     limit_ratio,
     make_return_world,
+    without_engine_world,
     worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
@@ -61,7 +63,10 @@ def test_ranges_are_in_order_and_hold_every_return(tmp_path: Path) -> None:
     kinds = [KINDS.index(one.worst.kind) for one in found.ranges]
     assert kinds == sorted(kinds)
     assert [one.worst.kind for one in found.ranges][:2] == ["ground", "low"]
+    setup = hill_setup(tmp_path)
+    words = {"ground": "unsafe", "low": "too low", "safe": "safe"}
     for one in found.ranges:
+        assert f" s, {words[one.worst.kind]}: to home: " in range_text(one, found, setup.scenario)
         inside = [each for each in found.each if one.first <= each.time <= one.last]
         assert len(inside) == one.count
         assert {each.kind for each in inside} == {one.worst.kind}
@@ -343,11 +348,15 @@ def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
 
 
 def test_glides_and_returns_with_px4_have_the_airspeeds_of_its_file(tmp_path: Path) -> None:
-    """PX4's return is ArduPlane's, at the user's own least and cruise airspeed; other values are the aircraft's."""
+    """A glide is flown at the user's own least airspeed; other values are the aircraft's."""
     setup = hill_setup(tmp_path)
     own = Px4(Px4Parameters.of_text("FW_AIRSPD_MIN 19.5\nFW_AIRSPD_TRIM 24\nFW_AIRSPD_MAX 30\n", "a.params"))
-    of_file = make_return_world(replace(setup, autopilot=own)).parameters
-    of_aircraft = make_return_world(replace(setup, autopilot=Px4(Px4Parameters.defaults()))).parameters
+    world = make_return_world(replace(setup, autopilot=own))
+    assert (world.autopilot, world.min_airspeed, world.min_airspeed_name) == (own, 19.5, "FW_AIRSPD_MIN")
+    # ArduPlane stands in without an engine.
+    of_file = without_engine_world(world).autopilot.parameters
+    of_aircraft = without_engine_world(make_return_world(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
+    assert isinstance(of_file, ArduPilotParameters)
     assert [of_file[name] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")] == [19.5, 24.0, 30.0]
-    assert of_aircraft["AIRSPEED_MIN"] == 18.0
-    assert of_file["ROLL_LIMIT_DEG"] == of_aircraft["ROLL_LIMIT_DEG"]
+    assert of_aircraft.min_airspeed == 18.0
+    assert of_file.roll_limit == of_aircraft.autopilot.turns.max_bank

@@ -213,6 +213,14 @@ def test_what_is_not_judged_is_neither_kept_nor_failed_where_it_is_required(tmp_
         setup = hill_setup(folder, f'[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "ardupilot"\n{law}', WAY)
         (one,) = [each for each in judge_geometry(setup).findings if (each.rule, each.place) == ("return", FLIGHT)]
         assert one.ok is ok
-    # By PX4's law none is known to be safe.
-    px4 = hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "px4"\n', mission_text(0.0, 2000.0))
-    assert [each.ok for each in judge_geometry(px4).findings if each.rule == "return"] == [None]
+    # PX4 returns at its own height, or along the mission, which is not simulated.
+    for number, (stated, ok) in enumerate([("RTL_TYPE 1\n", True), ("RTL_TYPE 2\n", None)]):
+        folder = tmp_path / f"px4-{number}"
+        folder.mkdir()
+        (folder / "mine.params").write_text(stated, encoding="utf-8")
+        demand = '[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "px4"\nparams = "mine.params"\n'
+        px4 = hill_setup(folder, demand, mission_text(0.0, 2000.0))
+        (one,) = [each for each in judge_geometry(px4).findings if each.rule == "return"]
+        assert one.ok is ok
+        assert "by the simulated PX4" in one.method
+        assert ("RTL_TYPE 2 returns along the mission" in one.reason) is (ok is None)

@@ -142,6 +142,25 @@ def test_a_loiters_corners_are_one_finding(outcomes: tuple[bool | None, bool | N
     assert ("a part of the circle was not flown" in one.reason) is (ok is None)
 
 
+@pytest.mark.parametrize(("missing", "ok"), [(0.47, True), (0.53, None)])
+def test_half_a_lap_less_than_drawn_is_whole(missing: float, ok: bool | None) -> None:
+    """Of ArduPlane, of which a corner was not judged: so much of a lap was flown outside the circle, at 280 m."""
+    setup = replace(loiter(), autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    requirements, aligned, circle = laid(setup)
+    offsets = aligned.track.position[:, :2] - circle.center
+    first = int(aligned.rows[circle.first]) + 100
+    turned = np.abs(np.unwrap(np.arctan2(*offsets.T)))
+    is_out = (np.arange(len(offsets)) >= first) & (np.abs(turned - turned[first]) < missing * 2.0 * math.pi)
+    position = aligned.track.position.copy()
+    position[is_out, :2] = circle.center + 1.4 * offsets[is_out]
+    flown = replace(aligned, track=replace(aligned.track, position=position))
+    corner = requirements.waypoint(circle.first)
+    (one,) = merge_loiter_findings(requirements, flown, [finding("turn", corner, None, 1.0)])
+    assert one.ok is ok
+    assert f"{circle.laps - missing:.1f}" in one.reason.split(" laps flown at ")[0].split("; ")[-1]
+    assert ("a part of the circle was not flown" in one.reason) is (ok is None)
+
+
 def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None:
     requirements, aligned, circle = laid(loiter())
     corners = [requirements.waypoint(k) for k in (circle.first, circle.first + 1, circle.last)]

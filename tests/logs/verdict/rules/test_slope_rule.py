@@ -13,6 +13,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules.slope_rule import slope_findings
 from tests.logs.verdict.judging import failing, judge, leg, of
+from tests.mission_lines import setup_of, wp
 from tests.synthetic import (
     Profile,
     bank_radius,
@@ -112,6 +113,18 @@ def test_a_short_leg_is_measured_over_four_seconds() -> None:
     assert item.ok
     assert "short leg" in item.method
     assert item.flown == pytest.approx(math.degrees(math.atan2(10, 150)), abs=1.0)
+
+
+def test_a_leg_around_a_loiter_has_its_number_in_the_texts() -> None:
+    """Two corners of the circle come before the steep leg: its index is not the number that people count."""
+    circle = wp(0, 2500, command=18, p="1 0 200 0")
+    setup = setup_of(wp(0, 500), circle, wp(2500, 2500), wp(2500, 3500, 600))
+    found = [item for item in judge_geometry(setup).findings if item.rule == "slope" and item.ok is False]
+    (steep,) = [item for item in found if item.place.to_item == 4]
+    assert steep.place.number == 2
+    assert steep.place.index is not None
+    assert steep.place.index > 2
+    assert steep.reason.startswith("leg 2 climbs 26.6° for 1.0 km")
 
 
 def test_a_big_corner_in_a_steep_descent_is_steeper_than_its_legs() -> None:

@@ -19,7 +19,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.verdict import Verdict
-from tests.logs.verdict.judging import failing, judge, leg
+from tests.logs.verdict.judging import failing, judge
 from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.synthetic import bank_radius, fly_path, make_setup
 
@@ -134,12 +134,19 @@ def test_a_lead_saves_what_is_longer_than_the_turn(lead: float, left: float) -> 
     assert found[1].planned == pytest.approx(left, abs=0.15)
 
 
-def test_a_climb_between_lines_that_cannot_be_flown_fails_without_a_flight() -> None:
-    """From 100 m to 500 m on 400 m between the first two lines: geometry does not know where that leads."""
+@pytest.mark.parametrize(("height", "left"), [(60.0, 100.0), (220.0, 92.9), (400.0, 26.4)])
+def test_a_climb_between_lines_that_cannot_be_flown_takes_the_begin_of_the_line(height: float, left: float) -> None:
+    """The slope of a turn-around is judged neither in a flight nor before it, only what it leaves of the line.
+
+    At 13.7 degrees the 400 m between the lines and the lead of 300 m climb 170.6 m.  A photo may be 10 % of its height
+    above ground off, 32 m of 320 m: of 220 m the other 17.4 m take 71 m of the line, of 400 m it is 179.4 m and 736 m.
+    """
     points = np.array(lines(apart=400.0))
-    points[4:, 2] = 500.0
+    points[4:, 2] += height
     setup = make_setup(points, limits={"surveys": "lines"})
-    assert ("slope", leg(3)) in failing(judge_geometry(setup))
+    verdict = judge_geometry(setup)
+    assert [item.planned for item in photo_lines(verdict)] == pytest.approx([100.0, left, 100.0], abs=0.2)
+    assert "slope" not in {rule for rule, _ in failing(verdict)}
 
 
 def test_with_turn_arounds_geometry_finds_lines_whole() -> None:
@@ -235,6 +242,17 @@ def test_overlap_as_drawn_is_what_was_asked_for() -> None:
     )
     # Without a camera nothing is said of it.
     assert overlaps(judge(with_camera(1, 2), fly_path(with_camera(1, 2)))) == {}
+
+
+@pytest.mark.parametrize("up", [-99.999, -100.0, -130.0])
+def test_photos_from_the_ground_or_below_it_overlap_by_nothing(up: float) -> None:
+    """As on a line that ends in a crash: 0 %, not minus any number; the drawn line is as low as that here."""
+    setup = photographed()
+    low = np.array(lines()) + np.array([0.0, 0.0, 100.0 + up])
+    setup = replace(setup, route=setup.route.with_fields(position=low))
+    found = overlaps(judge(setup, fly_path(setup, radius=FITS)))
+    assert [found[check].flown for check in ("front overlap", "side overlap")] == [0.0, 0.0]
+    assert " 0 m above ground), 75 % required" in found["front overlap"].reason
 
 
 @pytest.mark.parametrize(("aside", "ok"), [(49.0, True), (51.0, False)])

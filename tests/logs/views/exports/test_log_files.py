@@ -51,6 +51,9 @@ def test_parquet_keeps_types_and_says_what_it_is(log_file: Path) -> None:
     assert table.column_names == list(flight_columns(log))
     assert (str(table.schema.field("time_s").type), str(table.schema.field("roll_rad").type)) == ("double", "float")
     assert table["airspeed_mps"].to_numpy().tobytes() == log.track.airspeed.tobytes()
+    # A track alone has no origin for a latitude and a longitude.
+    of_track = [name for name in table.column_names if name not in ("latitude_deg", "longitude_deg")]
+    assert list(log.track.to_pandas().columns) == of_track
     about = {key.decode(): value.decode() for key, value in table.schema.metadata.items()}
     assert about["planfly.scenario"] == log.setup.scenario.name
     assert about["planfly.ended"] == log.ended

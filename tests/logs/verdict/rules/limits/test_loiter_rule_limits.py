@@ -10,6 +10,7 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import of
+from tests.logs.verdict.unsure_aircraft import with_guessed_bank
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bank_radius
 
@@ -21,6 +22,29 @@ def test_a_circle_may_be_two_centimetres_narrower_than_the_bank_limits(short: fl
     item = of(judge_geometry(setup), "loiter")
     assert item.limit == pytest.approx(bank_radius(), abs=1e-4)
     assert item.ok is ok
+
+
+@pytest.mark.parametrize(("short", "ok"), [(0.005, None), (0.022, False)])
+def test_a_guessed_bank_limit_leaves_circles_open_that_60_degrees_hold(short: float, ok: bool | None) -> None:
+    radius = bank_radius(bank_deg=60.0) - short
+    setup = with_guessed_bank(setup_of(wp(0, 0), wp(0, 2000, command=18, p=f"2 0 {radius:.6f} 0"), wp(0, 4000)))
+    verdict = judge_geometry(setup)
+    item = of(verdict, "loiter")
+    assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
+    assert "and the aircraft's bank limit of 30° (a guess) the aircraft needs 110 m" in item.reason
+    if ok is None:
+        assert verdict.undecided
+        assert [change.what for one in item.suggestions for change in one] == ["stated bank"]
+        assert "of which 30° are a guess: planfly aircraft --new ... --bank DEGREES" in item.suggestion
+        assert "loiter at 1 waypoint is too close to the limit" in verdict.headline
+
+
+@pytest.mark.parametrize(("limit_deg", "ok"), [(40.0, None), (30.0, False)])
+def test_an_autopilot_that_banks_less_than_the_guess_decides(limit_deg: float, ok: bool | None) -> None:
+    """A circle of 80 m takes 38.6 degrees at 25 m/s: more than 30, less than 40."""
+    made = setup_of(wp(0, 0), wp(0, 2000, command=18, p="2 0 80 0"), wp(0, 4000))
+    law = Px4(Px4Parameters.load(load_aircraft("aerosonde"))).with_parameters(FW_R_LIM=limit_deg)
+    assert of(judge_geometry(replace(with_guessed_bank(made), autopilot=law)), "loiter").ok is ok
 
 
 @pytest.mark.parametrize(("room", "ok"), [(1.0, True), (-1.0, None)])

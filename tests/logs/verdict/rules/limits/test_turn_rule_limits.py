@@ -15,6 +15,7 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.turns import TurnMeasure, measure_turn
 from logs.verdict.rules.turn_rule import turn_findings
 from tests.logs.verdict.judging import ROUTE, judge, of, waypoint
+from tests.logs.verdict.unsure_aircraft import with_guessed_bank
 from tests.synthetic import bank_radius, bump, edited, fly_path, make_setup, waypoint_stations
 
 
@@ -125,3 +126,16 @@ def test_a_turn_is_watched_for_ten_seconds_after_its_arc(seconds: float, seen: b
     assert aligned is not None
     overshoot = measure_turn(requirements, aligned, 1).overshoot
     assert overshoot == pytest.approx(1.0 if seen else 0.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("spare", "ok"), [(0.05, None), (-0.05, False)])
+def test_a_guessed_bank_limit_leaves_turns_open_that_fit_with_60_degrees(spare: float, ok: bool | None) -> None:
+    """A turn of 90 degrees between two legs as long as the radius at 60 degrees of bank."""
+    length = bank_radius(bank_deg=60.0) + spare
+    setup = make_setup([[0, 0, 300], [0, length, 300], [length, length, 300]])
+    assert of(judge_geometry(setup), "turn", waypoint(1)).ok is False
+    item = of(judge_geometry(with_guessed_bank(setup)), "turn", waypoint(1))
+    assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
+    assert "the aircraft's bank limit of 30° (a guess)" in item.reason
+    whats = [change.what for one in item.suggestions for change in one]
+    assert ("stated bank" in whats) is (ok is None)

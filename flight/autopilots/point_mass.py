@@ -62,6 +62,12 @@ class PointMass(NamedTuple):
     power: Floats
     glides: bool = True
 
+    def in_wind(self, wind: Wind) -> "PointMass":
+        """Return the point mass in another wind."""
+        record = self.record.copy()
+        set_wind(record, wind)
+        return self._replace(record=record)
+
 
 def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
     """Return the point mass of an aircraft from its trims, in a wind.
@@ -81,9 +87,14 @@ def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, win
     record.airspeed_step, record.altitude_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
     record.alpha, record.alpha_lift = alpha, lift
     record.induced = _induced_drag_factor(speeds, excess[0, :, 0])
+    set_wind(record, wind)
+    return PointMass(record, excess.copy(), power, glides)
+
+
+def set_wind(record: Record, wind: Wind) -> None:
+    """Set the wind of a `POINT_MASS` record."""
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
     record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
-    return PointMass(record, excess.copy(), power, glides)
 
 
 # Version of the cached tables: increase it with any change of `_compute_trim_tables`.

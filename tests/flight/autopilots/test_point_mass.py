@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane import point_mass as subject
-from flight.autopilots.arduplane.point_mass import PointMass, excess_power, fill_excess_power, make_point_mass
+from flight.autopilots import point_mass as subject
+from flight.autopilots.point_mass import PointMass, excess_power, fill_excess_power, make_point_mass
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import airframe
 from world.wind import Wind
 

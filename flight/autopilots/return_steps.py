@@ -1,0 +1,179 @@
+"""Steps of a simulated RTL that do not depend on the autopilot, in compiled code: its start, clearances and loiter."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from flight.autopilots.point_mass import angle_of_attack, excess_power
+from flight.autopilots.simulated_returns import (
+    MAX_IMPACT_DEPTH_M,
+    RETURN_GROUND_IMPACT,
+    RETURN_OFF_TERRAIN,
+    RETURN_RESULT,
+    RETURN_TIMEOUT,
+    SimulatedReturns,
+)
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
+from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_RADIUS_M
+from world.arrays import Floats, Heights
+from world.frames import PolyMapRecord
+from world.geometry import wrap
+from world.kernels import Record, inner, record_dtype
+from world.terrain import ground_height
+from world.wind import mean_wind_speed
+
+# Lag of the flight path behind the pitch, s: the time in which lift turns the velocity of a small aircraft.
+PATH_LAG_S = 0.4
+# Progress around the RTL loiter since the aircraft captured it at the target altitude.
+LOITER_PROGRESS = record_dtype(
+    "seconds",  # s since the capture
+    "turned",  # rad flown around the center since then, positive to the right
+    "bearing",  # rad, bearing from the center, at the last tick
+)
+
+
+def simulate_each(
+    timeouts: list[float], fly: Callable[[int, Floats, Record], None], *, store_positions: bool
+) -> SimulatedReturns:
+    """Simulate n RTLs one by one.
+
+    timeouts: timeout of each RTL, s, (n,).
+    fly: simulates one RTL; the arguments are its number, the array (t, 3) of positions to fill, m, and its result, a
+        `RETURN_RESULT` record to fill.
+    store_positions: True to store the positions.
+    """
+    results = np.zeros(len(timeouts), RETURN_RESULT)
+    positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if store_positions else 0, 3))
+    tracks = []
+    for k in range(len(timeouts)):
+        fly(k, positions, results[k])
+        if store_positions:
+            tracks.append(positions[: int(results[k]["position_count"])].copy())
+    return SimulatedReturns(results, tuple(tracks))
+
+
+@inner
+def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
+    """Set ``estimated`` to the start of the flight, and ``result`` to the values before the flight."""
+    estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
+    estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
+    estimated.velocity_up = start.velocity_up
+    result.clearance = result.clearance_before_arrival = math.inf if has_terrain else math.nan
+    result.threat = -1
+    result.sphere_distance, result.distance_before_arrival = math.inf, math.inf
+    result.arrival_time, result.arrival_altitude, result.energy, result.outcome, result.position_count = (
+        math.nan,
+        math.nan,
+        0.0,
+        RETURN_TIMEOUT,
+        0,
+    )
+
+
+@inner
+def initialise_state(start: Record, aircraft: Record, state: Record) -> None:
+    """Set airspeed and attitude of the point mass from the motion over the ground at the start, in the mean wind."""
+    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
+    air_east = start.velocity_east - wind * aircraft.wind_east
+    air_north = start.velocity_north - wind * aircraft.wind_north
+    climb_rate = start.velocity_up
+    state.airspeed = max(1.0, math.hypot(math.hypot(air_east, air_north), climb_rate))
+    state.yaw, state.roll = math.atan2(air_east, air_north), start.roll
+    state.alpha = angle_of_attack(state, aircraft)
+    state.pitch = math.asin(min(1.0, max(-1.0, climb_rate / state.airspeed))) + state.alpha
+
+
+@inner
+def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
+    """Return the throttle with which the aircraft holds the climb rate of the start, in steps of 0.01."""
+    throttle = 1.0
+    while (
+        throttle > 0.0 and excess_power(excess_table, throttle, state.airspeed, start.up, aircraft) > start.velocity_up
+    ):
+        throttle -= 0.01
+    return throttle
+
+
+@inner
+def store_position(estimated: Record, positions: Floats, result: Record) -> None:
+    """Append the present position to the stored positions, unless the array is full."""
+    row = result.position_count
+    if row < positions.shape[0]:
+        positions[row, 0], positions[row, 1], positions[row, 2] = estimated.east, estimated.north, estimated.up
+        result.position_count += 1
+
+
+@inner
+def advance_loiter(estimated: Record, target: Record, loiter: Record, arrival_radius: float, dt: float) -> bool:
+    """Update the progress around the last loiter, and return True once the loiter is complete.
+
+    The loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
+
+    target: waypoint of the loiter.
+    loiter: progress around the loiter, a record of `LOITER_PROGRESS`.
+    arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
+    dt: s since the last call.
+    """
+    offset_e, offset_n = estimated.east - target.centre_east, estimated.north - target.centre_north
+    bearing = math.atan2(offset_e, offset_n)
+    if loiter.seconds > 0.0:
+        loiter.turned += wrap(bearing - loiter.bearing)
+    loiter.bearing = bearing
+    if loiter.seconds > 0.0 or (
+        math.hypot(offset_e, offset_n) < max(RTL_ARRIVAL_RADIUS_M, arrival_radius)
+        and abs(estimated.up - target.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
+    ):
+        loiter.seconds += dt
+    return loiter.seconds > ENDLESS_LOITER_TIME_S and abs(loiter.turned) >= 2.0 * math.pi
+
+
+@inner
+def update_clearances(
+    estimated: Record,
+    time: float,
+    heights: Heights,
+    to_pixel: PolyMapRecord,
+    spheres: Floats,
+    radii: Floats,
+    has_terrain: bool,
+    result: Record,
+) -> None:
+    """Update the end time, the minimum height above ground and the minimum distance outside the kill spheres.
+
+    End the RTL outside the elevation data, or once the aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
+    """
+    result.end_time = time
+    for m in range(spheres.shape[0]):
+        radius = radii[m]
+        if radius <= 0.0:
+            continue
+        offset_e, offset_n, offset_up = (
+            estimated.east - spheres[m, 0],
+            estimated.north - spheres[m, 1],
+            estimated.up - spheres[m, 2],
+        )
+        sphere_distance = math.sqrt(offset_e * offset_e + offset_n * offset_n + offset_up * offset_up) - radius
+        if sphere_distance < result.sphere_distance:
+            result.sphere_distance, result.threat, result.threat_time = sphere_distance, m, time
+        if math.isnan(result.arrival_time):
+            result.distance_before_arrival = min(result.distance_before_arrival, sphere_distance)
+    if not has_terrain:
+        return
+    clearance = estimated.up - ground_height(heights, to_pixel, estimated.east, estimated.north)
+    if math.isnan(clearance):
+        result.outcome = RETURN_OFF_TERRAIN
+        return
+    if clearance < result.clearance:
+        if result.clearance > 0.0:
+            if math.isnan(result.arrival_time):
+                result.clearance_before_arrival = clearance
+            result.clearance_time = time
+            result.clearance_east, result.clearance_north, result.clearance_up = (
+                estimated.east,
+                estimated.north,
+                estimated.up,
+            )
+        result.clearance = clearance
+    if clearance <= -MAX_IMPACT_DEPTH_M:
+        result.outcome, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time

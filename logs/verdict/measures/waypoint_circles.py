@@ -1,0 +1,77 @@
+"""Find waypoints at which an autopilot circled because the aircraft was not at the waypoint's altitude."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from logs.verdict.measures.acceptance import acceptance_condition
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.wording import place_text
+
+# Least change of course of a circle at a waypoint, rad: less hardly leads off the legs.
+_MIN_CIRCLE_RAD = 0.5 * math.pi
+# Maximum number of circles that a text names.
+_MAX_NAMED = 4
+
+
+class WaypointCircle(NamedTuple):
+    """Circle that an autopilot flew at a waypoint that is no loiter.
+
+    waypoint: index of the waypoint.
+    height_error: altitude error with which the aircraft reached the waypoint, m, positive above.
+    """
+
+    waypoint: int
+    height_error: float
+
+
+def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> list[WaypointCircle]:
+    """Return the circles that an autopilot flew because it was outside its altitude tolerance at a waypoint.
+
+    Such an autopilot flies on from a waypoint once it has reached it within the tolerance; if it reaches it outside the
+    tolerance, it circles.  Return [] for an autopilot that flies on at any altitude.
+    """
+    setup, route, track = requirements.setup, requirements.setup.route, aligned.track
+    if not setup.autopilot.deviations.altitude_parameter:
+        return []
+    circles, begin = [], 0
+    for i in range(1, len(route.points)):
+        if not aligned.passed[i - 1] or i - 1 in route.rtl_legs:
+            break
+        if route.arc_radii[i] > 0.0:
+            begin = max(begin, int(aligned.rows[i]))
+            continue
+        stop = int(aligned.rows[min(i + 2, requirements.legs)]) + 1 if aligned.passed[i] else len(track)
+        offsets = track.position[begin : max(stop, begin + 1)] - requirements.points[i]
+        is_off = np.abs(offsets[:, 2]) > setup.autopilot.loiters.altitude_tolerance
+        is_near = np.hypot(offsets[:, 0], offsets[:, 1]) <= acceptance_condition(requirements, i).radius
+        is_past = offsets[:, :2] @ requirements.leg_unit(i - 1) > 0.0
+        is_reached = (is_near | is_past) & ~is_off
+        end = int(np.argmax(is_reached)) if is_reached.any() else len(offsets) - 1
+        rows_off = np.flatnonzero(is_off[:end] & is_near[:end])
+        if rows_off.size and np.ptp(aligned.course[begin + int(rows_off[0]) : begin + end]) >= _MIN_CIRCLE_RAD:
+            circles.append(WaypointCircle(i, float(offsets[rows_off[0], 2])))
+        begin += end
+    return circles
+
+
+def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCircle]) -> str:
+    """State where an autopilot circled, with which height errors, and which parameter made it circle.
+
+    Return "" without circles.
+    """
+    if not circles:
+        return ""
+    autopilot = requirements.setup.autopilot
+    places = [
+        f"{place_text(requirements.waypoint(circle.waypoint))} (height error {circle.height_error:+.0f} m)"
+        for circle in circles[:_MAX_NAMED]
+    ]
+    rest = f" and {len(circles) - _MAX_NAMED} more" if len(circles) > _MAX_NAMED else ""
+    return (
+        f"{autopilot.title} circled at {', '.join(places)}{rest}: {autopilot.deviations.altitude_parameter} allows"
+        f" {autopilot.loiters.altitude_tolerance:g} m"
+    )

@@ -1,0 +1,23 @@
+"""Write the coverage of a radio link as a GeoTIFF."""
+
+import numpy as np
+
+from logs.verdict.measures.link_coverage import LinkCoverage
+from world.frames import GeoOrigin
+from world.gdal_raster import geotiff_bytes
+
+# Value of a cell without a margin.
+NO_MARGIN_DB = -9999.0
+
+
+def coverage_geotiff(coverage: LinkCoverage, origin: GeoOrigin) -> bytes:
+    """Return the bytes of a GeoTIFF of the margin in every cell, dB.
+
+    Its projection is the azimuthal equidistant one about the origin of the map; `NO_MARGIN_DB` marks cells whose ground
+    is unknown or above the aircraft.
+    """
+    margin = np.where(np.isfinite(coverage.margin), coverage.margin, NO_MARGIN_DB).astype(np.float32)
+    side, north = coverage.side, coverage.south + coverage.side * len(margin)
+    grid = (side, 0.0, coverage.west, 0.0, -side, north)
+    projection = f"+proj=aeqd +lat_0={origin.lat_deg} +lon_0={origin.lon_deg} +datum=WGS84 +units=m +no_defs"
+    return geotiff_bytes(np.ascontiguousarray(margin[::-1]), grid, projection, NO_MARGIN_DB, unit="dB")
