@@ -155,12 +155,11 @@ class Scenario:
 
     def wind_velocities(self, positions: Floats, seconds: Floats) -> Floats:
         """Return the mean wind at positions (n, 3) and times (n,), m/s, (n, 2); see `wind_velocity`."""
-        altitudes, field = np.ascontiguousarray(positions[:, 2]), self.wind.field
+        altitudes, field = np.ascontiguousarray(positions[:, 2], dtype=np.float64), self.wind.field
         if field is None:
             return self.wind.velocities_at(altitudes)
-        places = to_geo(self.origin, positions[:, 0], positions[:, 1])
-        deviations = field.velocities_at(seconds, *places, altitudes)
-        return self.wind.velocities_at(field.limit_altitudes(seconds, *places, altitudes)) + deviations
+        found = field.interpolate(seconds, *to_geo(self.origin, positions[:, 0], positions[:, 1]), altitudes)
+        return self.wind.velocities_at(np.ascontiguousarray(found[:, 2])) + found[:, :2]
 
     def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
         """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).
@@ -170,7 +169,8 @@ class Scenario:
         if self.wind.field is None:
             return self.wind
         up = float(position[2])
-        winds = np.array([self.wind_velocity((*position[:2], up + height), seconds) for height in PROFILE_HEIGHTS_M])
+        column = np.array([(*position[:2], up + height) for height in PROFILE_HEIGHTS_M])
+        winds = self.wind_velocities(column, np.full(len(column), seconds))
         profile = fit_profile_line(PROFILE_HEIGHTS_M, winds)
         return replace(
             self.wind,

@@ -27,6 +27,7 @@ from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, rtl_loiter_time
 from flight.simulation.track import Rows, join_rows, quantise
 from flight.simulation.turbulence import start_gusts
 from world.arrays import Floats
+from world.forecast.wind_field import without_levels_above
 from world.geometry import leg_courses
 from world.kernels import Records
 from world.random_streams import NAVIGATION, TURBULENCE, stream
@@ -36,6 +37,8 @@ from world.wind import W20
 TIME_LIMIT_FACTOR = 1.5
 # Time added to that limit, s.
 TIME_LIMIT_BASE_S = 60.0
+# Lowest ground speed that is assumed for it, m/s.
+MIN_GROUND_SPEED_MPS = 3.0
 
 
 class Airborne(ABC):
@@ -115,7 +118,8 @@ class Airborne(ABC):
         self._work.settings.center_longitude = self.map.center_longitude
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
-        time_limit = TIME_LIMIT_FACTOR * length / _min_ground_speed(setup, self._airspeeds) + TIME_LIMIT_BASE_S
+        ground_speed = _min_ground_speed(setup, self._airspeeds) - _max_wind_deviation(setup, length)
+        time_limit = TIME_LIMIT_FACTOR * length / max(MIN_GROUND_SPEED_MPS, ground_speed) + TIME_LIMIT_BASE_S
         # A loiter for a time lasts as long as its item states, although its path is only one circle.
         timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
         time_limit += sum(
@@ -244,7 +248,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
 
 def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
-    """Return the lowest ground speed on any leg, in the mean wind at the leg's altitudes, m/s; at least 3 m/s."""
+    """Return the lowest ground speed on any leg, in the mean wind at the leg's altitudes, m/s."""
     limits: Limits = setup.limits
     points, courses = setup.route.positions, leg_courses(setup.route.positions)
     tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
@@ -252,4 +256,17 @@ def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
     for leg, airspeed in enumerate(airspeeds.tolist()):
         table = tables[airspeed]
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
-    return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0
+    return float(np.nanmin(speeds)) if np.isfinite(speeds).any() else MIN_GROUND_SPEED_MPS
+
+
+def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
+    """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s; 0 without a forecast.
+
+    length: m, of the flight.
+    """
+    field = setup.scenario.wind.field
+    if field is None:
+        return 0.0
+    longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
+    near = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
+    return float(np.linalg.norm(near.velocities, axis=-1).max())

@@ -4,13 +4,14 @@ A fall without drag goes farthest ahead, and one with the wing across the air dr
 of any other fall lies between.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import GRAVITY
 from world.arrays import Floats
 from world.terrain import Terrain
-from world.wind import Wind
 
 # Air density at sea level, kg/m3; it is lower higher up, which lies between the two falls.
 _AIR_DENSITY = 1.225
@@ -27,13 +28,16 @@ def plate_drag(aircraft: Aircraft) -> float:
     return 0.5 * _AIR_DENSITY * _PLATE_DRAG_COEFFICIENT * aircraft.wing_area / aircraft.mass
 
 
-def impact_points(position: Floats, velocity: Floats, drag: float, wind: Wind, terrain: Terrain) -> Floats:
+def impact_points(
+    position: Floats, velocity: Floats, drag: float, wind_at: Callable[[Floats], Floats], terrain: Terrain
+) -> Floats:
     """Return where falls meet the ground, east and north, m, (n, 2).
 
     Where the terrain is unknown, its lowest known height below the falls applies.
 
     position, velocity: at the start of the falls, over the ground, m and m/s, (n, 3).
     drag: drag per mass and square of the airspeed, 1/m.
+    wind_at: function from positions, m, (n, 3), to the wind there, m/s, (n, 2) east and north.
     """
     place, speed = position.astype(np.float64), velocity.astype(np.float64)
     start_ground = terrain.height(place[:, 0], place[:, 1])
@@ -44,7 +48,7 @@ def impact_points(position: Floats, velocity: Floats, drag: float, wind: Wind, t
         rows = np.flatnonzero(is_falling)
         if not rows.size:
             break
-        wind_velocity = np.column_stack([wind.velocities_at(place[rows, 2]), np.zeros(rows.size)])
+        wind_velocity = np.column_stack([wind_at(place[rows]), np.zeros(rows.size)])
         # Half of the step's gravity, the exact loss of speed by drag alone, and the other half.
         airspeed = speed[rows] - wind_velocity - half_pull
         slowed = airspeed / (1.0 + drag * np.linalg.norm(airspeed, axis=1)[:, None] * _TIME_STEP_S)

@@ -8,7 +8,7 @@ flights, returns and falls, and the volumes by the formulas of SORA's annex A.
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -133,7 +133,13 @@ def fly_for_excursions(
     half_span = 0.5 * airframe.wing_span
     lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
     flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns)])
-    falls = _fall_areas(sampled, airframe, setup.scenario.wind, terrain)
+    # In a forecast, the wind at the middle of the flight.
+    middle = 0.5 * float(flown.track.time[-1])
+
+    def wind_at(places: Floats) -> Floats:
+        return setup.scenario.wind_velocities(places, np.full(len(places), middle))
+
+    falls = _fall_areas(sampled, airframe, wind_at, terrain)
     glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
@@ -218,14 +224,15 @@ def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
 
 
 def _fall_areas(
-    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind: Wind, terrain: Terrain
+    sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind_at: Callable[[Floats], Floats], terrain: Terrain
 ) -> list[BaseGeometry]:
     """Return the areas on which an aircraft can fall from paths: the hull of each piece of a path and its impacts.
 
     sampled: positions and velocities of each path, m and m/s, (n, 3) each.
+    wind_at: see `impact_points`.
     """
     positions, velocities = (np.concatenate(values) for values in zip(*sampled, strict=True))
-    impacts = [impact_points(positions, velocities, drag, wind, terrain) for drag in (0.0, plate_drag(aircraft))]
+    impacts = [impact_points(positions, velocities, drag, wind_at, terrain) for drag in (0.0, plate_drag(aircraft))]
     points = np.stack([positions[:, :2], *impacts], axis=1)
     ends = np.cumsum([len(each) for each, _ in sampled])[:-1]
     areas = []

@@ -19,7 +19,7 @@ from world.forecast.wind_field import (
     fit_mean_profile,
     limit_gradient,
     subtract_profile,
-    without_high_levels,
+    without_levels_above,
 )
 from world.frames import GeoOrigin, to_geo
 from world.wind import Wind
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _CLEARANCE_M = 150.0
 # Greatest height above the start of ground that counts for this, m.
 _MAX_CLIMB_M = 2000.0
+# Altitude above which the levels of a forecast are left out, m AMSL: the highest altitude of a scenario.
+MAX_AMSL_M = 9000.0
 # Distance below the lowest level within which the lowest level's wind applies, m.
 MAX_DEPTH_BELOW_LEVELS_M = 100.0
 # Distance around a forecast of a single place within which it applies, m: half a cell of a global model.
@@ -100,7 +102,7 @@ def forecast_wind(
     latitudes, longitudes = to_geo(site.origin, [point[0] for point in site.ends], [point[1] for point in site.ends])
     altitudes = np.array([float(point[2]) for point in site.ends])
     reference = float(altitudes[0])
-    field = without_high_levels(forecast.field_from(departure, member), reference)
+    field = without_levels_above(forecast.field_from(departure, member), MAX_AMSL_M)
     if field.packed().size > MAX_FIELD_NUMBERS:
         shown = f"{field.packed().size:,} numbers for a flight"
         raise ForecastError.at(file, "nodes", shown, f"allowed {MAX_FIELD_NUMBERS:,}: make its area smaller")
@@ -145,8 +147,8 @@ def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats,
     lowest, highest = np.array(facts.lowest_amsl), np.array(facts.highest_amsl)
     if wind.field is not None:
         # The levels at each place: levels above ground follow the ground of the forecast's model.
-        lowest = wind.field.limit_altitudes(0.0, latitudes, longitudes, -math.inf)
-        highest = wind.field.limit_altitudes(0.0, latitudes, longitudes, math.inf)
+        lowest = wind.field.interpolate(0.0, latitudes, longitudes, -math.inf)[:, 2]
+        highest = wind.field.interpolate(0.0, latitudes, longitudes, math.inf)[:, 2]
     above, below = altitudes - highest, lowest - MAX_DEPTH_BELOW_LEVELS_M - altitudes
     if above.max() > 0.0:
         k = int(np.argmax(above))

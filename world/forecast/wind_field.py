@@ -89,27 +89,26 @@ class WindField:
             raise ValueError("not a wind field")
         return cls(first, second, third, nodes[..., _ALTITUDE].copy(), nodes[..., _EAST:].copy())
 
-    def velocities_at(
+    def interpolate(
         self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
     ) -> Floats:
-        """Return the wind at n points, m/s, (n, 2) east and north; arguments as for `limit_altitudes`."""
-        return self._interpolate(seconds, latitudes, longitudes, altitudes)[:, :2]
+        """Return the wind at n points, m/s, east and north, and the altitude at which it applies, m AMSL, (n, 3).
 
-    def limit_altitudes(
-        self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
-    ) -> Floats:
-        """Return the altitudes at which the wind at n points applies, (n,) m AMSL: limited to the field's levels there.
+        That altitude is the point's altitude, limited to the field's levels there.
 
         seconds: (n,) s, or one value, as all arguments.
         latitudes, longitudes: deg.
         altitudes: m AMSL.
         """
-        return self._interpolate(seconds, latitudes, longitudes, altitudes)[:, 2]
-
-    def _interpolate(self, *points: ArrayLike) -> Floats:
-        """Return what `interpolate_field` does at n points, (n, 3)."""
+        points = (seconds, latitudes, longitudes, altitudes)
         arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(values, dtype=np.float64)) for values in points))
         return _interpolate_points(self.packed(), *(np.ascontiguousarray(array) for array in arrays))
+
+    def velocities_at(
+        self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
+    ) -> Floats:
+        """Return the wind at n points, m/s, (n, 2) east and north; arguments as for `interpolate`."""
+        return self.interpolate(seconds, latitudes, longitudes, altitudes)[:, :2]
 
     def between(self, start: float, end: float) -> "WindField":
         """Return the part of the field that determines the wind from `start` to `end` (s)."""
@@ -241,9 +240,6 @@ def _interpolate_points(
 PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
 # Number of altitudes of a mission to which its mean profile is fitted.
 _PROFILE_POINTS = 9
-# Levels above this height over the reference altitude are left out, except the lowest of them, m: all altitudes of a
-# scenario are between -500 and 9,000 m AMSL.
-_MAX_HEIGHT_M = 9500.0
 # Largest gradient of a mean profile, 1/s: the range of a scenario's [wind] gradient.
 _MAX_GRADIENT = 0.05
 # A field that differs from its mean wind by less than this everywhere is the same everywhere, m/s.
@@ -269,16 +265,14 @@ class MeanProfile:
         return np.stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)], axis=-1)
 
 
-def without_high_levels(field: WindField, reference_amsl: float) -> WindField:
-    """Return a field without its levels above every flight that begins at the reference altitude (m AMSL)."""
+def without_levels_above(field: WindField, amsl: float) -> WindField:
+    """Return a field without its levels above an altitude (m AMSL) everywhere, except the lowest of them."""
     lowest = field.altitudes.min(axis=(0, 1, 2))
-    count = min(len(lowest), int((lowest <= reference_amsl + _MAX_HEIGHT_M).sum()) + 1)
-    return WindField(
-        field.times,
-        field.latitudes,
-        field.longitudes,
-        np.ascontiguousarray(field.altitudes[..., :count]),
-        np.ascontiguousarray(field.velocities[..., :count, :]),
+    count = min(len(lowest), int((lowest <= amsl).sum()) + 1)
+    return replace(
+        field,
+        altitudes=np.ascontiguousarray(field.altitudes[..., :count]),
+        velocities=np.ascontiguousarray(field.velocities[..., :count, :]),
     )
 
 

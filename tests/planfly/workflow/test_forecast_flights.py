@@ -149,6 +149,15 @@ def test_below_and_above_the_levels_the_wind_of_the_nearest_level_applies(folder
     np.testing.assert_allclose(flown.track.wind[is_below, 0], 4.0, atol=2e-3)
 
 
+def test_a_head_wind_that_comes_up_leaves_the_flight_its_time(folder: Path) -> None:
+    """Calm at the start; at 4 m/s over the ground, the first leg of 1.5 km then takes five minutes instead of one."""
+    u = np.array([0.0, -21.0, -21.0])[:, np.newaxis, np.newaxis, np.newaxis]
+    file = write_netcdf(folder / "a.nc", wind_dataset(u, 0.0, hours=(0.0, 0.005, 2.0)))
+    flown = fly(autopilot="planfly", forecast=file, at=AT)
+    assert flown.ended == "completed"
+    assert flown.track.time[-1] > 300.0
+
+
 @pytest.mark.parametrize("longitude", [179.99, 180.0])
 @pytest.mark.parametrize("grid", [np.arange(0.0, 360.0, 0.25), np.arange(-180.0, 180.0, 0.25)], ids=["0", "-180"])
 def test_a_mission_across_the_antimeridian(longitude: float, grid: Floats, folder: Path) -> None:
