@@ -63,17 +63,14 @@ UNSAFE = frozenset(KINDS[:5])
 # End of a return: it stays in a loiter there; it goes on from the loiter to a landing sequence (RTL_AUTOLAND 1 of
 # ArduPlane); or it flies straight to a landing sequence (RTL_AUTOLAND 2, and "land" as a battery failsafe action).
 Ending = Literal["circle", "on to land", "straight to land"]
-# Reasons that leave returns undecided, whatever their simulation shows; an autopilot may add clauses of its own
-# (`ReturnBehaviour.unsimulated_text`, `unjudged_texts`).  They follow the terrain; the autopilot has another control
-# law; mode AUTOLAND lands by a pattern of its own; they follow the mission's return path (RTL_AUTOLAND 4); or the
-# landing sequence begins with the landing itself.
-UNJUDGED_PARTS = ("terrain", "law", "autoland", "return path", "landing")
 
 # Distance to the ground or the required height within which the point mass could be wrong, m: its least clearance is
-# within 7 m of 38 flights of ArduPlane, and within 4.5 m of 254 flights in JSBSim (`benchmarks.return_differences`).
+# within 7 m of 38 flights of ArduPlane, and in JSBSim (`benchmarks.return_differences`) within 4.5 m of 254 flights of
+# the simulated ArduPlane and within 5.1 m of 555 flights of the simulated PX4.
 POINT_MASS_ERROR_M = 10.0
 # Distance to a kill sphere within which the point mass could be wrong, m: its least distance outside a sphere is within
-# 32 m of 57 flights in JSBSim, and within 18 m where it is below 100 m.
+# 32 m of 57 flights of the simulated ArduPlane in JSBSim, and within 18 m where it is below 100 m; and within 35 m of
+# 97 of 111 flights of the simulated PX4, of which the others turned back to another side.
 POINT_MASS_POSITION_ERROR_M = 35.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
@@ -181,7 +178,8 @@ class Returns:
     flown: True if the returns begin on a flown track, False for the planned path.
     jsbsim_differences: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
     stands_in: True if ArduPlane's return is simulated because the autopilot has no return law.
-    unjudged_parts: parts that are not judged: each one of `UNJUDGED_PARTS`, or a clause.
+    unjudged_parts: parts that are not judged, whatever the simulation shows: each a key of
+        `logs.verdict.returns.returns_text.UNJUDGED_PART_TEXTS`, or a clause by the autopilot.
     autoland: RTL_AUTOLAND; None for returns of another autopilot.
     autoland_assumed: True if this value is assumed, because ArduPlane does not arm with 0.
     autopilot: title of the autopilot whose return is simulated.
@@ -322,12 +320,6 @@ class ReturnWorld:
         return self.setup.limits.min_clearance
 
     @property
-    def min_airspeed_name(self) -> str:
-        """Parameter of `min_airspeed`; "" if no parameter states it."""
-        limits = self.autopilot.speeds.limits
-        return "" if limits is None else limits.min_name
-
-    @property
     def fly(self) -> FlyReturns:
         """Function that simulates the autopilot's RTLs.  Raises ValueError for an autopilot without an RTL."""
         fly = self.autopilot.returns.fly
@@ -340,6 +332,12 @@ class ReturnWorld:
         """Equivalent airspeed of a glide, m/s: the lowest that the autopilot accepts."""
         limits = self.autopilot.speeds.limits
         return self.setup.airspeed if limits is None else limits.min
+
+    @property
+    def min_airspeed_name(self) -> str:
+        """Parameter of `min_airspeed`; "" if no parameter states it."""
+        limits = self.autopilot.speeds.limits
+        return "" if limits is None else limits.min_name
 
     @property
     def is_battery_known(self) -> bool:

@@ -71,7 +71,8 @@ _ACTION_TEXTS = {
     "land here": "lands where it is",
     "disarm": "stops its motor, which ends its flight",
 }
-_UNJUDGED_PART_TEXTS = {
+# Clauses on the parts of returns that are not judged, by their names in answers.
+UNJUDGED_PART_TEXTS = {
     "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return is used instead",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
@@ -86,7 +87,7 @@ def unjudged_parts_text(parts: Sequence[str]) -> str:
     >>> unjudged_parts_text(("autoland", "RTL_LAND_DELAY 0 lands after the return, which is not simulated"))
     'mode AUTOLAND lands by a pattern of its own; RTL_LAND_DELAY 0 lands after the return, which is not simulated'
     """
-    return "; ".join(_UNJUDGED_PART_TEXTS.get(part, part) for part in parts)
+    return "; ".join(UNJUDGED_PART_TEXTS.get(part, part) for part in parts)
 
 
 def segment_text(kind: Kind) -> str:
