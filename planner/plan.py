@@ -466,6 +466,10 @@ def plan_html(plan: Plan) -> str:
             "outside missiles' reach by at least",
             f"{certificate.kill_distance:.0f} m" if math.isfinite(certificate.kill_distance) else "none",
         ),
+        (
+            "lengths of legs to spare",
+            f"{certificate.available_length:.0f} m" if math.isfinite(certificate.available_length) else "none",
+        ),
         ("turns and slopes to spare", f"{math.degrees(certificate.turn):.1f}°, {math.degrees(certificate.slope):.2f}°"),
         ("algorithm, seed", f"{plan.algorithm}, {plan.seed}"),
         *(("fails", problem) for problem in certificate.problems),

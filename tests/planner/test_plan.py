@@ -252,7 +252,7 @@ def test_what_is_known_of_zones_and_height_comes_back_and_nothing_of_it_is_writt
 # ----------------------------------------------------------------------
 # A plan on a terminal's one line, and as a notebook shows it.
 
-GOOD_CERTIFICATE = Certificate(np.radians(5.0), np.inf, np.radians(1.25), 9.04, 10.0, 51.0, ())
+GOOD_CERTIFICATE = Certificate(np.radians(5.0), 84.2, np.radians(1.25), 9.04, 10.0, 51.0, ())
 
 
 @pytest.fixture(scope="module")
@@ -295,6 +295,7 @@ def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
     assert rows["length / straight line"] == "1.2500"
     assert rows["clearance to spare, at least"] == "9.0 m"
     assert rows["outside missiles' reach by at least"] == "51 m"
+    assert rows["lengths of legs to spare"] == "84 m"
     assert rows["turns and slopes to spare"] == "5.0°, 1.25°"
     assert rows["algorithm, seed"] == "umda, 7"
 
