@@ -122,6 +122,19 @@ _MetreRing = Annotated[list[_MetreCorner], Field(max_length=MAX_CORNERS)]
 _DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MAX_CORNERS)]
 
 
+def _check_one_position(table: "PositionTable | ZoneTable") -> None:
+    """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
+    pairs = [{key: getattr(table, key) for key in keys} for keys in (("east_m", "north_m"), ("lat_deg", "lon_deg"))]
+    given_pairs = [pair for pair in pairs if any(value is not None for value in pair.values())]
+    if len(given_pairs) > 1:
+        raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+    if not given_pairs:
+        raise ValueError("position: missing; give east_m and north_m, or lat_deg and lon_deg")
+    for key, value in given_pairs[0].items():
+        if value is None:
+            raise ValueError(f"{key}: missing; a position needs {' and '.join(given_pairs[0])}")
+
+
 class ZoneTable(ScenarioTable):
     """[[zones]]: a polygon by its corners, or a cylinder by its centre and radius, with a vertical band.
 
@@ -159,13 +172,10 @@ class ZoneTable(ScenarioTable):
         corners = sum(map(len, self.rings_m or self.rings_deg or ()))
         if corners > MAX_CORNERS:
             raise ValueError(f"{stated_keys[0]}: {corners:,} corners: at most {MAX_CORNERS:,} are allowed in one zone")
-        metres = (self.east_m is not None, self.north_m is not None)
-        degrees = (self.lat_deg is not None, self.lon_deg is not None)
-        if self.radius_m is None:
-            if any(metres) or any(degrees):
-                raise ValueError("radius_m: missing; a zone with a centre is a cylinder and needs a radius")
-        elif not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
-            raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+        if self.radius_m is not None:
+            _check_one_position(self)
+        elif any(value is not None for value in (self.east_m, self.north_m, self.lat_deg, self.lon_deg)):
+            raise ValueError("radius_m: missing; a zone with a centre is a cylinder and needs a radius")
         return self
 
     @model_validator(mode="after")
@@ -276,19 +286,6 @@ class AreaTable(ScenarioTable):
                 f"ceiling_amsl_m: {self.ceiling_amsl_m:g}: must be above floor_amsl_m {self.floor_amsl_m:g}"
             )
         return self
-
-
-def _check_one_position(table: "PositionTable") -> None:
-    """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
-    pairs = [{key: getattr(table, key) for key in keys} for keys in (("east_m", "north_m"), ("lat_deg", "lon_deg"))]
-    given_pairs = [pair for pair in pairs if any(value is not None for value in pair.values())]
-    if len(given_pairs) > 1:
-        raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
-    if not given_pairs:
-        raise ValueError("position: missing; give east_m and north_m, or lat_deg and lon_deg")
-    for key, value in given_pairs[0].items():
-        if value is None:
-            raise ValueError(f"{key}: missing; a position needs {' and '.join(given_pairs[0])}")
 
 
 class PositionTable(ScenarioTable):
