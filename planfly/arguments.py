@@ -189,6 +189,8 @@ def parse_position(keyword: str, coordinates: Sequence[float]) -> tuple[float, f
     world.errors.ArgumentError: station (46.0,): expected latitude -89..89 and longitude -180..180
     """
     try:
+        if isinstance(coordinates, str | bytes):
+            raise TypeError
         lat, lon = (float(value) for value in coordinates)
     except (TypeError, ValueError):
         lat = lon = math.nan

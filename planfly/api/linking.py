@@ -153,6 +153,7 @@ def link(
     station = options["station"]
     given = {name: value for name, value in options.items() if name in _ENTRIES}
     check_arguments(**given)
+    lat, lon = (None, None) if station is None else parse_position("station", station)
     if out is not None:
         check_output_folder(Path(out), overwrite)
     judged = judge(what, **select_log_and_mission_options(options))
@@ -160,7 +161,6 @@ def link(
         missing = next((name for name in _NEEDED if given[name] is None), None)
         if missing is not None:
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
-    lat, lon = (None, None) if station is None else parse_position("station", station)
     entries = {_ENTRIES[name]: value for name, value in given.items()}
     setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon))
     result = _judge_link(setup, judged.track)

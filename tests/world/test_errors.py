@@ -13,6 +13,7 @@ from world.errors import (
     ArgumentError,
     CrashError,
     FlightError,
+    ForecastError,
     LogError,
     MissingExtraError,
     MissionError,
@@ -23,7 +24,7 @@ from world.errors import (
     TerrainError,
 )
 
-KINDS = (ScenarioError, TerrainError, MissionError, FlightError, ParameterError, LogError)
+KINDS = (ScenarioError, TerrainError, ForecastError, MissionError, FlightError, ParameterError, LogError)
 
 
 def test_every_error_is_a_planfly_error() -> None:

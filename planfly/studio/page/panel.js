@@ -155,9 +155,9 @@ export class Panel {
       this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"),
       this.ask("battery", "How large a battery?", "24 flights with their returns; the reserve is kept in 95 of 100"),
       this.ask("ground_risk", "Whom does it fly over?", "12 flights: volumes by SORA 2.5"),
-      this.about.settings.forecast ? this.ask("window", "When can I take off?", "10 flights at each hour of the next 12 in the forecast") : null);
+      this.about?.settings.forecast ? this.ask("window", "When can I take off?", "10 flights at each hour of the next 12 in the forecast") : null);
     box.append(long);
-    for (const [job, title] of Object.entries(QUESTIONS)) if (this.answers[job]) box.append(this.result(title, this.answers[job]));
+    for (const [job, title] of Object.entries(QUESTIONS)) if (this.answers?.[job]) box.append(this.result(title, this.answers[job]));
     return undefined;
   }
 

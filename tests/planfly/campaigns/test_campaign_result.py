@@ -24,7 +24,7 @@ from planfly.campaigns.tables import CAMPAIGN_DATABASE, read_table
 from planfly.commands.registry import build_parser
 from tests.planfly.campaigns.made_report import made_report
 
-FLOWN = ("aircraft", "airspeed", "wind", "turbulence", "at", "params", "guidance", "autopilot", "nav")
+FLOWN = ("aircraft", "airspeed", "wind", "turbulence", "forecast", "at", "params", "guidance", "autopilot", "nav")
 FLOWN_BY = (
     "--wind 8.25,270 --turbulence light --nav rtk --aircraft aerosonde --airspeed 21.5 --fence a.fence --fence b.kml "
     "--autopilot px4"

@@ -71,12 +71,15 @@ def test_a_weaker_receiver_keeps_less_margin() -> None:
         ({**RADIO, "cable_loss": -1.0}, "cable_loss -1.0: expected a loss from 0 to 60 dB"),
         ({**RADIO, "max_outage": 3601.0}, "max_outage 3601.0: expected a time from 0 to 3,600 s"),
         ({**RADIO, "use": "smoke"}, "use smoke: expected telemetry, control"),
-        ({**RADIO, "station": (99.0, 0.0)}, r"lat_deg: 99\.0: allowed -89\.\.89"),
+        (
+            {**RADIO, "station": (99.0, 0.0)},
+            r"station \(99\.0, 0\.0\): expected latitude -89\.\.89 and longitude -180\.\.180",
+        ),
         (
             {**RADIO, "station": (1.0, 2.0, 3.0)},
-            r"station \(1\.0, 2\.0, 3\.0\): expected latitude and longitude, degrees",
+            r"station \(1\.0, 2\.0, 3\.0\): expected latitude -89\.\.89 and longitude -180\.\.180",
         ),
-        ({**RADIO, "station": "46"}, "station 46: expected latitude and longitude, degrees"),
+        ({**RADIO, "station": "46"}, "station 46: expected latitude -89"),
         ({**RADIO, "station": (0.0, 0.0)}, "the elevation file has no data there"),
     ],
 )

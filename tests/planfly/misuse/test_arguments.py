@@ -20,7 +20,7 @@ _PLACES = (36.27, -84.15), (36.33, -84.35)
 CALLS: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("plan", "plan_then_fly", "run", "make_scenario"), ("tight",)),
     **dict.fromkeys(("battery", "campaign", "check", "fly", "ground_risk", "judge", "link", "returns"), ("p.json",)),
-    **dict.fromkeys(("serve", "winds", "open_studio"), ("p.json",)),
+    **dict.fromkeys(("serve", "winds", "window", "open_studio"), ("p.json",)),
     "survey": ("m.waypoints",),
     "campaign_flight": ("p.json", 0, "campaign"),
     "export": ("m.waypoints", "m.plan"),
@@ -49,6 +49,7 @@ CALLS: dict[str, tuple[Any, ...]] = {
 }
 # Keywords that a call needs.
 KEYWORDS: dict[str, dict[str, Any]] = {
+    "window": {"earliest": "2026-05-01T06:00Z"},
     "identify_aircraft": {"mass": 2.0, "span": 2.0},
     "predict": {"aircraft": "aerosonde"},
 }
