@@ -110,6 +110,9 @@ def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
 # The tables of a scenario file: every default, every range, and every fault in one line with its key and value.
 
 
+CALM = {"speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0, "turbulence": "none", "seed": None, "forecast": None}
+
+
 def test_every_default() -> None:
     file = parse_scenario(SMALL, "small.toml")
     assert file.model_dump(exclude={"terrain", "area", "start", "destination"}) == {
@@ -159,14 +162,7 @@ def test_every_default() -> None:
             "motor_braking": False,
             "battery_wh": None,
         },
-        "wind": {
-            "speed_mps": 0.0,
-            "from_deg": 0.0,
-            "gradient": 0.0,
-            "turbulence": "none",
-            "seed": None,
-            "forecast": None,
-        },
+        "wind": CALM,
         "home": None,
         "launch": None,
         "landing": None,
