@@ -177,7 +177,7 @@ def test_the_coverage_has_the_margin_of_the_path_below_it(log: Path) -> None:
 
 
 def test_the_returns_from_an_outage_are_those_of_planfly_returns() -> None:
-    """Where ArduPlane returns without the link, each return is judged as `planfly returns` judges it."""
+    """Judge each of ArduPlane's returns without the link as `planfly returns` judges it."""
     flight = example_log()
     parameters = ArduPilotParameters.of_text("FS_GCS_ENABL 1\nFS_LONG_ACTN 1\n", "mine.param")
     origin = flight.setup.scenario.origin

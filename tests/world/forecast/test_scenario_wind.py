@@ -1,4 +1,4 @@
-"""Where and when a forecast covers a mission, and how its wind changes with its mean."""
+"""Coverage of a mission by a forecast in place and time, and the change of its wind with its mean."""
 
 import math
 from dataclasses import replace

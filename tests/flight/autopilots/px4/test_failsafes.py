@@ -1,4 +1,4 @@
-"""What ends a mission of PX4, by the values in its parameter reference."""
+"""Events that end a mission of PX4, by the values in its parameter reference."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where PX4 circled at a waypoint because of its altitude, and what its findings then state."""
+"""Waypoints at which PX4 circled because of its altitude, and the findings that name them."""
 
 import re
 from dataclasses import replace

@@ -29,7 +29,8 @@ from planfly.rtl.jsbsim_returns import fly_return
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from tests.soak import some
 
-HILL_M, BESIDE_M = 400.0, 372.0
+HILL_M = 400.0
+BESIDE_M = 372.0
 EVERY = 8.0
 BEHIND = mission_text(5000.0, 6500.0, amsl=200.0)
 
