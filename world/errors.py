@@ -3,6 +3,7 @@
     PlanflyError
     ├── ScenarioError   a scenario file or a planner option
     ├── TerrainError    an elevation file
+    ├── ForecastError   a weather forecast
     ├── MissionError    a plan or mission file
     ├── FlightError     an aircraft model or a start condition
     │   ├── StartError  a flight that cannot start as its mission states: `fly` reports a verdict

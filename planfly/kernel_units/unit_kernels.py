@@ -113,7 +113,6 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "logs.verdict.measures.route_progress._match_rows",
         "logs.verdict.measures.track_alignment._match_chords",
         "logs.verdict.measures.track_alignment.airspeed_gain_in_rising_air",
-        "world.forecast.wind_field._interpolate_points",
         "world.wind._mean_wind_speeds",
         "world.wind.mean_wind_speed",
     ),
