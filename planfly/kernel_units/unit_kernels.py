@@ -47,6 +47,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         *_PROBLEM_KERNELS,
         "aircraft.path_limits.arc_slope",
         "aircraft.path_limits.turn_tangents",
+        _CERTIFY_MODULE + "corner_excursions",
         _CERTIFY_MODULE + "heights_above_ground",
         _CERTIFY_MODULE + "leg_slope_limits",
         _CERTIFY_MODULE + "missile_distance",
