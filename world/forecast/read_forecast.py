@@ -116,8 +116,9 @@ def _call_library(path: Path, function: Callable[[], Any]) -> Any:
             return function()
     except Exception as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0][:150]
-    finally:
+        # They are closed here, not later with the hook of the caller. It takes 0.3 s in a large process.
         gc.collect()
+    finally:
         sys.unraisablehook = hook
     raise ForecastError(f"{path}: damaged or incomplete: {reason}", file=str(path))
 
