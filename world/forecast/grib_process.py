@@ -16,6 +16,11 @@ from world.forecast.forecast import Box, Forecast
 # Writes a pickled Forecast or ForecastError to standard output, to which no library prints.
 _PROGRAM = """
 import os, pickle, sys
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_DATA, (int(sys.argv[1]),) * 2)
+except (ImportError, ValueError):
+    pass  # Windows has no such limit, and the limit of a shell may be lower.
 answer = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)
 from world.errors import ForecastError
@@ -26,6 +31,9 @@ except ForecastError as error:
     found = error
 pickle.dump(found, answer)
 """
+# Limit of the process's memory, bytes: one changed byte in a message can ask eccodes for 16 GB.  A file of 2 million
+# places is read in less than 1 GB, message by message.
+_MEMORY_LIMIT_BYTES = 3 * 2**30
 # Time after which the process is ended, s.
 _TIMEOUT_S = 1800.0
 
@@ -37,7 +45,7 @@ def read_in_process(path: Path, box: Box, ground_amsl: float) -> Forecast:
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
         process = subprocess.run(
-            [sys.executable, "-c", _PROGRAM],
+            [sys.executable, "-c", _PROGRAM, str(_MEMORY_LIMIT_BYTES)],
             input=pickle.dumps((path, box, ground_amsl)),
             env=os.environ | {"PYTHONPATH": paths},
             capture_output=True,
