@@ -50,7 +50,6 @@ LONGER = {
     "planfly/campaigns/pictures.py:narrow_figure": 62,
     "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
     "planner/evaluation/threat_index.py:kill_density": 73,
-    "planner/evaluation/travel_cost.py:model_leg": 62,
     "planner/search/plan_path.py:plan_path": 67,
     "planner/search/replan.py:replan": 73,
     "planner/seeding/airspace_grids.py:_relax_airspace_stage": 62,

@@ -23,7 +23,6 @@ _EXPOSURE_COLUMN = 1
 _CLEARANCE_COLUMN = 2
 _TIME_COLUMN = 3
 _ENERGY_COLUMN = 4
-TIME_COST = LENGTH_COST._replace(length=0.0, time=1.0)
 
 
 class Value(IntEnum):
@@ -43,8 +42,9 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
     paths: (n, w, 3) m.
     """
     out = np.zeros((len(paths), len(Value)))
-    energy_cost = TIME_COST if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
-    _fill_values(data, TIME_COST, energy_cost, np.ascontiguousarray(paths), out)
+    time_cost = LENGTH_COST._replace(length=0.0, time=1.0, winds=data.travel.winds)
+    energy_cost = time_cost if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
+    _fill_values(data, time_cost, energy_cost, np.ascontiguousarray(paths), out)
     if energy is None:
         out[:, Value.ENERGY] = np.nan
     return out

@@ -16,7 +16,7 @@ from aircraft.tracking import zero_tracking_error
 from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
-from planner.evaluation.travel_cost import LENGTH_COST, TravelCost
+from planner.evaluation.travel_cost import LENGTH_COST, TravelCost, make_wind_grid
 from planner.plan import Objective, Violation
 from world.arrays import Floats, Heights
 from world.by_reference import by_reference
@@ -392,7 +392,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
             _zone_margins(scenario, CERTIFIED_ZONE_MARGIN_M, vertical_zone_margin, end_fraction),
             vertical + limits.reserve_above,
         ),
-        travel=LENGTH_COST,
+        travel=LENGTH_COST._replace(winds=make_wind_grid(scenario, aircraft)),
     )
     return _shrink_area(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 

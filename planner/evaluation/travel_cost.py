@@ -1,4 +1,4 @@
-"""Cost of a leg: its length, its time in the mean wind, or the energy of its flight.
+"""Cost of a leg: its length, its time in the wind, or the energy of its flight.
 
 A leg d that is flown at true airspeed V in the wind w takes the time T with |d - w T| = V T. This is the wind triangle
 in three dimensions, whose larger part is horizontal (Zermelo's problem in a steady wind, "Über das Navigationsproblem
@@ -8,6 +8,9 @@ height, so a leg is integrated by Simpson's rule over its two ends and its middl
 
 In a uniform wind a straight line takes the least time, and T is a norm of d plus a term that is the same for all paths
 to a destination. Then only the direction of a detour matters, by at most V / sqrt(V^2 - w^2).
+
+In a forecast the wind also changes with place and time, so that a detour can pay. The wind at a place is that of the
+time at which a straight flight to the destination has flown as far as the place is from the start.
 """
 
 import math
@@ -21,11 +24,16 @@ from aircraft.path_limits import PerformanceTable, downwind_vector, true_airspee
 from world.arrays import Floats
 from world.by_reference import by_reference
 from world.kernels import compiled, inner
+from world.scenario import Scenario
 
 # The third coordinate.
 UP_AXIS = 2
 # Half-step of the finite difference in height, m.
 HEIGHT_STEP_M = 2.0
+# Half-step of the finite difference east and north in a forecast's wind, m.
+HORIZONTAL_STEP_M = 25.0
+# Numbers of places east, north and up at which the wind of a forecast is taken.
+WIND_GRID_SHAPE = (33, 33, 17)
 # Ground speed assumed on a leg that is not flyable, as a fraction of the airspeed, so that a search avoids it.
 UNFLYABLE_SPEED_RATIO = 0.01
 # Fractions of a leg for Simpson's rule.
@@ -34,9 +42,22 @@ _SIMPSON_FRACTIONS = (0.0, 0.5, 1.0)
 _SIMPSON_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
+class WindGrid(NamedTuple):
+    """Wind at the places of a regular grid, each at the time at which a plan passes there.
+
+    first: the grid's first place, world m, (3,).
+    step: distances between its places, m, (3,).
+    velocities: m/s, east and north, (x, y, z, 2); without places if the wind is that of the performance table.
+    """
+
+    first: Floats
+    step: Floats
+    velocities: NDArray[np.float64]
+
+
 @by_reference
 class TravelCost(NamedTuple):
-    """Weights of length, time and energy in a path's cost, and the power at each height.
+    """Weights of length, time and energy in a path's cost, the power at each height, and the wind of a forecast.
 
     length: cost per metre of path.
     time: cost per second.
@@ -44,6 +65,7 @@ class TravelCost(NamedTuple):
     level, linear, square: (h,) coefficients of the power (W) at the heights of the performance table and at its
         airspeed: level + linear x + square x^2, where x is the sine of the climb angle to the air.
     min_sine, max_sine: (h,) bounds of x, beyond which power is constant: idle and full throttle.
+    winds: wind of a forecast.
     """
 
     length: float
@@ -54,16 +76,51 @@ class TravelCost(NamedTuple):
     square: Floats
     min_sine: Floats
     max_sine: Floats
+    winds: WindGrid
 
 
 Objective = Literal["length", "time", "energy"]
 _EMPTY_TABLE = np.zeros(0)
 _EMPTY_TABLE.setflags(write=False)
+_NO_VELOCITIES = np.zeros((0, 0, 0, 2))
+_NO_VELOCITIES.setflags(write=False)
+# No wind but that of the performance table.
+NO_WINDS = WindGrid(_EMPTY_TABLE, _EMPTY_TABLE, _NO_VELOCITIES)
 # Cost of a search for the shortest path.
-LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE)
+LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE, NO_WINDS)
 
 
-def make_travel_cost(objective: Objective, envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
+def make_wind_grid(scenario: Scenario, table: PerformanceTable) -> WindGrid:
+    """Return the wind of a scenario's forecast over its map; `NO_WINDS` without a forecast.
+
+    table: performance of the aircraft in the mean wind.
+    """
+    if scenario.wind.field is None:
+        return NO_WINDS
+    (west, east), (south, north) = scenario.bounds.tolist()
+    axes = [
+        np.linspace(low, max(high, low + 1.0), count)
+        for low, high, count in zip(
+            (west, south, float(scenario.floor)), (east, north, float(scenario.ceiling)), WIND_GRID_SHAPE, strict=True
+        )
+    ]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    ends = np.stack([scenario.start, scenario.destination])
+    straight_m = path_cost(LENGTH_COST, table, ends)
+    straight_s = path_cost(LENGTH_COST._replace(length=0.0, time=1.0), table, ends)
+    ground_speed = straight_m / straight_s if 0.0 < straight_s < math.inf else table.airspeed
+    distances = np.hypot(places[..., 0] - scenario.start[0], places[..., 1] - scenario.start[1])
+    velocities = scenario.wind_velocities(places.reshape(-1, 3), distances.ravel() / ground_speed)
+    first, step = np.array([axis[0] for axis in axes]), np.array([axis[1] - axis[0] for axis in axes])
+    grid = WindGrid(first, step, velocities.reshape(*WIND_GRID_SHAPE, 2))
+    for array in grid:
+        array.setflags(write=False)
+    return grid
+
+
+def make_travel_cost(
+    objective: Objective, envelope: Envelope, table: PerformanceTable, winds: WindGrid = NO_WINDS
+) -> TravelCost | None:
     """Make the cost function of an objective, in equivalent metres.
 
     The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
@@ -77,15 +134,15 @@ def make_travel_cost(objective: Objective, envelope: Envelope, table: Performanc
     """
     if objective == "length":
         return LENGTH_COST
-    return make_time_cost(table) if objective == "time" else make_energy_cost(envelope, table)
+    return make_time_cost(table, winds) if objective == "time" else make_energy_cost(envelope, table, winds)
 
 
-def make_time_cost(table: PerformanceTable) -> TravelCost:
+def make_time_cost(table: PerformanceTable, winds: WindGrid = NO_WINDS) -> TravelCost:
     """Return the cost of a path's time, in m of level flight in still air."""
-    return LENGTH_COST._replace(length=0.0, time=float(table.airspeed))
+    return LENGTH_COST._replace(length=0.0, time=float(table.airspeed), winds=winds)
 
 
-def make_energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
+def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGrid = NO_WINDS) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air; None if power is unknown.
 
     Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full throttle.
@@ -98,7 +155,8 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost 
     columns = [np.interp(table.amsl, table.amsl[is_known], rows[is_known, k]) for k in range(5)]
     for column in columns:
         column.setflags(write=False)
-    return TravelCost(0.0, 0.0, float(table.airspeed / columns[0][0]), *columns)
+    level, linear, square, min_sine, max_sine = columns
+    return TravelCost(0.0, 0.0, float(table.airspeed / level[0]), level, linear, square, min_sine, max_sine, winds)
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
@@ -159,10 +217,11 @@ def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: floa
 
 
 class _FlightConditions(NamedTuple):
-    """Airspeed (m/s) and power coefficients at a height; see `TravelCost`."""
+    """Airspeed (m/s), wind (m/s) and power coefficients at a place; see `TravelCost`."""
 
     airspeed: float
-    wind: float
+    wind_east: float
+    wind_north: float
     level: float
     linear: float
     square: float
@@ -171,11 +230,35 @@ class _FlightConditions(NamedTuple):
 
 
 @inner
-def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: float) -> _FlightConditions:
-    """Return the airspeed, the wind speed and the power coefficients at an altitude, m AMSL."""
-    airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
+def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the wind of a grid at a place, m/s, east and north, trilinear; beyond the grid, that at its edge."""
+    velocities = winds.velocities
+    place_x = min(velocities.shape[0] - 1.0, max(0.0, (x - winds.first[0]) / winds.step[0]))
+    place_y = min(velocities.shape[1] - 1.0, max(0.0, (y - winds.first[1]) / winds.step[1]))
+    place_z = min(velocities.shape[2] - 1.0, max(0.0, (z - winds.first[2]) / winds.step[2]))
+    i = min(velocities.shape[0] - 2, int(place_x))
+    j = min(velocities.shape[1] - 2, int(place_y))
+    k = min(velocities.shape[2] - 2, int(place_z))
+    east, north = 0.0, 0.0
+    for corner in range(8):
+        a, b, c = corner & 1, corner >> 1 & 1, corner >> 2
+        weight = abs(1 - a - place_x + i) * abs(1 - b - place_y + j) * abs(1 - c - place_z + k)
+        east += weight * velocities[i + a, j + b, k + c, 0]
+        north += weight * velocities[i + a, j + b, k + c, 1]
+    return east, north
+
+
+@inner
+def _conditions_at(travel: TravelCost, table: PerformanceTable, x: float, y: float, amsl: float) -> _FlightConditions:
+    """Return the airspeed, the wind and the power coefficients at a place, world m and m AMSL."""
+    airspeed = true_airspeed(table, amsl)
+    if travel.winds.velocities.size == 0:
+        (wx, wy), wind_speed = downwind_vector(table), wind_speed_at(table, amsl)
+        wind_east, wind_north = wind_speed * wx, wind_speed * wy
+    else:
+        wind_east, wind_north = _interpolate_wind(travel.winds, x, y, amsl)
     if travel.energy == 0.0:
-        return _FlightConditions(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
+        return _FlightConditions(airspeed, wind_east, wind_north, 0.0, 0.0, 0.0, -1.0, 1.0)
     count, row = table.amsl.size, 0
     while row + 2 < count and table.amsl[row + 1] <= amsl:
         row += 1
@@ -185,7 +268,8 @@ def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: f
     next_row = min(row + 1, count - 1)
     return _FlightConditions(
         airspeed,
-        wind,
+        wind_east,
+        wind_north,
         travel.level[row] + fraction * (travel.level[next_row] - travel.level[row]),
         travel.linear[row] + fraction * (travel.linear[next_row] - travel.linear[row]),
         travel.square[row] + fraction * (travel.square[next_row] - travel.square[row]),
@@ -196,11 +280,17 @@ def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: f
 
 @inner
 def _time_energy_cost(
-    travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
+    travel: TravelCost,
+    table: PerformanceTable,
+    leg: tuple[float, float, float],
+    x: float,
+    y: float,
+    amsl: float,
 ) -> tuple[float, bool]:
-    """Return the cost of time and energy of a leg at one altitude, and True if the leg is flyable."""
-    conditions, (wx, wy) = _conditions_at_altitude(travel, table, amsl), downwind_vector(table)
-    time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
+    """Return the cost of time and energy of a leg in the wind of one place, and True if the leg is flyable."""
+    dx, dy, dz = leg
+    conditions = _conditions_at(travel, table, x, y, amsl)
+    time = leg_time(dx, dy, dz, conditions.wind_east, conditions.wind_north, conditions.airspeed)
     cost = travel.time * time.seconds
     if travel.energy != 0.0:
         sine = min(conditions.max_sine, max(conditions.min_sine, dz / (conditions.airspeed * time.seconds)))
@@ -220,7 +310,9 @@ def leg_cost(
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for point in range(3):
-        timed_cost, is_flyable = _time_energy_cost(travel, table, dx, dy, dz, start[2] + _SIMPSON_FRACTIONS[point] * dz)
+        fraction = _SIMPSON_FRACTIONS[point]
+        x, y, amsl = start[0] + fraction * dx, start[1] + fraction * dy, start[2] + fraction * dz
+        timed_cost, is_flyable = _time_energy_cost(travel, table, (dx, dy, dz), x, y, amsl)
         if not is_flyable:
             return math.inf
         total += _SIMPSON_WEIGHTS[point] * timed_cost
@@ -261,7 +353,7 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
     slopes[:], curvature[:] = 0.0, 0.0
     dx, dy, dz = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
     length = max(1e-3, math.sqrt(dx * dx + dy * dy + dz * dz))
-    (wx, wy), step = downwind_vector(table), (dx, dy, dz)
+    step = (dx, dy, dz)
     step_curvature = np.empty((3, 3))
     _add_step_model(
         curvature,
@@ -276,9 +368,9 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
         return total
     for point in range(3):
         fraction, weight = _SIMPSON_FRACTIONS[point], _SIMPSON_WEIGHTS[point]
-        amsl = start[2] + fraction * dz
-        conditions = _conditions_at_altitude(travel, table, amsl)
-        time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
+        x, y, amsl = start[0] + fraction * dx, start[1] + fraction * dy, start[2] + fraction * dz
+        conditions = _conditions_at(travel, table, x, y, amsl)
+        time = leg_time(dx, dy, dz, conditions.wind_east, conditions.wind_north, conditions.airspeed)
         # The cost is time x rate, plus a cost per metre of climb.
         rate, climb_cost, power_curvature, timed_cost = travel.time, 0.0, 0.0, travel.time * time.seconds
         if travel.energy != 0.0:
@@ -296,23 +388,46 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
                 )
         total += weight * timed_cost
         gradient = (time.by_east, time.by_north, time.by_up)
-        _fill_time_curvature(step_curvature, time, conditions, wx, wy)
+        _fill_time_curvature(step_curvature, time, conditions)
         step_curvature[UP_AXIS, UP_AXIS] += power_curvature / max(1e-9, rate)
         _add_step_model(curvature, slopes, step_curvature, weight * rate, gradient, weight * rate)
         slopes[0, UP_AXIS] -= weight * climb_cost
         slopes[1, UP_AXIS] += weight * climb_cost
-        cost_above, _ = _time_energy_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP_M)
-        cost_below, _ = _time_energy_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP_M)
-        height_slope = weight * (cost_above - cost_below) / (2.0 * HEIGHT_STEP_M)
-        height_curvature = weight * max(0.0, cost_above - 2.0 * timed_cost + cost_below) / HEIGHT_STEP_M**2
+        _add_place_model(travel, table, start, step, fraction, weight, timed_cost, model)
+    return total
+
+
+@inner
+def _add_place_model(
+    travel: TravelCost,
+    table: PerformanceTable,
+    start: Floats,
+    step: tuple[float, float, float],
+    fraction: float,
+    weight: float,
+    timed_cost: float,
+    model: LegModel,
+) -> None:
+    """Add the slopes and the curvature of a leg's cost by the place at which its wind and power are taken.
+
+    start, step: start of the leg, and the leg, m.
+    fraction: the place's fraction of the leg.
+    weight, timed_cost: the place's weight in the cost of the leg, and the leg's cost of time and energy there.
+    """
+    x, y, amsl = start[0] + fraction * step[0], start[1] + fraction * step[1], start[2] + fraction * step[2]
+    # A forecast changes wind on each axis, the mean profile only with altitude.
+    for axis in range(UP_AXIS if travel.winds.velocities.size == 0 else 0, 3):
+        shift = HEIGHT_STEP_M if axis == UP_AXIS else HORIZONTAL_STEP_M
+        east_step, north_step, up_step = shift * (axis == 0), shift * (axis == 1), shift * (axis == UP_AXIS)
+        cost_above, _ = _time_energy_cost(travel, table, step, x + east_step, y + north_step, amsl + up_step)
+        cost_below, _ = _time_energy_cost(travel, table, step, x - east_step, y - north_step, amsl - up_step)
+        slope = weight * (cost_above - cost_below) / (2.0 * shift)
+        curvature = weight * max(0.0, cost_above - 2.0 * timed_cost + cost_below) / shift**2
         end_weights = (1.0 - fraction, fraction)
         for end in range(2):
-            slopes[end, UP_AXIS] += end_weights[end] * height_slope
+            model.slopes[end, axis] += end_weights[end] * slope
             for other_end in range(2):
-                curvature[end, UP_AXIS, other_end, UP_AXIS] += (
-                    height_curvature * end_weights[end] * end_weights[other_end]
-                )
-    return total
+                model.curvature[end, axis, other_end, axis] += curvature * end_weights[end] * end_weights[other_end]
 
 
 @inner
@@ -327,14 +442,14 @@ def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, floa
 
 
 @inner
-def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions, wx: float, wy: float) -> None:
+def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions) -> None:
     """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D.
 
     Here g is the gradient of the time, w the wind, V the airspeed and D as in `leg_time`.
     """
-    wind = (conditions.wind * wx, conditions.wind * wy, 0.0)
+    wind = (conditions.wind_east, conditions.wind_north, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)
-    speed2_difference = conditions.airspeed**2 - conditions.wind**2
+    speed2_difference = conditions.airspeed**2 - conditions.wind_east**2 - conditions.wind_north**2
     for axis in range(3):
         for other_axis in range(3):
             element = 1.0 if axis == other_axis else 0.0

@@ -114,7 +114,9 @@ def _call_paper_scores(task: _Task) -> None:
 def _call_front(task: _Task) -> None:
     """Call the kernels that value paths for a front, and those that select rows by hypervolume."""
     data = task.problem.search
-    front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
+    front_values(
+        data, make_energy_cost(task.problem.limits.envelope, data.aircraft, data.travel.winds), task.path[None]
+    )
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)
 
 

@@ -272,9 +272,10 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     algorithm = find_algorithm(None, scenario.name)
     problem = make_problem(scenario, limits_for(algorithm, limits))
     aircraft = problem.search.aircraft
-    energy = make_energy_cost(limits.envelope, aircraft)
+    winds = problem.search.travel.winds
+    energy = make_energy_cost(limits.envelope, aircraft, winds)
     by_energy = energy is not None and scenario.planner.objective != "time"
-    travel = energy if energy is not None and by_energy else make_time_cost(aircraft)
+    travel = energy if energy is not None and by_energy else make_time_cost(aircraft, winds)
     frame = rotated_frame(problem.space.start, problem.space.destination)
     scored = _with_margins(problem, MARGIN_FRACTIONS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)

@@ -60,7 +60,7 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
     Raises ScenarioError for energy if the power is unknown.
     """
     objective = scenario.planner.objective or "length"
-    travel_cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
+    travel_cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft, problem.search.travel.winds)
     if travel_cost is None:
         allowed = 'the power of this aircraft is unknown; "length" and "time" can be planned for'
         raise ScenarioError.at(scenario.name, "planner.objective", objective, allowed)

@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.path_limits import PerformanceTable
 from planfly.workflow.airframe import load_airframe
-from planner.evaluation.travel_cost import LENGTH_COST, TravelCost, make_travel_cost, path_cost
+from planner.evaluation.travel_cost import LENGTH_COST, TravelCost, WindGrid, make_travel_cost, path_cost
 from tests.setups import falling_envelope
 from world.scenario import load_scenario
 
@@ -64,6 +64,20 @@ def test_a_climb_through_a_shear_takes_what_a_fine_sum_says() -> None:
     want = math.hypot(length, rise) * float(np.mean(1.0 / speeds))
     found = cost([0.0, length, 100.0 + rise], table(wind=5.0, gradient=0.02))
     assert found == pytest.approx(want, rel=1e-4)
+
+
+def test_a_leg_through_a_tailwind_that_rises_along_it_takes_the_integral_of_its_speed() -> None:
+    """dt = dx / (25 + x / 100) from 0 to 1,000 m: 100 ln(35 / 25), which Simpson's rule meets within 1.1e-4."""
+    velocities = np.zeros((2, 2, 2, 2))
+    velocities[1, ..., 0] = 20.0
+    winds = WindGrid(np.array([0.0, -500.0, 0.0]), np.array([2000.0, 1000.0, 500.0]), velocities)
+    for array in winds:
+        array.setflags(write=False)
+    found = cost([1000.0, 0.0, 100.0], table(wind=9.0), SECONDS._replace(winds=winds))
+    assert found == pytest.approx(100.0 * math.log(1.4), rel=1.2e-4)
+    # Beyond the grid, the wind at its edge: 20 m/s.
+    beyond = np.array([[2500.0, 0.0, 100.0], [4750.0, 0.0, 100.0]])
+    assert path_cost(SECONDS._replace(winds=winds), table(), beyond) == pytest.approx(2250.0 / 45.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("climb", [-0.02, 0.0, 0.05])

@@ -9,7 +9,7 @@ from aircraft.tracking import zero_tracking_error
 from benchmarks.task import make_task
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import ProblemArrays, make_problem
-from planner.evaluation.travel_cost import make_travel_cost, path_cost
+from planner.evaluation.travel_cost import NO_WINDS, WindGrid, make_travel_cost, path_cost
 from planner.seeding.flown_corners import SAMPLES_PER_CORNER
 from planner.seeding.shortening import resample
 from planner.seeding.shortening_model import (
@@ -23,6 +23,16 @@ from planner.seeding.shortening_model import (
     lagrangian,
 )
 from world.scenario import load_scenario
+
+
+def linear_winds() -> WindGrid:
+    """Return a grid of winds that are linear in place, up to 8 m/s, in an area of 60 km by 60 km by 6 km."""
+    x, y, z = np.meshgrid(*(np.linspace(-1.0, 1.0, 3) for _ in range(3)), indexing="ij")
+    velocities = np.stack([4.0 * x - 2.0 * y + 2.0 * z, 3.0 * y - x + z], axis=-1)
+    winds = WindGrid(np.array([-3e4, -3e4, -2000.0]), np.array([3e4, 3e4, 3000.0]), velocities)
+    for array in winds:
+        array.setflags(write=False)
+    return winds
 
 
 def bound_of(north: float = 0.0) -> tuple[np.ndarray, ActiveConstraints]:
@@ -172,12 +182,16 @@ def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
     np.testing.assert_allclose(whole, np.array(columns).T, atol=1e-6)
 
 
+@pytest.mark.parametrize("is_forecast", [False, True])
 @pytest.mark.parametrize("objective", ["time", "energy"])
-def test_the_gradient_of_time_and_energy_is_that_of_their_values(objective: Literal["time", "energy"]) -> None:
+def test_the_gradient_of_time_and_energy_is_that_of_their_values(
+    objective: Literal["time", "energy"], is_forecast: bool
+) -> None:
     task = make_task("jacksboro-air")
     problem = make_problem(task.scenario, task.airframe.limits)
     shear = problem.search.aircraft._replace(wind_speed=9.0, wind_gradient=0.005)
-    travel = make_travel_cost(objective, task.airframe.limits.envelope, shear)
+    winds = linear_winds() if is_forecast else NO_WINDS
+    travel = make_travel_cost(objective, task.airframe.limits.envelope, shear, winds)
     assert travel is not None
     data = problem.search._replace(travel=travel, aircraft=shear, max_turn=9.0, legs_hold_turns=False)
     path, limits = zigzag(data, 0.1, 6), precompute_limits(data)
