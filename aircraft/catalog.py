@@ -351,7 +351,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     elif target.exists() or target.is_symlink():
         raise FlightError(f"{folder}: exists; overwrite=True replaces it, or name another folder", file=folder)
     if not target.parent.is_dir():
-        raise FlightError(f"{folder}: the parent folder {target.parent} does not exist", file=folder)
+        raise FlightError(f"{folder}: its parent folder '{target.parent}' does not exist", file=folder)
     return target
 
 

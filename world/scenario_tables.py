@@ -483,10 +483,10 @@ class FlightTable(ScenarioTable):
     def _check_autopilot(self) -> "FlightTable":
         autopilot = self.steering.autopilot
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
-            raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
+            raise ValueError(f'guidance: not allowed with autopilot = "{autopilot}", only with "planfly"')
         if self.params is not None and autopilot == OWN_GUIDANCE:
             raise ValueError(
-                'params: not a key of autopilot = "planfly", which guidance selects if no autopilot is named'
+                'params: not allowed with autopilot = "planfly", which guidance selects if no autopilot is named'
             )
         if self.arduplane_version is not None and autopilot != _ARDUPILOT:
             raise ValueError(f'arduplane_version: only a key of autopilot = "ardupilot", not of "{autopilot}"')

@@ -98,7 +98,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     if folder.is_dir():
         check_output_file(file, overwrite)
     elif not folder.absolute().parent.is_dir():
-        raise PlanflyError(f"{folder}: the parent folder {folder.parent} does not exist", file=folder)
+        raise PlanflyError(f"{folder}: its parent folder '{folder.parent}' does not exist", file=folder)
     return file
 
 

@@ -362,7 +362,7 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     """
     scenario, aircraft = base.scenario, base.airframe.aircraft
     if scenario.terrain is None:
-        message = f"{base.name}: heights above ground need an elevation file: name a terrain"
+        message = f"{base.name}: the heights above ground need terrain: name an elevation file (--terrain)"
         raise ScenarioError(message, file=base.name, field="terrain")
     path = nominal_path(base)
     if goal.population is not None:

@@ -129,8 +129,8 @@ def add_time_option(group: OptionGroup) -> None:
         "--at",
         metavar="TIME",
         help=(
-            "time of the flight, START or START/END in ISO 8601 format, as in 2026-05-01T10:00+02:00: zones "
-            "that are not active then are ignored, and a forecast begins there (default: all zones are active)"
+            "time of the flight, START or START/END in ISO 8601 format, as in 2026-05-01T10:00+02:00: zones that are "
+            "inactive at that time are ignored, and a forecast is read from START on (default: all zones are active)"
         ),
     )
 
@@ -169,8 +169,8 @@ def add_forecast_option(group: OptionGroup) -> None:
     option = group.add_argument(
         "--forecast",
         metavar="FILE",
-        help="weather forecast (NetCDF, GRIB, or the JSON of Open-Meteo) that states the wind in time, height and "
-        "place; --at states the take-off (NetCDF requires planfly[forecast], GRIB planfly[grib])",
+        help="weather forecast (NetCDF, GRIB, or JSON from Open-Meteo) that gives the wind by time, height and place; "
+        "--at gives the time of take-off (NetCDF requires planfly[forecast], GRIB planfly[grib])",
     )
     with_completer(option, file_completer("nc", "nc4", "grib", "grib2", "grb2", "json"))
 
@@ -198,9 +198,8 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         "--autopilot",
         choices=CHOICES["autopilot"],
         help=(
-            "simulated autopilot: ArduPlane (ardupilot, the default: the release that saved the parameter file, or the "
-            "newest; ardupilot-4.6, ardupilot-4.7), PX4 for fixed wing (px4, its release likewise; px4-1.16, px4-1.17) "
-            "or planfly's own guidance (planfly)"
+            "simulated autopilot: ardupilot (the default) is ArduPlane, px4 is PX4 for fixed wing, planfly is planfly's "
+            "own guidance; a name without a number takes the release that saved the parameter file, otherwise the newest"
         ),
     )
     group.add_argument(

@@ -245,8 +245,8 @@ def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
         raise ForecastError.at(
             file,
             "time",
-            f"a flight of {duration / 60.0:.0f} minutes from {facts.departure:%Y-%m-%d %H:%M} UTC",
-            f"the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
+            f"{facts.departure:%Y-%m-%d %H:%M} UTC",
+            f"the flight takes {duration / 60.0:.1f} min, but the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
         )
 
 

@@ -603,7 +603,7 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
         if math.isnan(slope):
             return "the terrain of the strip is unknown towards its ends"
         if abs(slope) > STEEPEST_STRIP_SLOPE:
-            course_text = f"on {round(math.degrees(course)) % 360}°"
+            course_text = f"on a course of {round(math.degrees(course)) % 360}°"
             return (
                 f"the strip slopes by {abs(slope):.0%} {direction} it {course_text};"
                 f" at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
@@ -634,7 +634,7 @@ def _find_finals(
             flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
             best_rejected = max(
                 best_rejected,
-                (-1e6, f"a glide of {flown_deg:.1f}° is steeper than the {max_deg:.1f}° that can be flown there"),
+                (-1e6, f"the approach needs a glide of {flown_deg:.1f}°, and the aircraft can fly at most {max_deg:.1f}° there"),
             )
             continue
         final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)

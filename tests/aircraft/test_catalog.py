@@ -222,7 +222,7 @@ def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
     ("folder", "said"),
     [
         ("there", "there: exists; overwrite=True replaces it, or name another folder"),
-        ("nowhere/mine", "the parent folder .*nowhere does not exist"),
+        ("nowhere/mine", "its parent folder '.*nowhere' does not exist"),
         ("my plane", "expected a folder name of letters, digits"),
         ("gains", "other than ardupilot, draws, gains, posterior, uncertainty, README"),
         ("link", "link: exists"),

@@ -123,7 +123,9 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
     if not refused_items or setup.autopilot.checks.dialect != "ardupilot":
         return []
     more_text = f" (+{len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
-    fault = message(f"unsupported command {command_name(refused_items[0].command)}", f"; PX4 accepts it{more_text}")
+    fault = message(
+        f"ArduPlane does not support {command_name(refused_items[0].command)}", f"{more_text}; PX4 accepts it"
+    )
     return [
         make_finding(
             "mission",
@@ -239,8 +241,8 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
-        steepest_text = f"{max(map(abs, slopes)):.1%}, and at most {STEEPEST_STRIP_SLOPE:.0%} can be landed on"
-        reason = f"NAV_LAND: the ground there slopes by {steepest_text}, so the touchdown is not judged"
+        steepest_text = f"{max(map(abs, slopes)):.1%}: a touchdown is judged on up to {STEEPEST_STRIP_SLOPE:.0%} only"
+        reason = f"NAV_LAND: the ground there slopes by {steepest_text}"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
     texts = setup.autopilot.checks.describe_unsimulated_settings(_mission_parts(setup)) if setup.source is None else []
@@ -354,7 +356,7 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
             arduplane_accepts = support.arduplane != Treatment.REFUSED
             autopilot = "ArduPlane accepts it" if arduplane_accepts else "ArduPlane rejects it, too"
             autopilot = "ArduPlane skips it" if support.reason == SKIPPED_REASON else autopilot
-            yield REFUSED if arduplane_accepts else False, item.seq, f"unsupported command {name}; {autopilot}"
+            yield REFUSED if arduplane_accepts else False, item.seq, f"PX4 does not support {name}; {autopilot}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
                 REFUSED,

@@ -298,7 +298,7 @@ def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeas
     return message(
         f"flown with a radius of {radius:.0f} m, passing its waypoint at {measure.min_distance:.1f} m",
         f"; with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the radius is"
-        f" {min_radius:.0f} m, and the waypoint is passed at {min_distance:.1f} m",
+        f" {min_radius:.0f} m, and the waypoint is passed {min_distance:.1f} m away",
     )
 
 

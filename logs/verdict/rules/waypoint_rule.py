@@ -37,7 +37,7 @@ def waypoint_findings(
 def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
     condition, offset = acceptance_condition(requirements, i), float(requirements.fly_by_offset[i])
-    faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
+    faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
     elif not requirements.setup.autopilot.turns.follows_path:
@@ -46,7 +46,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
             message(
-                f"the arc of the {turn:.0f}° corner passes the waypoint at {offset:.0f} m",
+                f"the arc of the {turn:.0f}° corner passes the waypoint {offset:.0f} m away",
                 f" (radius {radius:.0f} m); the waypoint counts as reached within {condition.radius:.0f} m",
             )
         )
@@ -102,9 +102,9 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         if crossing_offset <= setup.corridor:
             ok = True
         side = "above" if height_error >= 0.0 else "below"
-        reason = f"passed at {distance:.1f} m, {abs(height_error):.1f} m {side} its altitude"
+        reason = f"passed {distance:.1f} m away horizontally, {abs(height_error):.1f} m {side} its altitude"
         if offset >= 1.0:
-            reason += f" (the fly-by path passes at {offset:.0f} m)"
+            reason += f" (the fly-by path passes {offset:.0f} m away)"
         if math.isfinite(crossing_offset):
             reason += f"; the line across the leg at the waypoint was crossed {crossing_offset:.0f} m to the side"
         if i > 0 and not aligned.passed[i]:

@@ -121,7 +121,7 @@ def test_a_law_of_guidance_and_a_real_autopilot_exclude_each_other(
     mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["fly", str(mission), "--sitl", str(write_fake(tmp_path)), "--guidance", "l1"]) == 2
-    assert 'guidance: not a key of autopilot = "ardupilot"' in capsys.readouterr().err
+    assert 'guidance: not allowed with autopilot = "ardupilot"' in capsys.readouterr().err
 
 
 def test_the_autopilots_log_is_not_written_over_another(

@@ -188,7 +188,7 @@ def test_what_lies_there_stays(here: Path, capsys: pytest.CaptureFixture[str]) -
         ("site", "site/site.toml: exists; --overwrite replaces it"),
         ("site/notes.txt", "site/notes.txt: expected a folder"),
         ("my.toml", "my.toml: expected a folder"),
-        ("no/site", "no/site: the parent folder no does not exist"),
+        ("no/site", "no/site: its parent folder 'no' does not exist"),
     ):
         assert main(["new", folder, *ends]) == 2
         assert said in capsys.readouterr().err

@@ -263,7 +263,7 @@ def test_a_loiter_takes_its_time(minutes: int, is_covered: bool, folder: Path) -
     if is_covered:
         assert planfly.judge("valley.waypoints", scenario="valley.toml", forecast=file, at=AT) is not None
     else:
-        with pytest.raises(planfly.ForecastError, match=r"time: a flight of 7\d minutes from 2026-05-01 06:00 UTC"):
+        with pytest.raises(planfly.ForecastError, match=r"time: 2026-05-01 06:00 UTC: the flight takes 7\d\.\d min"):
             planfly.judge("valley.waypoints", scenario="valley.toml", forecast=file, at=AT)
 
 

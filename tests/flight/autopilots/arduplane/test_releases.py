@@ -176,7 +176,7 @@ def test_a_file_of_47_that_46_flies_states_the_older_name(tmp_path: Path) -> Non
     file = tmp_path / "new.param"
     file.write_text("ALT_SLOPE_MIN 20\nAIRSPEED_CRUISE 20\n", encoding="utf-8")
     notes = choose_release("4.6", str(file)).notes
-    assert notes[1:] == (f"{file}: ALT_SLOPE_MIN is named GLIDE_SLOPE_MIN in ArduPlane 4.6",)
+    assert notes[1:] == (f"{file}: ALT_SLOPE_MIN is read as GLIDE_SLOPE_MIN, its name in ArduPlane 4.6",)
     # A name of the release that flies needs no note.
     assert choose_release("4.7", str(file)).notes == ()
 

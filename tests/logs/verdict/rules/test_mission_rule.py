@@ -46,14 +46,14 @@ REFUSED = {
         "checkMissionItemValidity",
         (*GOOD, "2 5000 0 0 0 0 0 0 0"),
         4,
-        "unsupported command NAV_FENCE_RETURN_POINT",
+        "ArduPlane does not support NAV_FENCE_RETURN_POINT",
     ),
     "spline": ("checkMissionItemValidity", (*GOOD, wp(1500, 0, command=82)), 4, "NAV_SPLINE_WAYPOINT"),
     "servo": (
         "checkMissionItemValidity",
         (*GOOD, "2 183 5 1500 0 0 0 0 0"),
         4,
-        "unsupported command DO_SET_SERVO; ArduPlane accepts it",
+        "PX4 does not support DO_SET_SERVO; ArduPlane accepts it",
     ),
     "takeoff-low": (
         "checkTakeoff",
