@@ -312,7 +312,8 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         raise _range_error("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
     if not sheet.burns_fuel and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
         max_energy = MAX_BATTERY / 3600.0
-        allowed = f"allowed up to {max_energy * sheet.mass:g} Wh for an aircraft of {sheet.mass:g} kg ({max_energy:g} Wh per kg)"
+        capacity = f"{max_energy * sheet.mass:g} Wh for an aircraft of {sheet.mass:g} kg ({max_energy:g} Wh per kg)"
+        allowed = f"allowed up to {capacity}"
         raise _range_error("battery", sheet.energy / 3600.0, allowed, "Wh")
     return sheet
 

@@ -697,7 +697,7 @@ class _ItineraryBuilder:
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.add_open_item(
-                f"{name} without a position, so that the autopilot takes the aircraft's own: not flown by planfly", item.seq
+                f"{name} without a position, so that the autopilot takes the aircraft's: not flown by planfly", item.seq
             )
             return
         if item.command == Command.NAV_WAYPOINT:

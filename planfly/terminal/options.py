@@ -198,8 +198,9 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         "--autopilot",
         choices=CHOICES["autopilot"],
         help=(
-            "simulated autopilot: ardupilot (the default) is ArduPlane, px4 is PX4 for fixed wing, planfly is planfly's "
-            "own guidance; a name without a number takes the release that saved the parameter file, otherwise the newest"
+            "simulated autopilot: ardupilot (the default) is ArduPlane, px4 is PX4 for fixed wing, planfly is "
+            "planfly's own guidance; a name without a number takes the release that saved the parameter file, "
+            "otherwise the newest"
         ),
     )
     group.add_argument(

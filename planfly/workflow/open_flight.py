@@ -246,7 +246,8 @@ def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
             file,
             "time",
             f"{facts.departure:%Y-%m-%d %H:%M} UTC",
-            f"the flight takes {duration / 60.0:.1f} min, but the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
+            f"the flight takes {duration / 60.0:.1f} min,"
+            f" but the forecast ends at {facts.last_time:%Y-%m-%d %H:%M} UTC",
         )
 
 

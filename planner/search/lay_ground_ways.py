@@ -632,10 +632,8 @@ def _find_finals(
         flown_slope = final_model.slope(height, length, tailwind, field_altitude)
         if flown_slope > max_slope:
             flown_deg, max_deg = math.degrees(math.atan(flown_slope)), math.degrees(math.atan(max_slope))
-            best_rejected = max(
-                best_rejected,
-                (-1e6, f"the approach needs a glide of {flown_deg:.1f}°, and the aircraft can fly at most {max_deg:.1f}° there"),
-            )
+            fault = f"the approach needs a glide of {flown_deg:.1f}°, and at most {max_deg:.1f}° can be flown there"
+            best_rejected = max(best_rejected, (-1e6, fault))
             continue
         final = _Final(course, length, height, _line_up_points(site, point, course, length, height), point)
         margin, obstacle = _check_final(site, final)

@@ -290,7 +290,10 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
         ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
         ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),
         # 300 Wh a kilogram of 2.1 kg.
-        ((*SIX, "--battery", "14.8V,631Wh"), "--battery 631 Wh: allowed up to 630 Wh for an aircraft of 2.1 kg (300 Wh per kg)"),
+        (
+            (*SIX, "--battery", "14.8V,631Wh"),
+            "--battery 631 Wh: allowed up to 630 Wh for an aircraft of 2.1 kg (300 Wh per kg)",
+        ),
         ((*SIX, "--prop", "12"), "--prop 12: expected diameter and pitch in inches, such as 12x6"),
         ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with mass"),
         # Given as nothing is given all the same.

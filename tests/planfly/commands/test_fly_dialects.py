@@ -32,7 +32,7 @@ NOT_FLYABLE = {"endless.waypoints": "energy", "qgc.waypoints": "mission"}
 OPEN = {
     "mission_planner.waypoints": "the take-off at waypoint 0 (item 1) is not judged",
     "qgc_takeoff.plan": "the take-off climbs 180 m in 800 m, 12.7°",
-    "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position, so that the autopilot takes the aircraft's own: not flown by planfly",
+    "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position, so that the autopilot takes the aircraft's: not flown",
 }
 # Over the terrain, which does not reach its home, also the return after the last item.
 OPEN_OVER_TERRAIN = OPEN | {"mavproxy.txt": "the return after the last item flies where the terrain is unknown"}

@@ -172,7 +172,10 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
     ),
     "the take-off at its end": (
         nc(lambda: winds(hours=(-3.0, -2.0, -1.0, 0.0))),
-        ("time: 2026-05-01 06:00 UTC: the flight takes ", " min, but the forecast ends at 2026-05-01 06:00 UTC",),
+        (
+            "time: 2026-05-01 06:00 UTC: the flight takes ",
+            " min, but the forecast ends at 2026-05-01 06:00 UTC",
+        ),
     ),
     "no level above the mission": (
         nc(lambda: winds(levels=(10.0, 50.0, 100.0, 150.0))),

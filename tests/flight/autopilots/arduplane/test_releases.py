@@ -23,7 +23,9 @@ def notes_of(text: str, file: Path, version: str) -> tuple[str, ...]:
         {"GLIDE_SLOPE_MIN": "ALT_SLOPE_MIN", "GLIDE_SLOPE_THR": "ALT_SLOPE_MAXHGT"} if version == "4.7" else {}
     )
     return tuple(
-        f"{file}: {old} is named {new} in ArduPlane {version}" for old, new in new_names.items() if old in text
+        f"{file}: {old} is read as {new}, its name in ArduPlane {version}"
+        for old, new in new_names.items()
+        if old in text
     )
 
 
@@ -168,7 +170,7 @@ def test_every_renamed_parameter_is_read_or_not_used_and_named_in_one_line(tmp_p
         file.write_text(f"{old} 7\nWP_RADIUS 60\n", encoding="utf-8")
         (note,) = choose_release("4.7", str(file)).notes[1:]
         new = name_in_release(old, "4.7")
-        said = f"{old} is named {new} in ArduPlane 4.7" if old in read else f"not used: {old} ({new})"
+        said = f"{old} is read as {new}, its name in ArduPlane 4.7" if old in read else f"not used: {old} ({new})"
         assert note == f"{file}: {said}"
 
 
@@ -241,7 +243,7 @@ def test_every_parameter_of_a_release_is_read_or_said_not_to_be_used(
     renamed = {name for name in names if name_in_release(name, version) != name}
     notes = " ".join(choose_release(version, str(file)).notes)
     for name in renamed & TABLE.by_any_name.keys():
-        assert f"{name} is named {name_in_release(name, version)}" in notes
+        assert f"{name} is read as {name_in_release(name, version)}" in notes
     left = len(renamed - TABLE.by_any_name.keys())
     assert ("not used:" in notes) == (left > 0)
     assert (f"+{left - 1} more renamed" in notes) == (left > 1)
