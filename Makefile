@@ -97,7 +97,7 @@ newest: SET := --upgrade
 low newest: export PLANFLY_NEED_CLIENTS :=
 low newest:
 	$(PYTHON) -m venv build/$@
-	build/$@/bin/python -m pip install --quiet $(SET) --editable '.[campaigns,live,tables]' hypothesis pytest pytest-xdist trimesh
+	build/$@/bin/python -m pip install --quiet $(SET) --editable '.[campaigns,forecast,grib,live,tables]' hypothesis pytest pytest-xdist trimesh
 	@echo "tested with the $(if $(filter low,$@),lowest,newest) versions:"
 	@build/$@/bin/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
 	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(SPREAD) $(LOW)
