@@ -162,10 +162,8 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
     figures = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
-    if summary.sensitivities:
-        bars = [
-            Bar(QUANTITY_BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities
-        ]
+    if summary.drivers:
+        bars = [Bar(entry.title, entry.index, entry.slope) for entry in summary.drivers]
         figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the smallest margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)

@@ -187,6 +187,10 @@ class SensitivityEntry:
     quantity: str
     first_order: float | None
     rank_slope: float | None
+    p_value: float | None
+    """Probability of such a dependence by chance."""
+    shown: bool
+    """True if the index is distinguishable from zero, with all quantities considered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
