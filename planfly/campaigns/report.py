@@ -62,7 +62,7 @@ from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_atomically
-from world.wording import count_text, count_range_text
+from world.wording import count_range_text, count_text
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
 _MAX_DRAWN_FLIGHTS = 3000
