@@ -20,3 +20,20 @@ def count_range_text(counts: Sequence[int], noun: str) -> str:
     """
     lowest, highest = min(counts), max(counts)
     return count_text(highest, noun) if lowest == highest else f"{lowest} to {count_text(highest, noun)}"
+
+
+def is_one_edit(first: str, second: str) -> bool:
+    """Return True if two words differ by one letter, missing, added or other, or by two swapped neighbours.
+
+    >>> [is_one_edit("WP_RADUIS", word) for word in ("WP_RADIUS", "WP_RADUI", "WP_RADUIX", "RTL_RADIUS", "WP_RADUIS2")]
+    [True, True, True, False, False]
+    """
+    for _ in range(2):
+        start = next(
+            (k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second))
+        )
+        # What is left differs at its beginning; reversed, at its end.
+        first, second = first[start:][::-1], second[start:][::-1]
+    if not (first + second).replace("_", "").isalpha():
+        return False
+    return max(len(first), len(second)) == 1 or (len(first) == 2 and first == second[::-1])
