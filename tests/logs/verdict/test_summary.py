@@ -108,7 +108,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
 
 
 def test_a_name_one_letter_from_a_parameter_has_its_own_note() -> None:
-    """Swapped, missing and wrong letters are misspelled; other batteries and gains, and names beside theirs, are not."""
+    """Swapped, missing and wrong letters are misspelled; other batteries and gains and names beside theirs are not."""
     setup = make_setup(((0.0, 0.0, 100.0), (900.0, 0.0, 100.0)))
 
     def misspelled(text: str, is_flown: bool = True) -> list[str]:
