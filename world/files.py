@@ -234,8 +234,10 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
         raise error(f"{path}:{line}: not a text file in UTF-8 (byte {problem.start})", file=path) from problem
 
 
-def did_you_mean(name: str, known_names: Iterable[str]) -> str:
+def did_you_mean(name: str, known_names: Iterable[str], folder: Path | None = None) -> str:
     """Return the end of a message about an unknown name: the most similar known name, or "".
+
+    folder: folder of files with these names, for the message.
 
     >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
     (": did you mean 'jacksboro'?", '')
@@ -249,7 +251,10 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     # A key without its unit is meant more likely than a key of similar letters.
     matches = [candidate for candidate in names_by_folded_name if candidate.startswith(f"{name.casefold()}_")]
     matches = matches or get_close_matches(name.casefold(), names_by_folded_name, n=1)
-    return f": did you mean {names_by_folded_name[matches[0]]!r}?" if matches else ""
+    if not matches:
+        return ""
+    match = names_by_folded_name[matches[0]]
+    return f": did you mean {match if folder is None else str(folder / match)!r}?"
 
 
 # ----------------------------------------------------------------------

@@ -1,5 +1,7 @@
 """Phrase numbers in messages."""
 
+from collections.abc import Sequence
+
 
 def count_text(count: int, noun: str) -> str:
     """Return a number with its noun.
@@ -8,3 +10,30 @@ def count_text(count: int, noun: str) -> str:
     ('1 threat', '2 threats', '1,200 rows')
     """
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def count_range_text(counts: Sequence[int], noun: str) -> str:
+    """Return several counts of the same things as text.
+
+    >>> count_range_text([12, 6, 10], "flight"), count_range_text([1, 1], "flight")
+    ('6 to 12 flights', '1 flight')
+    """
+    lowest, highest = min(counts), max(counts)
+    return count_text(highest, noun) if lowest == highest else f"{lowest} to {count_text(highest, noun)}"
+
+
+def is_one_edit(first: str, second: str) -> bool:
+    """Return True if two words differ by one letter, missing, added or other, or by two swapped neighbours.
+
+    >>> [is_one_edit("WP_RADUIS", word) for word in ("WP_RADIUS", "WP_RADUI", "WP_RADUIX", "RTL_RADIUS", "WP_RADUIS2")]
+    [True, True, True, False, False]
+    """
+    for _ in range(2):
+        start = next(
+            (k for k, (a, b) in enumerate(zip(first, second, strict=False)) if a != b), min(len(first), len(second))
+        )
+        # What is left differs at its beginning; reversed, at its end.
+        first, second = first[start:][::-1], second[start:][::-1]
+    if not (first + second).replace("_", "").isalpha():
+        return False
+    return max(len(first), len(second)) == 1 or (len(first) == 2 and first == second[::-1])

@@ -6,6 +6,7 @@ from typing import get_args
 
 from flight.autopilots.autopilot import Origin
 from flight.autopilots.parameter_files import LONGEST_NAME
+from flight.autopilots.parameter_set import ParameterSet
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
 from logs.verdict.findings import (
@@ -21,10 +22,12 @@ from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
-from world.wording import count_text
+from world.wording import count_text, is_one_edit
 
 # Maximum number of failed findings that the first line names.
 _MAX_NAMED_FINDINGS = 4
+# Largest length of a part of a parameter's name that counts as short, letters.
+_LONGEST_SHORT_PART = 2
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
     "geometry": "By geometry only",
@@ -290,6 +293,29 @@ def _airframe_or_autopilot_lines(
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
+def _misspelling_lines(parameters: ParameterSet) -> list[str]:
+    """Return a line for each name of the parameter file that looks like a misspelled name of the autopilot's.
+
+    Names that differ by a digit, as BATT2_CAPACITY from BATT_CAPACITY, are other parameters; so is every name of a file
+    that also has the similar name.
+    """
+    known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
+
+    def is_meant(name: str, known: str) -> bool:
+        """Return True if a known name is meant; short parts such as P and D of gains are never misspelled."""
+        parts = set(name.split("_")) ^ set(known.split("_"))
+        is_stated = known_names[known][0].name in stated_names
+        return not is_stated and is_one_edit(name, known) and min(map(len, parts)) > _LONGEST_SHORT_PART
+
+    lines = []
+    for name in parameters.unused:
+        meant_name = next((known for known in known_names if is_meant(name, known)), "")
+        if meant_name and name not in known_names:
+            title = parameters.table.title
+            lines.append(f"Not a parameter of the simulated {title}: {name}: did you mean {meant_name}?")
+    return lines[:_MAX_NAMED_FINDINGS]
+
+
 def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     """Return lines on the sources of the parameters, on names without an effect, and on contradictions.
 
@@ -298,9 +324,10 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
         return []
-    contradictions = (
-        [f"Parameters that do not fit: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []
-    )
+    contradictions = [
+        *(_misspelling_lines(parameters) if isinstance(parameters, ParameterSet) else ()),
+        *([f"Parameters that do not fit: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []),
+    ]
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return contradictions
     counts = {origin: len(parameters.by_origin(origin)) for origin in get_args(Origin)}

@@ -29,7 +29,7 @@ from planfly.flight_options import (
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
 from planfly.named_fences import NamedFences, read_named_fences
-from planfly.rtl.return_summary import ReturnSummary, returns_line
+from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
@@ -91,7 +91,12 @@ class FlownMission:
     @property
     def returns_line(self) -> str:
         """One line on returns from a few points of the flight; "" for a mission without a home."""
-        return returns_line(self.setup, self.track) if self.returns is None else self.returns.line
+        return self.return_summary.line
+
+    @property
+    def return_summary(self) -> ReturnSummary:
+        """Returns from a few points of the flight; without a log they are computed at each call."""
+        return return_summary(self.setup, self.track) if self.returns is None else self.returns
 
     def __repr__(self) -> str:
         return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
@@ -123,7 +128,12 @@ class Judged:
     @property
     def returns_line(self) -> str:
         """One line on returns from a few points of the flight or the planned path; "" without a home."""
-        return returns_line(self.setup, self.track)
+        return self.return_summary.line
+
+    @property
+    def return_summary(self) -> ReturnSummary:
+        """Returns from a few points of the flight or the planned path, computed at each call."""
+        return return_summary(self.setup, self.track)
 
 
 # ----------------------------------------------------------------------

@@ -116,7 +116,7 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
         only_first,
         only_second,
         tuple(difference_texts(*inputs)),
-        tuple(_notes(tables, settings, len(flyable))),
+        (*_notes(tables, settings, len(flyable)), *_disagreement_notes(difference, is_paired=bool(len(flyable)))),
     )
 
 
@@ -154,6 +154,23 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
     if any(setting.get("stops") or setting.get("changed") for setting in settings):
         notes.append("a number of flights was not fixed beforehand: the interval of the difference is only approximate")
     return notes
+
+
+def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:
+    """Return a remark if the test and the interval, which decides the answer, disagree on a difference; otherwise [].
+
+    >>> _disagreement_notes(ProportionDifference(0.1, Interval(0.02, 0.3), 0.04), is_paired=True)
+    []
+    """
+    low, high = difference.interval
+    excludes_zero, max_p_value = low > 0.0 or high < 0.0, 1.0 - DEFAULT_CONFIDENCE
+    if excludes_zero == (difference.p_value <= max_p_value):
+        return []
+    test = f"{'McNemar' if is_paired else 'Fisher'}'s exact test"
+    p_text = f"p = {difference.p_value:.2g}, {max_p_value:.2g} is the limit"
+    texts = ("shows a difference", "shows none")
+    interval_text, test_text = texts if excludes_zero else reversed(texts)
+    return [f"the interval {interval_text}, and decides the answer; {test} {test_text} ({p_text})"]
 
 
 def comparison_lines(comparison: CampaignComparison) -> list[str]:

@@ -1,6 +1,7 @@
 """Find the strongest wind from each direction in which a mission is flyable, by rounds of informative flights."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Hashable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
@@ -131,12 +132,20 @@ class WindsResult:
         """Return the direction from which the wind blows, degrees.  direction: index of the direction."""
         return 360.0 * direction / self.goal.directions
 
+    def flight_counts(self) -> list[int]:
+        """Return the number of flights of each direction."""
+        counts = Counter(direction for direction, _, _ in self.flights)
+        return [counts[direction] for direction in range(len(self.boundaries))]
+
     def __repr__(self) -> str:
-        min_speed = min(boundary.estimate for boundary in self.boundaries)
-        return (
-            f"<WindsResult {count_text(len(self.boundaries), 'direction')}, {min_speed:.1f} m/s the lowest;"
-            f" {count_text(len(self.flights), 'flight')}>"
-        )
+        counts = self.flight_counts()
+        speeds = [
+            boundary.estimate
+            for boundary, count in zip(self.boundaries, counts, strict=True)
+            if count >= MIN_FLIGHTS_PER_DIRECTION
+        ]
+        speed_text = f", {min(speeds):.1f} m/s the lowest" if speeds else ""
+        return f"<WindsResult {count_text(len(counts), 'direction')}{speed_text}; {count_text(sum(counts), 'flight')}>"
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:

@@ -19,6 +19,7 @@ from logs.views.charts import shorten
 from logs.views.drawing import clean_style, new_figure
 from planfly.campaigns.statistics.decision import Interval, wilson
 from world.arrays import Floats
+from world.wording import count_range_text
 
 PLANNED = theme.colour("planned")
 BLUE = theme.colour("second")
@@ -408,6 +409,11 @@ class ChartDirection:
     flights: tuple[tuple[float, int, int], ...]
     is_judged: bool = True
 
+    @property
+    def flight_count(self) -> int:
+        """Number of flights of the direction."""
+        return sum(count for _, count, _ in self.flights)
+
 
 def draw_go_no_go(
     directions: Sequence[ChartDirection],
@@ -428,7 +434,7 @@ def draw_go_no_go(
         axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
         _draw_wind_areas(axes, directions, max_speed)
         for direction in directions:
-            if direction.is_beyond_search:
+            if direction.is_judged and direction.is_beyond_search:
                 marker = (3, 0, -direction.from_deg)
                 axes.plot(
                     np.radians(direction.from_deg),
@@ -465,7 +471,8 @@ def draw_go_no_go(
             fontsize=9,
             color=QUIET_COLOUR,
         )
-        open_edge = max_speed if any(direction.is_beyond_search for direction in directions) else None
+        is_open = any(direction.is_judged and direction.is_beyond_search for direction in directions)
+        open_edge = max_speed if is_open else None
         _draw_legend(figure, directions, target, confidence, wind, open_edge)
     return figure
 
@@ -507,7 +514,7 @@ def _draw_legend(
 ) -> None:
     """Draw the legend of the chart of winds.
 
-    open_edge: maximum wind of the search, m/s, if the boundary of a direction is beyond it, otherwise None.
+    open_edge: maximum wind of the search, m/s, if a judged boundary is beyond it, otherwise None.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -520,8 +527,10 @@ def _draw_legend(
             (Patch(color=INTERVAL_COLOUR, alpha=0.45), f"interval of the\nboundary, {100 * confidence:g} %"),
             (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
         ]
-    if not all(direction.is_judged for direction in directions):
-        handles_and_labels.append((Patch(color=GRID_COLOUR, alpha=0.5), "not judged"))
+    counts = [direction.flight_count for direction in directions if not direction.is_judged]
+    if counts:
+        label = f"not judged, {count_range_text(counts, 'flight')}\nfrom each direction"
+        handles_and_labels.append((Patch(color=GRID_COLOUR, alpha=0.5), label))
     handles_and_labels += [
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not flyable"),

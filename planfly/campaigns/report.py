@@ -62,7 +62,7 @@ from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
 from world.files import write_atomically
-from world.wording import count_text
+from world.wording import count_range_text, count_text
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
 _MAX_DRAWN_FLIGHTS = 3000
@@ -162,10 +162,8 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
     figures = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
-    if summary.sensitivities:
-        bars = [
-            Bar(QUANTITY_BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities
-        ]
+    if summary.drivers:
+        bars = [Bar(entry.title, entry.index, entry.slope) for entry in summary.drivers]
         figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the smallest margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
@@ -406,13 +404,15 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
     rows = [
         (
             f"{direction.from_deg:g}°",
-            _speed_text(direction.boundary, goal.most),
-            _interval_text(direction.low, direction.high, goal.most),
-            str(sum(count for _, count, _ in direction.flights)),
+            _speed_text(direction.boundary, goal.most) if is_estimated else "not judged",
+            _interval_text(direction.low, direction.high, goal.most) if is_estimated else "",
+            str(direction.flight_count),
             RULE_WORDS[rule].title if rule else "",
             f"no: {reason}" if reason else "yes",
         )
-        for direction, rule, reason in zip(directions, _deciding_rules(winds), reasons, strict=True)
+        for direction, rule, reason, is_estimated in zip(
+            directions, _deciding_rules(winds), reasons, _estimated_directions(winds), strict=True
+        )
     ]
     data = {
         "schema": WINDS_SCHEMA,
@@ -479,23 +479,42 @@ def _is_only_calm(winds: WindsResult) -> bool:
     return winds.calm is not None and winds.calm.flights == len(winds.flights)
 
 
+def _fails_in_calm_air(winds: WindsResult) -> bool:
+    """Return True if the flights in calm air show that the mission misses the target probability there."""
+    if _is_only_calm(winds):
+        return True
+    calm = winds.calm
+    return calm is not None and wilson(calm.flights - calm.failed_count, calm.flights).high < winds.goal.target
+
+
 def unsettled_reasons(winds: WindsResult) -> list[str]:
     """Return for each direction the reason why its boundary is not judged, or "" if it is.
 
-    All are "" if every flight in calm air failed, because then no wind was searched.
+    A direction whose boundary is calm air is judged if the flights there show it.
     """
-    if _is_only_calm(winds):
-        return [""] * len(winds.boundaries)
-    counts, max_width = Counter(direction for direction, _, _ in winds.flights), 2.0 * BOUNDARY_ACCURACY_MPS
+    fails_in_calm_air, counts = _fails_in_calm_air(winds), winds.flight_counts()
+    max_width = 2.0 * BOUNDARY_ACCURACY_MPS
     reasons = []
-    for k, boundary in enumerate(winds.boundaries):
-        if not needs_more_flights(boundary, counts[k], BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
+    for boundary, count in zip(winds.boundaries, counts, strict=True):
+        is_calm = fails_in_calm_air and boundary.estimate < CALM_MPS
+        if is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
             reasons.append("")
-        elif counts[k] < MIN_FLIGHTS_PER_DIRECTION:
-            reasons.append(f"{count_text(counts[k], 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
+        elif count < MIN_FLIGHTS_PER_DIRECTION:
+            reasons.append(f"{count_text(count, 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
         else:
             reasons.append(f"an interval of {boundary.width:.2f} m/s; at most {max_width:g} m/s is required")
     return reasons
+
+
+def _estimated_directions(winds: WindsResult) -> list[bool]:
+    """Return True for each direction whose boundary is stated: it is judged, or only its interval is too wide.
+
+    With fewer flights the boundary and its interval depend mostly on assumptions.
+    """
+    return [
+        not reason or count >= MIN_FLIGHTS_PER_DIRECTION
+        for reason, count in zip(unsettled_reasons(winds), winds.flight_counts(), strict=True)
+    ]
 
 
 def winds_answer(winds: WindsResult) -> WindsAnswer:
@@ -505,11 +524,9 @@ def winds_answer(winds: WindsResult) -> WindsAnswer:
     show it or all boundaries are judged; "not judged" if no direction has a judged boundary; "not judged in full" if
     only some directions have one; and otherwise "judged".
     """
-    calm, reasons = winds.calm, unsettled_reasons(winds)
-    if calm is not None:
-        max_share = wilson(calm.flights - calm.failed_count, calm.flights).high
-        if max_share < winds.goal.target or not any(reasons):
-            return "not flyable"
+    reasons = unsettled_reasons(winds)
+    if _fails_in_calm_air(winds) or (winds.calm is not None and not any(reasons)):
+        return "not flyable"
     if all(reasons):
         return "not judged"
     return "not judged in full" if any(reasons) else "judged"
@@ -517,15 +534,18 @@ def winds_answer(winds: WindsResult) -> WindsAnswer:
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
     """Return a line that the search or some of its directions are not judged, and why; [] if all are judged."""
-    unsettled_count = sum(map(bool, unsettled_reasons(winds)))
-    if not unsettled_count:
+    reasons = unsettled_reasons(winds)
+    counts = [count for count, reason in zip(winds.flight_counts(), reasons, strict=True) if reason]
+    if not counts:
         return []
-    total = len(winds.boundaries)
+    unsettled_count, total = len(counts), len(reasons)
     word = "not judged" if unsettled_count == total else "not judged in full"
+    directions_text = f"{count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'}"
+    flights_text, max_width = count_range_text(counts, "flight"), 2.0 * BOUNDARY_ACCURACY_MPS
     return [
-        f"{word}: {unsettled_count} of {count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'} too"
-        f" few flights: each requires at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most"
-        f" {2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer flights, the interval depends mostly on assumptions"
+        f"{word}: {unsettled_count} of {directions_text} too few flights ({flights_text}): each requires at least"
+        f" {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most {max_width:g} m/s; with fewer flights, the interval"
+        " depends mostly on assumptions"
     ]
 
 
@@ -595,38 +615,46 @@ def _calm_lines(winds: WindsResult) -> list[str]:
     ]
 
 
-def _boundary_line(winds: WindsResult) -> str:
-    """Return one line with the lowest and the highest boundary of a search for winds."""
-    directions, target = chart_directions(winds), winds.goal.target
-    lowest_direction, highest_direction = (
-        select(directions, key=lambda direction: direction.boundary) for select in (min, max)
-    )
-    max_speed, percent = winds.goal.most, f"{100 * winds.goal.confidence:g} %"
-    best_text = f"{_speed_text(highest_direction.boundary, max_speed)} from {highest_direction.from_deg:g}°"
-    if winds.calm is None:
-        return (
-            f"flies with P >= {target:g}, by the best estimate, in wind up to"
-            f" {_speed_text(lowest_direction.boundary, max_speed)}"
-            f" from {lowest_direction.from_deg:g}° (the lowest;"
-            f" {_interval_text(lowest_direction.low, lowest_direction.high, max_speed)} m/s"
-            f" at {percent}), {best_text}"
-        )
-    if highest_direction.boundary < CALM_MPS:
-        basis = "" if _is_only_calm(winds) else ", by the best estimate,"
-        return f"does not fly with P >= {target:g}{basis} even in calm air"
-    return (
-        f"does not fly with P >= {target:g}, by the best estimate, in any wind from {lowest_direction.from_deg:g}°,"
-        f" even a light one; it flies in wind up to {best_text}"
-    )
+def _boundary_lines(winds: WindsResult) -> list[str]:
+    """Return one line with the lowest and the highest boundary of a search for winds; [] if none is stated."""
+    directions = [
+        direction
+        for direction, is_estimated in zip(chart_directions(winds), _estimated_directions(winds), strict=True)
+        if is_estimated
+    ]
+    if not directions:
+        return []
+    lowest = min(directions, key=lambda direction: (direction.boundary, direction.low))
+    highest = max(directions, key=lambda direction: direction.boundary)
+    target, max_speed, percent = winds.goal.target, winds.goal.most, f"{100 * winds.goal.confidence:g} %"
+    lowest_text, highest_text = (_speed_text(direction.boundary, max_speed) for direction in (lowest, highest))
+    if lowest.boundary >= CALM_MPS:
+        best_text = f", {highest_text} from {highest.from_deg:g}°" if highest_text != lowest_text else ""
+        return [
+            f"flies with P >= {target:g}, by the best estimate, in wind up to {lowest_text} from {lowest.from_deg:g}°"
+            f" (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
+        ]
+    if highest.boundary < CALM_MPS:
+        basis = "" if _fails_in_calm_air(winds) else ", by the best estimate,"
+        return [f"does not fly with P >= {target:g}{basis} even in calm air"]
+    return [
+        f"does not fly with P >= {target:g}, by the best estimate, in any wind from {lowest.from_deg:g}°,"
+        f" even a light one; it flies in wind up to {highest_text} from {highest.from_deg:g}°"
+    ]
 
 
 def wind_lines(winds: WindsResult) -> list[str]:
     """Return the result of a search for winds as a few lines of text."""
     percent = f"{100 * winds.goal.confidence:g} %"
-    answer_lines = [*_unsettled_lines(winds), _boundary_line(winds)]
+    answer_lines = [*_unsettled_lines(winds), *_boundary_lines(winds)]
     if winds_answer(winds) == "not flyable":
         # Failures in calm air answer the question, whatever the directions show.
         answer_lines.reverse()
+    flights_text = count_text(len(winds.flights), "flight")
+    if _is_only_calm(winds):
+        flights_text += "; no wind was tried, because every flight in calm air fails"
+    elif any(_estimated_directions(winds)):
+        flights_text += f"; intervals at {percent}, from the flights in each direction"
     return [
         *answer_lines,
         *_calm_lines(winds),
@@ -634,9 +662,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
         *_deciding_lines(winds),
         *_lines_without_failures(winds),
         *_lost_lines(winds),
-        f"{count_text(len(winds.flights), 'flight')}; no wind was tried, because every flight in calm air fails"
-        if _is_only_calm(winds)
-        else f"{count_text(len(winds.flights), 'flight')}; intervals at {percent}, from the flights in each direction",
+        flights_text,
     ]
 
 
@@ -645,14 +671,21 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 
     name: mission of the search.
 
-    The answer fails unless it is "judged"; a direction that is not judged is skipped.
+    The answer fails unless it is "judged".  A direction that is not judged is skipped, and a direction fails in which
+    the mission does not fly even in calm air.
     """
     lines, reasons = wind_lines(winds), unsettled_reasons(winds)
     cases = [answer_case("" if winds_answer(winds) == "judged" else lines[0])]
     for direction, reason in zip(chart_directions(winds), reasons, strict=True):
-        boundary = _speed_text(direction.boundary, winds.goal.most)
-        case = JunitCase("planfly.winds", f"from {direction.from_deg:g}°", text=f"wind up to {boundary}")
-        cases.append(case._replace(result="skipped", message=f"not judged: {reason}") if reason else case)
+        case = JunitCase("planfly.winds", f"from {direction.from_deg:g}°")
+        if reason:
+            case = case._replace(result="skipped", message=f"not judged: {reason}")
+        elif direction.boundary < CALM_MPS:
+            message = f"does not fly with P >= {winds.goal.target:g} even in calm air"
+            case = case._replace(result="failure", message=message)
+        else:
+            case = case._replace(text=f"wind up to {_speed_text(direction.boundary, winds.goal.most)}")
+        cases.append(case)
     return JunitSuite(name, cases, "\n".join(lines))
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -10,28 +10,39 @@ import numpy as np
 
 from logs.verdict.conditions import Conditions, flown_lines
 from logs.verdict.junit import JunitCase, JunitSuite
-from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.wording import margin_text, place_text
+from logs.verdict.wording import margin_text, place_text, quantity_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
-from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
-from planfly.campaigns.flight_row import FlightRow, scale_margin
+from planfly.campaigns.failure_counts import (
+    RuleFailures,
+    count_failures,
+    deciding_rule,
+    failure_lines,
+    failures_document,
+)
+from planfly.campaigns.flight_row import FlightRow, parse_failed_findings, scale_margin
 from planfly.campaigns.statistics.decision import (
     MIN_FLIGHTS_FOR_INDEX,
     Estimate,
     Goal,
     Tally,
+    chance_probability,
     first_order_index,
     rank_slope,
 )
 from planfly.campaigns.tables import Store
+from world.arrays import Floats
 from world.wording import count_text
 
 # Schema of ``summary.json``.
 SUMMARY_SCHEMA = "planfly.campaign-summary/1"
 # Minimum share of a margin's variance that a quantity must explain to be named.
 _MIN_NAMED_FRACTION = 0.05
+# Maximum probability that chance alone makes a campaign name any quantity.
+_MAX_CHANCE = 0.05
+# Maximum number of quantities that the line of a terminal names.
+_MAX_NAMED_QUANTITIES = 3
 # Number of worst flights that the summary lists.
 WORST_FLIGHT_COUNT = 10
 # Number of those with a log.  A log takes as long as the flight itself, and `--refly` writes that of any flight.
@@ -44,11 +55,25 @@ class Sensitivity:
 
     index: first-order index: fraction of the margin's variance that the quantity explains, 0 to 1.
     slope: rank correlation, negative if an increase of the quantity reduces the margin.
+    p_value: probability of such a dependence by chance, see `chance_probability`.
     """
 
     quantity: str
     index: float
     slope: float
+    p_value: float
+
+    @property
+    def title(self) -> str:
+        """Name of the quantity for a person.
+
+        >>> Sensitivity("ident/lift-slope", 0.1, 0.2, 0.5).title
+        "the aircraft's lift slope"
+        """
+        quantity = QUANTITY_BY_NAME.get(self.quantity)
+        if quantity is not None:
+            return quantity.title
+        return f"the aircraft's {self.quantity.rpartition('/')[2].replace('-', ' ')}"
 
 
 @dataclass(frozen=True)
@@ -56,7 +81,8 @@ class RankedRule:
     """Rule in the ranking of a campaign by how close its flights came to failing it.
 
     failed: number of flights that failed the rule.
-    lowest: smallest margin of all flights, in `unit`; None if no flight has one.
+    lowest: smallest margin of all flights, in `unit`; None if it is not known, because no flight has a margin or some
+    failed by an unknown one.
     low_margin: 5 % quantile of the margin, in `unit`; None likewise.
     """
 
@@ -81,7 +107,8 @@ class CampaignSummary:
     the mean of its margins divided by their standard deviation (Cornell, "A probability-based structural code", ACI
     Journal 66, 1969); "" if there is no such rule.
     conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
-    low_margin: 5 % quantile of the margin of the deciding rule, in `unit`; None if unknown.
+    low_margin: 5 % quantile of the margin of the deciding rule, in `unit`; None if unknown, as with so many failures by
+    an unknown margin.
     ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
     """
 
@@ -101,6 +128,19 @@ class CampaignSummary:
     made_of: str
     conditions: Conditions
 
+    @property
+    def drivers(self) -> tuple[Sensitivity, ...]:
+        """Quantities that are shown to explain the deciding margin, the strongest first.
+
+        The probability that chance alone makes any quantity one of them is at most `_MAX_CHANCE` (Bonferroni).
+        """
+        max_p_value = _MAX_CHANCE / max(1, len(self.sensitivities))
+        return tuple(
+            sensitivity
+            for sensitivity in self.sensitivities
+            if sensitivity.index >= _MIN_NAMED_FRACTION and sensitivity.p_value <= max_p_value
+        )
+
     def __repr__(self) -> str:
         tally = self.estimate.tally
         return f"<CampaignSummary {self.name}: {_flyable_text(tally)}>"
@@ -110,7 +150,8 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
     """Summarise a campaign in one pass through its table."""
     by_rule = _count_failures(store)
     worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
-    deciding, low_margin = _deciding_rule(store, by_rule)
+    margins = _read_margins(store)
+    deciding = _deciding_rule(margins, by_rule)
     return CampaignSummary(
         name=base.name,
         seed=base.seed,
@@ -119,10 +160,10 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         by_rule=by_rule,
         lost=tuple(index for index, outcome in store.outcomes().items() if outcome == "lost"),
         deciding=deciding,
-        low_margin=low_margin,
-        unit=next((margin.unit for row in worst_rows for rule, margin in row.margins if rule == deciding), ""),
-        sensitivities=_rule_sensitivities(base, store, deciding),
-        ranking=_rank_rules(store, by_rule),
+        low_margin=_margin_quantile(margins[deciding]) if deciding else None,
+        unit=_margin_unit(store, deciding) if deciding else "",
+        sensitivities=_rule_sensitivities(base, store, margins[deciding]) if deciding else (),
+        ranking=_rank_rules(store, margins, by_rule),
         worst=worst_rows,
         dispersions=base.dispersions.to_json(),
         made_of=store.made_of,
@@ -132,46 +173,72 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
 
 def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
     """Count the flights in a table by failed rule and place."""
-    failed_lists = map(json.loads, store.texts("failed"))
-    return count_failures(
-        [(failed_finding.pop("rule"), Place(**failed_finding)) for failed_finding in failed_findings]
-        for failed_findings in failed_lists
-    )
+    return count_failures(parse_failed_findings(text) for text in store.texts("failed"))
 
 
-def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
-    """Return the rule that decides the campaign, and the margin that 5 % of the flights fall below.
+def _read_margins(store: Store) -> dict[str, Floats]:
+    """Return the minimum margin of each rule in each flight, (n,), keyed by rule.
+
+    NaN if the rule was not judged, -inf if the flight failed the rule by an unknown margin.
+    """
+    failed_rules = [{rule for rule, _ in parse_failed_findings(text)} for text in store.texts("failed")]
+    margins = {}
+    for rule, words in RULE_WORDS.items():
+        has_failed = np.array([rule in failed for failed in failed_rules], dtype=bool)
+        known_margins = store.column(words.margin_column)
+        margins[rule] = np.where(has_failed & ~(known_margins < 0.0), -np.inf, known_margins)
+    return margins
+
+
+def _margin_quantile(margins: Floats) -> float | None:
+    """Return the 5 % quantile of a rule's margins; None if it is unknown.
+
+    >>> _margin_quantile(np.array([-np.inf, *np.linspace(0.0, 2.0, 10)])) is None
+    True
+    >>> _margin_quantile(np.array([np.nan, *np.linspace(0.0, 2.0, 21)]))
+    0.1
+    """
+    judged_margins = margins[~np.isnan(margins)]
+    if not judged_margins.size:
+        return None
+    # An interpolation with -inf is NaN.
+    with np.errstate(invalid="ignore"):
+        quantile = float(np.quantile(judged_margins, 0.05))
+    return quantile if math.isfinite(quantile) else None
+
+
+def _deciding_rule(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]) -> str:
+    """Return the rule that decides the campaign.
 
     The deciding rule is the rule that most flights failed.  Without failures it is the rule with the smallest ratio of
-    mean margin to its standard deviation.  Returns "" and None if no margin is known.
+    mean margin to its standard deviation.  Returns "" if no margin is known.
     """
-    low_margins, reliability_indices = {}, {}
-    for rule in RULE_WORDS:
-        margins = store.column(RULE_WORDS[rule].margin_column)
-        known_margins = margins[np.isfinite(margins)]
+    if by_rule:
+        return deciding_rule(by_rule)
+    reliability_indices = {}
+    for rule, rule_margins in margins.items():
+        known_margins = rule_margins[np.isfinite(rule_margins)]
         if known_margins.size:
-            low_margins[rule] = float(np.quantile(known_margins, 0.05))
             deviation = float(known_margins.std())
             reliability_indices[rule] = float(known_margins.mean()) / deviation if deviation > 0.0 else math.inf
-    if by_rule:
-        rule = max(by_rule, key=lambda failures: failures.flights).rule
-        return rule, low_margins.get(rule)
-    if not low_margins:
-        return "", None
-    rule = min(reliability_indices, key=lambda name: reliability_indices[name])
-    return rule, low_margins[rule]
+    return min(reliability_indices, key=lambda name: reliability_indices[name], default="")
 
 
-def _rank_rules(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[RankedRule, ...]:
+def _rank_rules(
+    store: Store, margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]
+) -> tuple[RankedRule, ...]:
     """Return the ranking of the rules; a failed rule is in it also if it has no margin."""
     failed_counts = {failures.rule: failures.flights for failures in by_rule}
     ranked = []
-    for rule, words in RULE_WORDS.items():
-        margins = store.column(words.margin_column)
-        margins = margins[np.isfinite(margins)]
-        lowest, low_margin = (float(margins.min()), float(np.quantile(margins, 0.05))) if margins.size else (None, None)
-        if margins.size or rule in failed_counts:
-            ranked.append(RankedRule(rule, failed_counts.get(rule, 0), lowest, low_margin, _margin_unit(store, rule)))
+    for rule, rule_margins in margins.items():
+        known_margins = rule_margins[np.isfinite(rule_margins)]
+        if known_margins.size or rule in failed_counts:
+            lowest = float(known_margins.min()) if known_margins.size else None
+            if lowest is not None and lowest >= 0.0 and np.isneginf(rule_margins).any():
+                # A flight that failed by an unknown margin has a smaller one.
+                lowest = None
+            low_margin, unit = _margin_quantile(rule_margins), _margin_unit(store, rule)
+            ranked.append(RankedRule(rule, failed_counts.get(rule, 0), lowest, low_margin, unit))
     return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled(entry))))
 
 
@@ -190,25 +257,36 @@ def _scaled(entry: RankedRule) -> float:
     return math.inf if entry.lowest is None or scale is None else entry.lowest / scale
 
 
-def _rule_sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
+def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tuple[Sensitivity, ...]:
     """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first.
 
+    A failure by an unknown margin counts as the smallest known margin, or as zero if that is positive.
     The result is empty for fewer than `MIN_FLIGHTS_FOR_INDEX` flights with a margin.
+
+    margins: margin of each flight, (n,), see `_read_margins`.
     """
-    if not rule:
+    is_judged = ~np.isnan(margins)
+    if np.count_nonzero(is_judged) < MIN_FLIGHTS_FOR_INDEX:
         return ()
-    margin = store.column(RULE_WORDS[rule].margin_column)
-    is_known = np.isfinite(margin)
-    if np.count_nonzero(is_known) < MIN_FLIGHTS_FOR_INDEX:
-        return ()
+    lower_limit = min(0.0, float(np.min(margins[np.isfinite(margins)], initial=0.0)))
+    margin = np.maximum(margins[is_judged], lower_limit)
     sensitivities = []
-    for varying in base.dispersions.varying:
-        name = varying.quantity.name
-        values = store.column(name)[is_known]
-        sensitivities.append(
-            Sensitivity(name, first_order_index(values, margin[is_known]), rank_slope(values, margin[is_known]))
-        )
+    for name, all_values in _drawn_values(base, store).items():
+        values = all_values[is_judged]
+        index, p_value = first_order_index(values, margin), chance_probability(values, margin)
+        sensitivities.append(Sensitivity(name, index, rank_slope(values, margin), p_value))
     return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
+
+
+def _drawn_values(base: CampaignBase, store: Store) -> dict[str, Floats]:
+    """Return the values of each varying quantity and of each drawn property of the aircraft, (n,), keyed by name."""
+    values = {varying.quantity.name: store.column(varying.quantity.name) for varying in base.dispersions.varying}
+    draws = base.dispersions.draws
+    if draws is not None:
+        # As texts, because the seeds have more digits than a float.
+        rows = [draws.row(int(seed)) for seed in store.texts("seed")]
+        values |= dict(zip(draws.names, draws.values[rows].T, strict=True))
+    return values
 
 
 def summary_json(summary: CampaignSummary) -> str:
@@ -252,6 +330,8 @@ def summary_json(summary: CampaignSummary) -> str:
                 "quantity": sensitivity.quantity,
                 "first_order": _to_plain_number(sensitivity.index),
                 "rank_slope": _to_plain_number(sensitivity.slope),
+                "p_value": _to_plain_number(sensitivity.p_value),
+                "shown": sensitivity in summary.drivers,
             }
             for sensitivity in summary.sensitivities
         ],
@@ -335,12 +415,15 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
     """Return the line on the margin of the deciding rule and on what it depends on; [] if no margin is known."""
-    if not summary.deciding or summary.low_margin is None:
+    if not summary.deciding:
         return []
-    return [
-        f"  decides {RULE_WORDS[summary.deciding].title}: one flight in twenty has a margin below"
-        f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
-    ]
+    if summary.low_margin is None:
+        failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == summary.deciding)
+        flights_text = count_text(summary.estimate.tally.flown, "flight")
+        text = f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} it, by an unknown margin"
+    else:
+        text = f"one flight in twenty has a margin below {quantity_text(summary.low_margin, summary.unit)}"
+    return [f"  decides {RULE_WORDS[summary.deciding].title}: {text}; {_drivers_text(summary)}"]
 
 
 def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
@@ -378,13 +461,12 @@ def _answer_text(summary: CampaignSummary) -> str:
 def _drivers_text(summary: CampaignSummary) -> str:
     """Return a clause on the quantities that explain most of the deciding margin's variance."""
     if not summary.sensitivities:
-        return f"at least {MIN_FLIGHTS_FOR_INDEX} flights would show what the margin depends on"
-    drivers = [sensitivity for sensitivity in summary.sensitivities if sensitivity.index >= _MIN_NAMED_FRACTION][:3]
-    if not drivers:
-        return "no single quantity explains the margin"
+        return f"at least {MIN_FLIGHTS_FOR_INDEX} flights that this rule judges would show what the margin depends on"
+    if not summary.drivers:
+        return "nothing that was drawn is shown to explain the margin"
     return "of the margin's variance " + ", ".join(
-        f"{QUANTITY_BY_NAME[sensitivity.quantity].title} explains {100.0 * sensitivity.index:.0f} %"
-        for sensitivity in drivers
+        f"{sensitivity.title} explains {100.0 * sensitivity.index:.0f} %"
+        for sensitivity in summary.drivers[:_MAX_NAMED_QUANTITIES]
     )
 
 

@@ -30,6 +30,7 @@ from world.errors import ArgumentError
 
 if TYPE_CHECKING:
     from planfly import Verdict
+    from planfly.rtl.return_summary import ReturnSummary
     from planfly.terminal.verdict_answers import VerdictsDocument
 
 # Suffixes of logs of other programs, as the help shows them.
@@ -92,12 +93,12 @@ def check(args: argparse.Namespace) -> int:
     result = call_api(planfly.judge, args)
     if not result.is_log:
         print_warnings(result.setup.scenario.notes)
-    code = INCOMPLETE if result.lossy else verdict_code(result.verdict)
-    write_json_if_requested(args, lambda: _verdict_answer(result.verdict, code))
+    code, returns = INCOMPLETE if result.lossy else verdict_code(result.verdict), result.return_summary
+    write_json_if_requested(args, lambda: _verdict_answer(result.verdict, returns, code))
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
     print_verdict(result.verdict, result.setup.notes)
-    print_returns_line(result.returns_line)
+    print_returns_line(returns.line)
     return code
 
 
@@ -129,10 +130,10 @@ def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, 
     return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
-def _verdict_answer(verdict: "Verdict", code: int) -> object:
+def _verdict_answer(verdict: "Verdict", returns: "ReturnSummary", code: int) -> object:
     """Return the answer of the command for --json."""
-    from planfly.terminal.verdict_answers import CheckAnswer
+    from planfly.terminal.verdict_answers import CheckAnswer, count_returns
 
     document = verdict.document()
     values = {field.name: getattr(document, field.name) for field in fields(document)}
-    return CheckAnswer(exit_code=code, **values)
+    return CheckAnswer(exit_code=code, returns=count_returns(returns), **values)

@@ -25,6 +25,7 @@ def add_compare_parser(command_line: LineParser) -> None:
         "compare two flights: a table of differences, and pictures; or two campaigns: how likely their flights succeed",
         "planfly compare calm.mcap windy.mcap --out both",
         "planfly compare runs/calm-campaign runs/windy-campaign",
+        details="  The exit code of two campaigns is 0 whatever the answer is: --json states it as `answer`.",
     )
     add_log_argument(parser, "first", "A", "a flight log (.mcap), or the folder of a campaign")
     add_log_argument(parser, "second", "B", "another")

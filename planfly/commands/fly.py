@@ -74,6 +74,7 @@ def fly(args: argparse.Namespace) -> int:
 def _json_answer(mission: str, flight: "FlownMission", code: int) -> object:
     """Return the answer of the command for --json."""
     from planfly.terminal.answers import FlyAnswer
+    from planfly.terminal.verdict_answers import count_returns
 
     return FlyAnswer(
         exit_code=code,
@@ -83,4 +84,5 @@ def _json_answer(mission: str, flight: "FlownMission", code: int) -> object:
         autopilot_log=None if flight.autopilot_log is None else str(flight.autopilot_log),
         warnings=[*flight.mission.warnings, *flight.setup.scenario.notes],
         verdict=flight.verdict.document(),
+        returns=count_returns(flight.return_summary),
     )

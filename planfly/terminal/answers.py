@@ -12,7 +12,7 @@ from aircraft.catalog import Aircraft
 from logs.verdict.conditions import Conditions
 from logs.verdict.document import VerdictDocument
 from planfly.api.aircraft import AircraftNumbers
-from planfly.terminal.verdict_answers import STRICT
+from planfly.terminal.verdict_answers import STRICT, ReturnCounts
 
 # ----------------------------------------------------------------------
 # Answer of ``planfly aircraft`` with ``--json``.
@@ -187,6 +187,10 @@ class SensitivityEntry:
     quantity: str
     first_order: float | None
     rank_slope: float | None
+    p_value: float | None
+    """Probability of such a dependence by chance."""
+    shown: bool
+    """True if the index is distinguishable from zero, with all quantities considered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -346,6 +350,7 @@ class FlyAnswer:
     """Log that the autopilot program wrote; null if no program flew."""
     warnings: list[str]
     verdict: VerdictDocument
+    returns: ReturnCounts | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -1,22 +1,48 @@
 """Answer of `planfly check` with ``--json``: one verdict, or one for each of several autopilots."""
 
 import dataclasses
-from typing import Literal
+from collections import Counter
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import ConfigDict
 from pydantic.dataclasses import dataclass
 
 from logs.verdict.document import VerdictDocument
 
+if TYPE_CHECKING:
+    from planfly.rtl.return_summary import ReturnSummary
+
 # Configuration of answers for pydantic.
 STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnCounts:
+    """Returns from some 50 points of a flight, which do not decide the verdict; `planfly returns` judges them all."""
+
+    line: str
+    """Summary of the returns, or the reason why none is judged."""
+    returns: int
+    """Number of returns."""
+    outcomes: dict[str, int]
+    """Number of returns of each outcome that occurs: ground, threat, zone, lost, energy, unknown, power, unsure, low or
+    safe."""
+
+
+def count_returns(summary: "ReturnSummary") -> ReturnCounts | None:
+    """Return the numbers of returns in a summary; None for a mission without a home or a terrain."""
+    if not summary.line:
+        return None
+    kinds = [] if summary.returns is None else [ret.kind for ret in summary.returns.each]
+    return ReturnCounts(line=summary.line, returns=len(kinds), outcomes=dict(Counter(kinds)))
+
+
 @dataclasses.dataclass(frozen=True, slots=True, kw_only=True)
 class CheckAnswer(VerdictDocument):
-    """planfly check: the verdict, as in verdict.json, and the exit code."""
+    """planfly check: the verdict, as in verdict.json, the exit code and the returns."""
 
     exit_code: int
+    returns: ReturnCounts | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

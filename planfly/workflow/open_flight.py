@@ -109,7 +109,7 @@ def check_mission_exists(path: Path) -> Path:
     Raises MissionError if it does not exist, with the most similar name as a suggestion.
     """
     if not path.is_file():
-        hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent))
+        hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent), path.parent)
         expected = "expected a plan.json, .waypoints or .plan file"
         raise MissionError(f"{path}: {missing_text(path)}; {expected}{hint}", file=path)
     return path

@@ -25,6 +25,9 @@ from world.arrays import Floats
 from world.frames import to_geo, to_map
 from world.terrain import Terrain
 
+# Greatest depth below ground of the last row of a flight that hits the ground, m: a tick of 1/60 s at 50 m/s is 0.8 m.
+_CONTACT_DEPTH_M = 1.0
+
 
 def clearance_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
@@ -263,7 +266,7 @@ def _planned_finding(
     off_text: where the leg leaves the terrain data; "" if it does not.
     """
     is_short = planned_height < limit - CLEARANCE_TOLERANCE_M
-    reason = f"{planned_height:.1f} m above ground at the lowest"
+    reason = f"{_height_text(planned_height)} at the lowest"
     if is_short:
         reason += f"; {limit:.0f} m are required"
     reason += _terrain_error_text(planned_height, limit, terrain.vertical_error)
@@ -315,9 +318,12 @@ def _flown_finding(
             )
             k = first + row
             min_clearance = float(aligned.clearance[k])
-            fraction = float(aligned.clearance_fraction[k])
-            reason = f"{min_clearance:.1f} m above ground {_time_and_place_text(aligned, k, fraction)}"
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M
+            if not ok and -_CONTACT_DEPTH_M < min_clearance < 0.0:
+                # The row of a ground contact lies in the ground, by less than a tick's way.
+                min_clearance = 0.0
+            fraction = float(aligned.clearance_fraction[k])
+            reason = f"{_height_text(min_clearance)} {_time_and_place_text(aligned, k, fraction)}"
         if not is_known.all():
             k = first + int(np.argmin(is_known))
             off_text = f"flown outside the terrain data {_time_and_place_text(aligned, k, 0.0)}"
@@ -329,7 +335,7 @@ def _flown_finding(
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
     is_unknown = ok is None and bool(off_text)
     if is_planned_short:
-        reason += f"; the planned path descends to {planned_height:.1f} m above ground"
+        reason += f"; the planned path descends to {_height_text(planned_height)}"
     return make_finding(
         "clearance",
         requirements.leg(leg),
@@ -347,6 +353,17 @@ def _flown_finding(
         method="exact along the flown track",
         check=GROUND_PATH if is_unknown else "",
     )
+
+
+def _height_text(clearance: float) -> str:
+    """Return a height above ground (m) as text.
+
+    >>> _height_text(12.34), _height_text(0.0), _height_text(-150.2)
+    ('12.3 m above ground', 'on the ground', '150.2 m below ground')
+    """
+    if clearance == 0.0:
+        return "on the ground"
+    return f"{abs(clearance):.1f} m {'above' if clearance > 0.0 else 'below'} ground"
 
 
 def _placed_message(requirements: RouteRequirements, leg: int, text: str) -> Message:

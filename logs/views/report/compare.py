@@ -278,7 +278,7 @@ def difference_lines(comparison: Comparison) -> list[str]:
       not flyable  not flyable
              36.5         36.5        0.00
     """
-    header = ("", "", *(name[-24:] for name in comparison.names), "difference")
+    header = ("", "", *comparison.names, "difference")
     rows = [header, *difference_rows(comparison)]
     rows = [(f"{name} ({unit})" if unit else name, *values) for name, unit, *values in rows]
     widths = [max(len(row[k]) for row in rows) for k in range(4)]

@@ -11,7 +11,7 @@ from logs.verdict.places import DecidingParameter
 from logs.verdict.presentation import RuleFindings, findings_by_rule
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import suggestions_text
+from logs.verdict.wording import quantity_text, suggestions_text
 
 NOTHING = "–"
 _UNITS = {"deg": "°", "none": "", "1": ""}
@@ -291,7 +291,9 @@ def _missed_text(finding: Finding) -> str:
     """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
     if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
         return ""
-    return quantity(-finding.margin - (finding.tolerance or 0.0), finding.unit)
+    distance = -finding.margin - (finding.tolerance or 0.0)
+    # A count has no decimals.
+    return quantity_text(distance, finding.unit) if finding.unit == "legs" else quantity(distance, finding.unit)
 
 
 def _sentence(finding: Finding) -> str:

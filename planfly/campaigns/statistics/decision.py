@@ -362,11 +362,37 @@ def first_order_index(x: Floats, y: Floats) -> float:
     total = float(((y - y.mean()) ** 2).sum()) if count else 0.0
     if count < MIN_FLIGHTS_FOR_INDEX or total <= 1e-12 * count or np.ptp(x) == 0.0:
         return 0.0
-    groups = int(min(_MAX_GROUPS, max(4, round(2.0 * count ** (1.0 / 3.0)))))
-    parts = np.array_split(y[np.argsort(x, kind="stable")], groups)
+    parts = _split_into_groups(x, y)
     between = sum(part.size * float(part.mean() - y.mean()) ** 2 for part in parts)
-    within = (total - between) / (count - groups)
-    return float(np.clip((between - (groups - 1) * within) / total, 0.0, 1.0))
+    within = (total - between) / (count - len(parts))
+    return float(np.clip((between - (len(parts) - 1) * within) / total, 0.0, 1.0))
+
+
+def _split_into_groups(x: Floats, y: Floats) -> list[Floats]:
+    """Split y into groups of equal size by x."""
+    groups = int(min(_MAX_GROUPS, max(4, round(2.0 * x.size ** (1.0 / 3.0)))))
+    return np.array_split(y[np.argsort(x, kind="stable")], groups)
+
+
+def chance_probability(x: Floats, y: Floats) -> float:
+    """Return the probability that y depends on x by chance at least as much as these values do, 0 to 1.
+
+    It is the smaller p-value of two tests, doubled: Kruskal and Wallis's of the groups of `first_order_index` (Journal
+    of the American Statistical Association 47, 1952), and Spearman's, which finds a rise or fall in fewer values.
+
+    Returns 1 for fewer than `MIN_FLIGHTS_FOR_INDEX` values, or if x or y does not vary.
+
+    >>> random = np.random.default_rng(1)
+    >>> x = random.random((40, 2))
+    >>> [chance_probability(x[:, k], x[:, 0] + 0.5 * random.random(40)) < 0.001 for k in range(2)]
+    [True, False]
+    """
+    from scipy.stats import kruskal, spearmanr
+
+    if x.size < MIN_FLIGHTS_FOR_INDEX or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return 1.0
+    p_values = kruskal(*_split_into_groups(x, y)).pvalue, spearmanr(x, y).pvalue
+    return min(1.0, 2.0 * float(min(p_values)))
 
 
 def rank_slope(x: Floats, y: Floats) -> float:

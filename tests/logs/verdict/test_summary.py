@@ -107,6 +107,28 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     assert any(line.endswith("defaults; read but not simulated: TERRAIN_FOLLOW") for line in lines)
 
 
+def test_a_name_one_letter_from_a_parameter_has_its_own_note() -> None:
+    """Swapped, missing and wrong letters are misspelled; other batteries and gains and names beside theirs are not."""
+    setup = make_setup(((0.0, 0.0, 100.0), (900.0, 0.0, 100.0)))
+
+    def misspelled(text: str, is_flown: bool = True) -> list[str]:
+        by = replace(setup, autopilot=ArduPlane(ArduPilotParameters.of_text(text, "mine.param")))
+        level = "flown" if is_flown else "geometric"
+        lines = summary_lines([], by, level, (LevelAnswer("autopilot", True, "flyable"),), judging_conditions(by))
+        return [line for line in lines if line.startswith("Not a parameter")]
+
+    for text, wrong, right in (
+        ("WP_RADUIS 50", "WP_RADUIS", "WP_RADIUS"),
+        ("NAVL1_PERID 17", "NAVL1_PERID", "NAVL1_PERIOD"),
+        ("ROLL_LIMIT_DEX 40", "ROLL_LIMIT_DEX", "ROLL_LIMIT_DEG"),
+    ):
+        note = f"Not a parameter of the simulated ArduPlane: {wrong}: did you mean {right}?"
+        assert misspelled(text) == misspelled(text, is_flown=False) == [note]
+    assert misspelled("RLL_RATE_K 0.1") == []
+    assert misspelled("BATT2_CAPACITY 5000\nFOO 1\nRELAY1_PIN 3") == []
+    assert misspelled("WP_RADIUS 50\nWP_RADUIS 50") == []
+
+
 def test_what_px4_has_no_parameter_for_is_not_used() -> None:
     setup = make_setup(((0.0, 0.0, 100.0), (900.0, 0.0, 100.0)))
     asked = replace(setup.scenario, returns=ReturnRequirements(("rtl",), None, np.zeros((0, 3)), 2))

@@ -54,6 +54,22 @@ def test_flights_with_the_same_draws_are_pairs(
     assert (answer["answer"], answer["pairs"], answer["campaigns"][1]["flyable"]) == ("less likely", 50, 36)
 
 
+def test_one_line_says_which_method_decides_where_two_disagree(base: CampaignBase, tmp_path: Path) -> None:
+    """Of 40 pairs five are flyable in the second campaign only: p = 2 / 2 ** 5, but the score interval excludes 0."""
+    first = fly(base, tmp_path / "a", 40, dict.fromkeys(range(5), "slope"))
+    found = planfly.compare_campaigns(first, fly(base, tmp_path / "b", 40, {}))
+    assert (found.answer, found.difference.p_value) == ("more likely", 0.0625)
+    note = (
+        "the interval shows a difference, and decides the answer; McNemar's exact test shows none (p = 0.062, 0.05 is"
+        " the limit)"
+    )
+    assert found.notes == (note,)
+    assert comparison_lines(found)[-1] == f"  note    {note}"
+    sure = planfly.compare_campaigns(first, fly(base, tmp_path / "c", 40, dict.fromkeys(range(5, 30), "slope")))
+    assert sure.difference.p_value < 0.01
+    assert sure.notes == ()
+
+
 def test_other_draws_are_other_samples(base: CampaignBase, tmp_path: Path) -> None:
     first = fly(base, tmp_path / "a", 80, dict.fromkeys(range(32), "slope"))
     second = fly(replace(base, seed=2), tmp_path / "b", 70, dict.fromkeys(range(14), "slope"))

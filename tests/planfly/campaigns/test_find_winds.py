@@ -81,7 +81,7 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     assert found.from_deg(3) == 270.0
     assert found.lost == ()
     # The wind is what is asked for: none is stated, whatever the scenario's is.
-    aircraft, world, pilot = wind_lines(found)[2:5]
+    aircraft, world, pilot = wind_lines(found)[1:4]
     assert aircraft.startswith("Aircraft: aerosonde, 11 kg, 25 m/s")
     assert world.startswith("Conditions: wind from each direction, light turbulence; ")
     assert pilot.startswith("Flown by: ")

@@ -175,10 +175,11 @@ def test_nothing_is_known_next_to_a_direction_that_is_not_judged() -> None:
 
 
 def test_without_a_judged_direction_nothing_is_a_go() -> None:
-    figure = draw_go_no_go([replace(one, is_judged=False) for one in SPOKES], 20.0, 0.99, 0.95, "demo", None)
+    spokes = [replace(one, is_judged=False, is_beyond_search=True) for one in SPOKES]
+    figure = draw_go_no_go(spokes, 20.0, 0.99, 0.95, "demo", None)
     assert not any(path.vertices.size for area in figure.axes[0].collections[:3] for path in area.get_paths())
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts == ["not judged", "flown, all flyable", "flown, some not flyable"]
+    assert texts == ["not judged, 6 flights\nfrom each direction", "flown, all flyable", "flown, some not flyable"]
 
 
 def test_the_legend_of_the_fan_leaves_its_title_free() -> None:

@@ -122,15 +122,37 @@ FOUND = WindsResult(
     ((0, 8.0, True), (0, 8.0, False), (1, 5.0, True), (2, 5.0, True), (3, 20.0, True)),
     (1,),
 )
+# The same boundaries by 150 flights of each direction.
+ESTIMATED = replace(FOUND, flights=tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION)))
 
 
 def test_flights_are_counted_by_wind() -> None:
     first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
-    assert wind_lines(FOUND)[1] == (
+    assert wind_lines(ESTIMATED)[1] == (
         "flies with P >= 0.9, by the best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
         " over 20 m/s from 270°"
     )
+    alike = replace(ESTIMATED, boundaries=(*(WindBoundary(20.0, 18.0 + k, 20.0, True) for k in (1, 0, 1, 1)),))
+    assert wind_lines(alike)[1] == (
+        "flies with P >= 0.9, by the best estimate, in wind up to over 20 m/s from 90° (the lowest; 18.0 to over 20 m/s"
+        " at 95 %)"
+    )
+
+
+def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: Path) -> None:
+    """Of 4 directions with a flight or two, and of one of 149 flights beside three of 150."""
+    assert not any("by the best estimate" in line or "interval" in line for line in wind_lines(FOUND)[1:])
+    assert repr(FOUND) == "<WindsResult 4 directions; 5 flights>"
+    assert all(case.text == "" for case in winds_suite("m", FOUND).cases)
+    write_winds(tmp_path, base, FOUND, "planfly winds x")
+    page = (tmp_path / "winds.html").read_text()
+    assert page.count('<td class="n">not judged</td><td class="n"></td>') == 4
+    assert "not judged, 1 to 2 flights" in page
+    assert "no limit found" not in page
+    partly = replace(ESTIMATED, flights=ESTIMATED.flights[:-1])
+    assert repr(partly) == "<WindsResult 4 directions, 7.0 m/s the lowest; 599 flights>"
+    assert wind_lines(partly)[1].endswith("(the lowest; 6.5 to 7.5 m/s at 95 %), 9.0 m/s from 180°")
 
 
 def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
@@ -141,18 +163,23 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     )
     boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
     found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
-    # The answer of calm air comes before the directions that are not judged.
-    assert wind_lines(found)[1].startswith("not judged: 4 of 4 directions")
-    assert [wind_lines(found)[0], *wind_lines(found)[2:5]] == [
+    # The answer of calm air comes before the direction that is not judged, and is that of the other three.
+    assert wind_lines(found)[0] == "does not fly with P >= 0.9 even in calm air"
+    assert wind_lines(found)[1].startswith("not judged in full: 1 of 4 directions has too few flights (1 flight): each")
+    found = replace(found, flights=ESTIMATED.flights)
+    assert wind_lines(found)[:4] == [
         "does not fly with P >= 0.9, by the best estimate, in any wind from 0°, even a light one;"
         " it flies in wind up to 2.0 m/s from 270°",
         "in calm air, 3 of 4 flights fail",
         "  failed  slopes in 1: leg 2 in 1",
         "  failed  clearance in 3: leg 4 in 3",
     ]
-    nowhere = replace(found, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:]))
-    assert wind_lines(nowhere)[::2][:2] == [
-        "does not fly with P >= 0.9, by the best estimate, even in calm air",
+    # Four directions that fail in calm air need no flights in wind.
+    nowhere = replace(
+        found, flights=FOUND.flights, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:])
+    )
+    assert wind_lines(nowhere)[:2] == [
+        "does not fly with P >= 0.9 even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]
 
@@ -209,7 +236,8 @@ def test_what_flights_show_by_themselves_where_none_failed() -> None:
 
 
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
-    assert wind_lines(FOUND)[0].startswith("not judged: 4 of 4 directions have too few flights: each requires at least")
+    few = "not judged: 4 of 4 directions have too few flights (1 to 2 flights): each requires at least 150"
+    assert wind_lines(FOUND)[0].startswith(few)
     boundary = WindBoundary(7.0, 6.8, 7.3, False)
     settled = WindsResult(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(MIN_FLIGHTS_PER_DIRECTION)))
     assert not any("not judged" in line for line in wind_lines(settled))
@@ -234,9 +262,21 @@ def test_the_cases_of_continuous_integration_are_the_answer_and_each_direction()
     narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
     judged = winds_suite("m", replace(FOUND, flights=settled, boundaries=narrow))
     assert [case.result for case in judged.cases] == ["passed"] * 5
+    assert judged.cases[1].text == "wind up to 5.0 m/s"
+    # What fails in calm air fails from every direction.
+    calm = (WindBoundary(0.0, 0.0, 0.0, False),) * 4
+    flights = ((0, 0.0, False),) * 3
+    failing = winds_suite("m", replace(FOUND, boundaries=calm, flights=flights, calm=CalmFailures(0.0, 3, 3, ())))
+    assert [case.result for case in failing.cases] == ["failure"] * 5
+    assert {case.message for case in failing.cases} == {"does not fly with P >= 0.9 even in calm air"}
 
 
 def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
+    write_winds(tmp_path, base, ESTIMATED, "planfly winds x")
+    page = (tmp_path / "winds.html").read_text()
+    # Of a direction that is known, and of one whose interval ends beyond.
+    assert '<td class="n">7.0 m/s</td><td class="n">6.5 to 7.5</td>' in page
+    assert '<td class="n">over 20 m/s</td><td class="n">18.0 to over 20</td>' in page
     write_winds(tmp_path, base, FOUND, "planfly winds x")
     data = json.loads((tmp_path / "winds.json").read_text())
     assert [one["boundary_mps"] for one in data["directions"]] == [7.0, 8.0, 9.0, 20.0]
@@ -249,11 +289,7 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     assert data["lost"] == [1]
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
     page = (tmp_path / "winds.html").read_text()
-    assert "over 20 m/s" in page
     assert page.count('<svg role="img" aria-label="Go/no-go chart') == 2
-    # Of a direction that is known, and of one whose interval ends beyond.
-    assert "6.5 to 7.5" in page
-    assert "18.0 to over 20" in page
     assert "lost      1 could not be flown" in page
 
 

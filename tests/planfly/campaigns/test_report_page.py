@@ -1,19 +1,23 @@
 """The page: whole, with its pictures inside and nothing fetched."""
 
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.report import campaign_page
+from planfly.campaigns.summary import Sensitivity
 from tests.planfly.campaigns.made_report import made_report
 
 
 @pytest.fixture(scope="module")
 def pages(base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """Made twice."""
+    """Made twice, with a quantity that explains the margin of the made flights, which depends on none."""
     with made_report(base, tmp_path_factory.mktemp("page")) as (store, summary):
+        assert summary.drivers == ()
+        summary = replace(summary, sensitivities=(Sensitivity("mass", 0.5, -0.7, p_value=1e-6),))
         return [campaign_page(base, summary, store, "planfly campaign <x>").decode() for _ in range(2)]
 
 

@@ -1,19 +1,25 @@
 """The summary: counts by rule and place, and the same text for any number of workers."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
+import numpy as np
+
+from aircraft.uncertainty import Draws
 from logs.verdict.junit import suites_text
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.dispersions import draw_flight
 from planfly.campaigns.failure_counts import count_failures
 from planfly.campaigns.flight_row import FlightRow, MinimumMargin, Outcome
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import campaign_page
 from planfly.campaigns.statistics.decision import Answer, Estimator, Goal
 from planfly.campaigns.summary import (
+    CampaignSummary,
     campaign_lines,
     campaign_suite,
     closest_text,
@@ -135,12 +141,72 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     }
 
 
+def summary_of_margins(
+    base: CampaignBase, folder: Path, flights: Sequence[tuple[float | None, bool]]
+) -> CampaignSummary:
+    """A campaign of flights with these slope margins, deg, None if it is unknown, that failed the rule or not."""
+    goal = Goal(None, False, len(flights))
+    with open_store(base, goal, folder, resume=False) as store:
+        for index, (margin, has_failed) in enumerate(flights):
+            row = with_margins(base, index, failed=("slope",) if has_failed else ())
+            known = (("slope", MinimumMargin(margin, "deg", Place("leg", 1))),) if margin is not None else ()
+            store.add(replace(row, margins=known))
+        return summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+
+
+def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
+    base: CampaignBase, tmp_path: Path
+) -> None:
+    """16 of 40 fail without a number; with one of 41, two flights of the lowest 5 % are between -inf and 0.5."""
+    passed = [(0.5 + 0.1 * k, False) for k in range(40)]
+    unknown = "16 of 40 flights fail it, by an unknown margin"
+    cases = {
+        "many": ([*passed[:24], *[(None, True)] * 16], unknown, None, None),
+        "one": ([*passed, (None, True)], "one flight in twenty has a margin below 0.6°", 0.6, None),
+        "known": ([*passed, (-2.0, True)], "one flight in twenty has a margin below 0.6°", 0.6, -2.0),
+        # A leg may pass by 3 degrees where another one fails without a number.
+        "other leg": (
+            [*passed[:24], *[(3.0, True)] * 16],
+            "16 of 40 flights fail it, by an unknown margin",
+            None,
+            None,
+        ),
+    }
+    for name, (flights, text, low_margin, lowest) in cases.items():
+        (tmp_path / name).mkdir()
+        summary = summary_of_margins(base, tmp_path / name, flights)
+        line = campaign_lines(summary)[-1]
+        assert line == f"  decides slopes: {text}; nothing that was drawn is shown to explain the margin"
+        data = json.loads(summary_json(summary))
+        assert (data["margin_of_one_in_twenty"], data["margin_unit"]) == (low_margin, "deg")
+        assert (data["closest_rules"][0]["smallest_margin"], data["closest_rules"][0]["unit"]) == (lowest, "deg")
+
+
+def test_only_what_is_shown_to_explain_the_margin_is_named_also_of_the_aircraft(
+    base: CampaignBase, tmp_path: Path
+) -> None:
+    """The margin of 40 flights is the drawn thrust, of which the table has no column; eleven others are noise."""
+    thrust = np.random.default_rng(5).normal(1.0, 0.1, 64)
+    names = ("ident/thrust", "ident/lift-slope")
+    draws = Draws(names, np.column_stack((thrust, np.random.default_rng(6).normal(1.0, 0.1, 64))), "draws.csv")
+    drawn = replace(base, dispersions=base.dispersions.with_draws(draws))
+    seeds = [draw_flight(drawn.dispersions, drawn.seed, index).seed for index in range(40)]
+    summary = summary_of_margins(drawn, tmp_path, [(5.0 * float(thrust[seed % 64]), False) for seed in seeds])
+    assert [driver.quantity for driver in summary.drivers] == ["ident/thrust"]
+    assert "; of the margin's variance the aircraft's thrust explains " in campaign_lines(summary)[-1]
+    sensitivities = {entry["quantity"]: entry for entry in json.loads(summary_json(summary))["sensitivities"]}
+    assert {name for name, entry in sensitivities.items() if entry["shown"]} == {"ident/thrust"}
+    assert {"ident/lift-slope", "mass", "wind_speed"} < set(sensitivities)
+    # The index of noise is often above 5 %.
+    assert max(entry["first_order"] for name, entry in sensitivities.items() if name != "ident/thrust") > 0.05
+
+
 def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Path) -> None:
     """Eight flights cannot say what a margin depends on, and are not drawn as eleven times 0 %."""
     with made_report(base, tmp_path, flights=8) as (store, summary):
         assert summary.deciding == "clearance"
         assert summary.sensitivities == ()
-        assert "would show what the margin depends on" in campaign_lines(summary)[-1]
+        assert "; at least 30 flights that this rule judges would show" in campaign_lines(summary)[-1]
         assert "What the smallest margin depends on" not in campaign_page(base, summary, store, "").decode()
 
 

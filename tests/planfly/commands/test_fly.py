@@ -51,6 +51,7 @@ def test_a_thinner_log_is_judged_as_it_is(flight: Path, tmp_path: Path) -> None:
     assert main(["check", str(log), "--json", str(tmp_path / "v.json")]) == code
     assert thin.recorded_verdict is not None
     answer = json.loads((tmp_path / "v.json").read_text(encoding="utf-8"))
+    assert answer.pop("returns")["line"]
     assert answer == thin.recorded_verdict | {"exit_code": code}
 
 

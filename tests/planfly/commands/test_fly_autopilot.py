@@ -60,7 +60,9 @@ def test_a_flight_is_logged_judged_and_judged_again(
     again = tmp_path / "again.json"
     assert main(["check", str(log), "--json", str(again)]) == code
     assert recorded.recorded_verdict is not None
-    assert json.loads(again.read_text(encoding="utf-8")) == recorded.recorded_verdict | {"exit_code": code}
+    answer = json.loads(again.read_text(encoding="utf-8"))
+    answer.pop("returns")
+    assert answer == recorded.recorded_verdict | {"exit_code": code}
     assert recorded.recorded_verdict["flown_by"]["changed"] == {"NAVL1_PERIOD": 17.0, "ROLL_LIMIT_DEG": 35.0}
 
 

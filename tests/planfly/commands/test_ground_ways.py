@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from planfly.cli import main
+from tests.planfly.terminal.answers.checked_answers import answered
 
 HOME = "36.2726545 -84.2614207"
 # 2.5 and 4.5 km from home to the north-west, 80 m and more over the ridge between: 200 m higher than the steepest climb
@@ -41,6 +42,16 @@ def test_a_first_waypoint_behind_a_ridge_is_not_judged_in_full(
     assert "The aircraft can" not in out
     assert "Airframe alone (planfly's guidance, exact navigation): flyable in the air; both flights agree" in out
     assert main(["check", str(tmp_path / "f.mcap")]) == 3
+
+
+@pytest.mark.parametrize("mission", ["air"], indirect=True)
+def test_the_answer_counts_returns_by_outcome(mission: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The line of returns beside the verdict states the same numbers; returns over the ridge hit the ground."""
+    answer = answered(capsys, 3, "check", "--geometry", mission, "--terrain", "jacksboro")
+    returns = answer["returns"]
+    assert returns["outcomes"]["ground"] > 0
+    assert sum(returns["outcomes"].values()) == returns["returns"]
+    assert returns["line"].startswith(f"of {returns['returns']} returns {returns['outcomes']['ground']} hit the ground")
 
 
 @pytest.mark.parametrize(

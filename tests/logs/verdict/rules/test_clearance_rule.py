@@ -53,6 +53,21 @@ def test_clearance_is_exact_and_says_where() -> None:
     assert ("departure", FLIGHT) in failing(judge(setup, edited(dive, position=dive.position - [0, 0, 20.0])))
 
 
+@pytest.mark.parametrize(
+    ("depth", "flown", "text"), [(0.3, 0.0, "on the ground at "), (5.0, -5.0, "5.0 m below ground at ")]
+)
+def test_the_row_of_a_ground_contact_is_on_the_ground(depth: float, flown: float, text: str) -> None:
+    """A track through a summit 260 m high, at its closest this far below it; level ground is 0 m high."""
+    hill_at = {"kind": "peaks", "peak": [{"east_m": 0.0, "north_m": 3000.0, "height_m": 260.0, "sigma_m": 400.0}]}
+    setup = make_setup([[0, 0, 300], [0, 2000, 300], [0, 6000, 300]], terrain=hill_at)
+    track = fly_path(setup)
+    height = of(judge(setup, track), "clearance", leg(1)).flown or 0.0
+    item = of(judge(setup, edited(track, position=track.position - [0, 0, height + depth])), "clearance", leg(1))
+    assert (item.ok, item.flown) == (False, pytest.approx(flown, abs=1e-3))
+    assert item.reason.startswith(text)
+    assert item.margin == pytest.approx(flown - (item.limit or 0.0), abs=1e-3)
+
+
 def with_hole(setup: FlightSetup) -> FlightSetup:
     """The setup over ground without data 100 m around the line, from 3000 m to 3500 m north."""
     ground = setup.scenario.terrain

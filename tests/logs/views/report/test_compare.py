@@ -60,6 +60,14 @@ def test_a_rule_that_fails_shows_no_margin_of_what_passes_beside_it(
     assert "11.6" not in line
 
 
+def test_a_name_is_printed_whole(log_file: Path) -> None:
+    """The names of two logs may differ at their beginnings only."""
+    log = read_log(log_file)
+    names = ("north-02-bad-ridge-cross.waypoints.mcap", "south-02-bad-ridge-cross.waypoints.mcap")
+    header = difference_lines(compare_logs(log, log, names=names))[0]
+    assert header.split() == [*names, "difference"]
+
+
 def test_a_rule_is_called_as_on_the_terminal(log_file: Path) -> None:
     log = read_log(log_file)
     _, items = compared(log, log)

@@ -44,6 +44,7 @@ def failed(rule: str, flown: float | None, limit: float, margin: float | None, p
 @pytest.mark.parametrize(
     ("rule", "flown", "limit", "margin", "tolerance", "missed"),
     [
+        ("completion", 2.0, 3.0, -1.0, 0.0, "1 leg"),
         ("clearance", 52.0, 60.0, -8.0, None, "8.00\u00a0m"),
         # Beyond the limit by 1.5 m, of which 0.5 m are tolerated.
         ("corridor", 61.5, 60.0, -1.5, 0.5, "1.00\u00a0m"),
@@ -54,7 +55,9 @@ def failed(rule: str, flown: float | None, limit: float, margin: float | None, p
 def test_a_failed_finding_states_by_how_much_it_missed(
     rule: str, flown: float, limit: float, margin: float | None, tolerance: float | None, missed: str
 ) -> None:
-    item = replace(failed(rule, flown, limit, margin), tolerance=tolerance, unit="m")
+    item = replace(
+        failed(rule, flown, limit, margin), tolerance=tolerance, unit="legs" if rule == "completion" else "m"
+    )
     assert [row.missed_by for row in finding_rows([item])] == [missed]
     assert [row.missed_by for row in finding_rows([replace(item, ok=True)])] == [""]
 

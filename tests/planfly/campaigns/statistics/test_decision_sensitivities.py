@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from planfly.campaigns.statistics.decision import MIN_FLIGHTS_FOR_INDEX, first_order_index, rank_slope
+from planfly.campaigns.statistics.decision import (
+    MIN_FLIGHTS_FOR_INDEX,
+    chance_probability,
+    first_order_index,
+    rank_slope,
+)
 
 
 def ishigami(x: np.ndarray) -> np.ndarray:
@@ -51,3 +56,19 @@ def test_rank_slope_says_which_way() -> None:
     assert rank_slope(x, np.exp(x)) == 1.0
     assert rank_slope(x, -x) == -1.0
     assert rank_slope(x, np.ones(50)) == 0.0
+
+
+def test_chance_is_as_rare_as_it_says() -> None:
+    """Of 500 pairs that do not depend on each other 5 % are below 0.05, at most; the deviation is 1 %."""
+    random = np.random.default_rng(4)
+    found = np.array([chance_probability(*random.random((2, 40))) for _ in range(500)])
+    assert 0.02 < np.mean(found < 0.05) < 0.08
+
+
+def test_a_rise_and_a_valley_are_no_chance() -> None:
+    """Spearman finds the rise in 40 values, and the groups find the valley, whose rank correlation is 0."""
+    x = np.linspace(-1.0, 1.0, 40)
+    assert chance_probability(x, x) < 1e-6
+    assert chance_probability(x, x**2) < 1e-3
+    assert chance_probability(x[:20], x[:20]) == 1.0
+    assert chance_probability(x, np.ones(40)) == 1.0
