@@ -213,6 +213,7 @@ class FlightRow:
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
     marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
+    undecided: rule and reason of each finding that leaves the verdict undecided; the tables do not store them.
     """
 
     draw: Draw
@@ -229,6 +230,7 @@ class FlightRow:
     seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
     worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
     marginal_passes: tuple[MarginalPass, ...] = ()
+    undecided: tuple[tuple[str, str], ...] = ()
 
     @property
     def closeness(self) -> float:
@@ -275,20 +277,22 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         reference="never",
         findings_only=log is None,
     )
-    track, route = flight.track, varied_flight.setup.route
+    track, route, verdict = flight.track, varied_flight.setup.route, flight.verdict
+    undecided = undecided_findings(verdict.findings) if verdict.undecided else ()
     has_rows = len(track) > 0
     return FlightRow(
         draw=draw,
-        outcome="flyable" if flight.verdict.flies else "not flyable",
+        outcome="flyable" if verdict.flies else "not flyable",
         ended=flight.ended,
-        failed=list_failed_findings(flight.verdict),
-        margins=find_minimum_margins(flight.verdict.findings),
-        missile_distance=_missile_distance(flight.verdict.findings),
-        energy_left=varied_flight.setup.battery - float(track.energy[-1]) if has_rows else None,
+        failed=list_failed_findings(verdict),
+        margins=find_minimum_margins(verdict.findings),
+        missile_distance=_missile_distance(verdict.findings),
+        energy_left=max(0.0, varied_flight.setup.battery - float(track.energy[-1])) if has_rows else None,
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
         crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
-        marginal_passes=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
+        marginal_passes=find_marginal_passes(verdict.findings, varied_flight.setup.scenario, track),
+        undecided=tuple((finding.rule, finding.reason) for finding in undecided),
         seconds=time.perf_counter() - start_time,
     )
 
