@@ -110,7 +110,7 @@ def ground_risk_page(result: GroundRiskResult, figure: Figure, command: str) -> 
             *ground_risk_text.risk_lines(result),
         ],
         figures=[(figure, "Map of the ground risk: flight geography, operational volume and ground risk buffer")],
-        tables=[PageTable([("quantity", ""), ("value", "u"), ("source", "")], rows)],
+        tables=[PageTable([("quantity", ""), ("value", ""), ("source", "")], rows)],
         explanation=[ground_risk_text.TABLE_EXPLANATION],
         command=command,
     )

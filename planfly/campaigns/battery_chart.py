@@ -87,7 +87,7 @@ def draw_battery(result: BatteryResult) -> Figure:
                 color=theme.colour("good" if result.is_enough else "fail"),
                 linewidth=1.8,
                 linestyle=":",
-                label=f"the aircraft's: {result.own_capacity:.0f} Wh{' (beyond the right edge)' if is_beyond else ''}",
+                label=f"the aircraft's: {result.own_capacity:.0f} Wh{' →' if is_beyond else ''}",
             )
         axes.set_xlim(*edges)
         figure.legend(loc="lower left", bbox_to_anchor=(0.07, 0.0), ncols=3, fontsize=9)

@@ -24,7 +24,7 @@ class PageTable(NamedTuple):
     """Table of a page.
 
     columns: title and style of each column.
-    rows: cells of each row.
+    rows: cells of each row; the last cell of a shorter row fills the rest of the row.
     heading: heading above the table; "" for none.
     """
 

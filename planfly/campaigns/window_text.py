@@ -60,9 +60,9 @@ DEPARTURE_COLUMNS = ("flyable", "95 % interval", "wind at the start", "least ene
 
 
 def departure_cells(departure: Departure) -> tuple[str, ...]:
-    """Return the cells of a departure below `DEPARTURE_COLUMNS`; only the last is filled if it was not flown."""
+    """Return the cells of a departure below `DEPARTURE_COLUMNS`; a single cell with the reason if it was not flown."""
     if not departure.rows:
-        return ("", "", "", "", f"not judged: {departure.not_judged}")
+        return (f"not judged: {departure.not_judged}",)
     speed, from_deg = departure.wind
     low, high = departure.interval
     return (
@@ -84,7 +84,9 @@ def window_lines(result: WindowResult) -> list[str]:
     lines = ["take-off, UTC     flyable   95 % interval  wind at the start   least energy  decided by"]
     for departure in result.departures:
         start = f"{departure.time:{TIME_FORMAT}}"
-        count, interval, wind, energy, decided = departure_cells(departure)
-        columns = f"{count:>8}  {interval:>12}   {wind:<18}  {energy:>12}  " if departure.rows else ""
-        lines.append(f"{start}  {columns}{decided}".rstrip())
+        cells = departure_cells(departure)
+        widths = (">8", ">13", "<18", ">12", "") if departure.rows else ("",)
+        lines.append(
+            "  ".join([start, *(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))]).rstrip()
+        )
     return lines

@@ -261,6 +261,11 @@ def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:
         assert list_failed_findings(other)
 
 
+def test_an_empty_battery_has_nothing_left(base: CampaignBase) -> None:
+    empty = fly_one(replace(base, airframe=replace(base.airframe, battery=1.0)), 0)
+    assert (empty.outcome, empty.energy_left) == ("not flyable", 0.0)
+
+
 def test_a_lost_flight_keeps_its_draw(base: CampaignBase) -> None:
     assert make_lost_row(base, 4, "died").draw == fly_one(base, 4).draw
 
