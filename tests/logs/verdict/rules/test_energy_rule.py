@@ -252,7 +252,7 @@ def test_px4_without_a_capacity_reads_the_charge_from_the_voltage(threshold: flo
 
 
 def test_an_empty_battery_is_said_and_what_is_needed_follows_from_the_prediction(setup: FlightSetup) -> None:
-    """At most 1.50871 times the prediction, a logarithm with a deviation of 0.25, and not times what the battery had."""
+    """At most 1.50871 times the prediction (a logarithm with a deviation of 0.25), not times what the battery had."""
     unsure = replace(load_envelope(AEROSONDE), source="a data sheet", power_sd=0.25)
     small = replace(real_setup(table=unsure), battery=20.0)
     predicted, _ = predicted_energy(route_requirements(small))
