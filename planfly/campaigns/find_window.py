@@ -89,7 +89,7 @@ class Departure:
     @property
     def undecided(self) -> int:
         """Number of flights that are not judged in full."""
-        return sum(bool(row.undecided) for row in self.rows)
+        return sum(row.undecided for row in self.rows)
 
     def is_judged_in_full(self, probability: float) -> bool:
         """Return True if the flights that are not judged in full do not decide whether the departure is open.
@@ -99,7 +99,7 @@ class Departure:
         if not self.rows:
             return False
         least = sum(row.outcome == "flyable" and not row.undecided for row in self.rows)
-        most = sum(row.outcome == "flyable" or bool(row.undecided) for row in self.rows)
+        most = sum(row.outcome == "flyable" or row.undecided for row in self.rows)
         return least / len(self.rows) >= probability or most / len(self.rows) < probability
 
     @property

@@ -46,13 +46,11 @@ def _best_text(result: WindowResult) -> str:
 
 def unjudged_lines(result: WindowResult) -> list[str]:
     """Return a line with the rules that are not judged in some flights, each with its first reason; [] if none is."""
-    reasons: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for departure in result.departures:
         for row in departure.rows:
-            for rule, reason in row.undecided:
-                reasons.setdefault(rule, reason)
-    texts = [f"{RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
-    return [f"Not judged: {'; '.join(texts)}"] if texts else []
+            texts = dict(row.unjudged) | texts
+    return [f"Not judged: {'; '.join(texts.values())}"] if texts else []
 
 
 # Columns of the table of departures after the time of take-off.

@@ -184,14 +184,15 @@ def test_all_rules_that_fail_most_flights_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("outcome", "words"), [("flyable", "10 of 10"), ("not flyable", "0 of 10")])
 def test_what_is_not_judged_is_named_and_decides_nothing(outcome: str, words: str, tmp_path: Path) -> None:
     """Whether the flights are flyable but for the take-off, or not judged in full."""
-    undecided = (("takeoff", "PX4's take-off is not simulated"),)
-    result = changed(found(open_in(tmp_path, hourly_winds(4.0, 4.0)), 0.0, 0.0), outcome=outcome, undecided=undecided)
+    unjudged = (("takeoff", "take-off (PX4's take-off is not simulated)"),)
+    result = found(open_in(tmp_path, hourly_winds(4.0, 4.0)), 0.0, 0.0)
+    result = changed(result, outcome=outcome, undecided=True, unjudged=unjudged)
     assert result.is_go is None
     assert f"UTC: not judged in full: {words} flights are flyable, 10 are not judged in full; " in answer_line(result)
     assert unjudged_lines(result) == ["Not judged: take-off (PX4's take-off is not simulated)"]
     # Two of ten flights that are not judged do not decide a probability of 0.8.
     first, *_ = found(open_in(tmp_path, hourly_winds(4.0, 4.0)), 0.0).departures
-    rows = tuple(replace(row, undecided=undecided if row.outcome != "flyable" else ()) for row in first.rows)
+    rows = tuple(replace(row, undecided=row.outcome != "flyable") for row in first.rows)
     assert Departure(first.time, first.scenarios, rows).is_judged_in_full(0.8)
     assert not Departure(first.time, first.scenarios, rows).is_judged_in_full(0.81)
 
