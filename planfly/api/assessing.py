@@ -79,19 +79,21 @@ def ground_risk(
     )
     with stage("flying", "flying for the ground risk") as advance:
         result = find_ground_risk(base, goal, workers_used, advance)
-    if out is None:
-        return result
-    question = {
-        "population": population,
-        "population_unit": None if population is None else population_unit,
-        "controlled": controlled,
-        "max_speed": max_speed,
-        "probability": probability,
-        "glide": glide,
-        "every": every,
+    command = answer_command_line("ground-risk", target, base, options, _goal_options(goal))
+    return result if out is None else _with_files(result, Path(out), command, overwrite=overwrite)
+
+
+def _goal_options(goal: GroundRiskGoal) -> dict[str, object]:
+    """Return the options of the command line that state a question, by name."""
+    return {
+        "population": goal.population,
+        "population_unit": None if goal.population is None else goal.unit,
+        "controlled": goal.controlled,
+        "max_speed": goal.speed,
+        "probability": goal.probability,
+        "glide": goal.glide,
+        "every": goal.interval,
     }
-    command = answer_command_line("ground-risk", target, base, options, question)
-    return _with_files(result, Path(out), command, overwrite=overwrite)
 
 
 def _with_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:

@@ -93,11 +93,9 @@ def window(
     goal = WindowGoal(departure_times(first, end, step, asked), asked, probability, options["flights"], zone)
     with stage("flying", f"flying {len(goal.departures)} departures") as advance:
         result = find_window(base, goal, workers, advance)
-    if out is None:
-        return result
     question = {"from": earliest, "to": latest, "every": every, "probability": probability}
     command = answer_command_line("window", target, base, options, question)
-    return _with_files(result, Path(out), command, overwrite=overwrite)
+    return result if out is None else _with_files(result, Path(out), command, overwrite=overwrite)
 
 
 def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Sequence[datetime]) -> CampaignBase:
