@@ -47,7 +47,6 @@ LONGER = {
     "logs/views/profile.py:profile_chart": 64,
     "planfly/api/drafting.py:new_scenario": 61,
     "planfly/api/optimising.py:optimise": 66,
-    "planfly/campaigns/pictures.py:narrow_figure": 62,
     "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
     "planner/evaluation/threat_index.py:kill_density": 73,
     "planner/search/plan_path.py:plan_path": 67,

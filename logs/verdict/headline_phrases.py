@@ -48,6 +48,11 @@ def excess_phrase(noun: str, finding: Finding) -> str:
     return _with_place(noun, finding, sign.join(compared_texts(worst_value, limit, finding.unit)))
 
 
+def slope_phrase(noun: str, finding: Finding) -> str:
+    """Return a phrase with the reason if the aircraft can fly no slope on the leg; else `excess_phrase`."""
+    return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
+
+
 def small_circle_phrase(noun: str, finding: Finding) -> str:
     """Return a phrase such as "loiter at waypoint 3 (radius 40 m < 76 m)"; else `excess_phrase`."""
     limit = finding.effective_limit

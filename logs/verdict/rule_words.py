@@ -14,6 +14,7 @@ from logs.verdict.headline_phrases import (
     photo_line_phrase,
     reason_phrase,
     shortfall_phrase,
+    slope_phrase,
     small_circle_phrase,
     zone_phrase,
 )
@@ -118,6 +119,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="slopes",
             question="Can each leg be climbed or descended at its airspeed in this wind, and was it?",
             margin=Margin("slope", "deg", 1.0),
+            phrase=slope_phrase,
             urgency=1,
         ),
         RuleWords(

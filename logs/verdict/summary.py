@@ -222,9 +222,7 @@ def summary_lines(
     lines += [*condition_lines(conditions), autopilot_line(conditions, is_flown=level == "flown")]
     lines += _parameter_lines(setup, is_flown=level == "flown")
     lines += _ignored_settings_lines(setup)
-    lines += _unjudged_lines(findings)
-    if reason := unjudged_return_text(setup):
-        lines.append(f"Not judged: {RULE_WORDS['return'].title} ({reason})")
+    lines += [f"Not judged: {text}" for _, text in unjudged_parts(findings, setup)]
     # These are limits of PX4 and not of the aircraft, so they decide nothing for another autopilot.
     lines += [
         f"PX4 would reject the mission: {finding.reason}"
@@ -256,9 +254,9 @@ def summary_lines(
     return tuple(lines)
 
 
-def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return a line for each rule with unjudged findings that the summary explains: the places and the first reason."""
-    lines = []
+def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tuple[str, str]]:
+    """Return each rule with unjudged findings that the summary explains, and a text: places and first reason."""
+    parts = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
         unjudged = [finding for finding in rule_findings if finding.ok is None]
@@ -268,8 +266,10 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
         rest = f" and {len(places) - _MAX_NAMED_FINDINGS} more" if len(places) > _MAX_NAMED_FINDINGS else ""
         is_part = len(places) == len(unjudged) < len(rule_findings)
         place = f" on {'; '.join(places[:_MAX_NAMED_FINDINGS])}{rest}" if is_part else ""
-        lines.append(f"Not judged: {rule.title}{place} ({unjudged[0].reason})")
-    return lines
+        parts.append((rule.name, f"{rule.title}{place} ({unjudged[0].reason})"))
+    if reason := unjudged_return_text(setup):
+        parts.append(("return", f"{RULE_WORDS['return'].title} ({reason})"))
+    return parts
 
 
 def _airframe_or_autopilot_lines(

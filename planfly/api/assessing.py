@@ -4,17 +4,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
-from planfly.api.campaigns import make_workers, open_sample
+from planfly.api.campaigns import answer_command_line, make_workers, open_sample
 from planfly.arguments import check_arguments
 from planfly.campaigns.find_ground_risk import GroundRiskGoal, GroundRiskResult, find_ground_risk
 from planfly.flight_options import SampleOptions, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import GROUND_RISK_FILES, check_output_folder, clean_folder
+from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
 from world.extras import requires_extra
-from world.files import write_atomically
 from world.population import PopulationUnit
 from world.scenario import Scenario
 
@@ -50,8 +49,8 @@ def ground_risk(
     probability: fraction of the flights that the flight geography holds.
     glide: True to include glides after an engine failure in the ground risk buffer.
     every: time between two returns, s.
-    out: folder for ``ground-risk.kml``, ``.geojson``, ``.png`` and ``.md``; None writes none.  overwrite: True replaces
-    them.
+    out: folder for ``ground-risk.kml``, ``.geojson``, ``.png`` and ``.md``, and ``report.html``; None writes none.
+    overwrite: True replaces them.
     flights: number of flights.  spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see
     `planfly.fly`.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -80,15 +79,34 @@ def ground_risk(
     )
     with stage("flying", "flying for the ground risk") as advance:
         result = find_ground_risk(base, goal, workers_used, advance)
-    return result if out is None else _with_files(result, Path(out), overwrite=overwrite)
+    command = answer_command_line("ground-risk", target, base, options, _goal_options(goal))
+    return result if out is None else _with_files(result, Path(out), command, overwrite=overwrite)
 
 
-def _with_files(result: GroundRiskResult, folder: Path, *, overwrite: bool) -> GroundRiskResult:
-    """Write volumes, map and table of a result into a folder, and return the result with the files."""
+def _goal_options(goal: GroundRiskGoal) -> dict[str, object]:
+    """Return the options of the command line that state a question, by name."""
+    return {
+        "population": goal.population,
+        "population_unit": None if goal.population is None else goal.unit,
+        "controlled": goal.controlled,
+        "max_speed": goal.speed,
+        "probability": goal.probability,
+        "glide": goal.glide,
+        "every": goal.interval,
+    }
+
+
+def _with_files(result: GroundRiskResult, folder: Path, command: str, *, overwrite: bool) -> GroundRiskResult:
+    """Write volumes, map, table and page of a result into a folder, and return the result with the files.
+
+    command: command line that repeats the search; "" if there is none.
+    """
     # Imported here: only pictures need matplotlib.
+    from logs.views.drawing import png_bytes
     from logs.views.exports.risk_files import risk_geojson, risk_kml
-    from logs.views.figures import draw_pictures
+    from logs.views.figures import draw
     from logs.views.ground_risk import RiskVolume, ground_risk_map
+    from planfly.campaigns.answer_pages import ground_risk_page
     from planfly.campaigns.ground_risk_text import table_text
 
     setup = result.base.nominal_setup()
@@ -104,14 +122,12 @@ def _with_files(result: GroundRiskResult, folder: Path, *, overwrite: bool) -> G
     )
     properties = {"mission": result.base.name, "ground_risk_class": result.ground_class}
     with stage("drawing", "drawing the ground risk"):
-        pictures = draw_pictures({"ground-risk": ground_risk_map(setup, volumes, result.population)})
-    contents: dict[str, str | bytes] = {
-        "ground-risk.kml": risk_kml(setup, volumes),
-        "ground-risk.geojson": risk_geojson(setup, volumes, properties),
-        "ground-risk.png": pictures["ground-risk.png"],
-        "ground-risk.md": table_text(result),
-    }
-    clean_folder(folder, GROUND_RISK_FILES, overwrite=overwrite)
-    for name in GROUND_RISK_FILES:
-        write_atomically(folder / name, contents[name])
-    return replace(result, files=tuple(folder / name for name in GROUND_RISK_FILES))
+        figure = draw(ground_risk_map(setup, volumes, result.population))
+        contents: dict[str, str | bytes] = {
+            "ground-risk.kml": risk_kml(setup, volumes),
+            "ground-risk.geojson": risk_geojson(setup, volumes, properties),
+            "ground-risk.png": png_bytes(figure),
+            "ground-risk.md": table_text(result),
+            "report.html": ground_risk_page(result, figure, command).render(),
+        }
+    return replace(result, files=replace_files(folder, contents, overwrite=overwrite))

@@ -1,6 +1,7 @@
 """Find the probability that a mission is flyable, its strongest winds and its smallest battery, by many flights."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Unpack
@@ -8,7 +9,13 @@ from typing import Unpack
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
-from planfly.campaigns.campaign_result import CampaignResult, campaign_command_line, make_goal, winds_command_line
+from planfly.campaigns.campaign_result import (
+    CampaignResult,
+    campaign_command_line,
+    command_line,
+    make_goal,
+    winds_command_line,
+)
 from planfly.campaigns.compare_campaigns import CampaignComparison, campaign_table, compare_tables
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
 from planfly.campaigns.find_battery import BatteryGoal, BatteryResult, find_battery
@@ -39,6 +46,7 @@ from planfly.flight_options import (
     CampaignOptions,
     MissionOptions,
     SampleOptions,
+    WindowOptions,
     WindsOptions,
     fence_file_names,
     select_mission_options,
@@ -48,6 +56,7 @@ from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.process_setup import end_repeated_call
 from planfly.runtime.stages import report_line, stage
+from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
 from world.argument_types import checks_types
 from world.errors import ArgumentError, PlanflyError
@@ -131,6 +140,29 @@ def _command_line_options(
         "scenario": _scenario_file(named_scenario, folder) if isinstance(named_scenario, Scenario) else named_scenario,
         "fence": fence_file_names(options),
     }
+
+
+def answer_command_line(
+    command: str,
+    target: Plan | Scenario | str | Path,
+    base: CampaignBase,
+    options: SampleOptions | WindowOptions,
+    question: Mapping[str, object],
+) -> str:
+    """Return the command line that repeats a window, a battery or a ground risk.
+
+    Returns "" for a target or a scenario that is an object in Python, which the command line cannot name.
+
+    question: options of the command itself, by name.
+    """
+    if not isinstance(target, str | Path) or isinstance(options.get("scenario"), Scenario):
+        return ""
+    mission = {**select_mission_options(options), "fence": fence_file_names(options), "seed": base.seed}
+    return command_line(
+        command,
+        str(target),
+        {**question, "flights": options.get("flights"), "spread": options.get("spread"), **mission},
+    )
 
 
 def make_workers(count: int | None, scheduler: str | None, seed: int | None) -> Workers:
@@ -222,16 +254,16 @@ def campaign(
             if options["flights"] is None:
                 _report_flight_count(goal, directory.folder)
         base = _open_base(target, options, _read_spread(spread), directory)
-        command_line = campaign_command_line(
+        repeated = campaign_command_line(
             _command_line_target(target, directory.folder),
             goal,
             _command_line_options(base, options, spread, directory.folder),
         )
-        return _fly_and_summarise(base, goal, workers_used, directory, command_line, keep=out is not None)
+        return _fly_and_summarise(base, goal, workers_used, directory, repeated, keep=out is not None)
 
 
 def _fly_and_summarise(
-    base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command_line: str, *, keep: bool
+    base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command: str, *, keep: bool
 ) -> CampaignResult:
     """Fly the remaining flights of a campaign, and summarise the campaign.
 
@@ -246,7 +278,7 @@ def _fly_and_summarise(
     if short_summary is not None:
         return CampaignResult(short_summary, read_table(table_path))
     with stage("reporting") as advance:
-        summary = finish_campaign(base, goal, estimate, directory.folder, command_line, advance)
+        summary = finish_campaign(base, goal, estimate, directory.folder, command, advance)
     return CampaignResult(summary, read_table(table_path), table_path)
 
 
@@ -367,10 +399,10 @@ def winds(
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             winds_found = find_winds(base, goal, workers_used, store, advance)
         if out is not None:
-            command_line = winds_command_line(
+            repeated = winds_command_line(
                 _command_line_target(target, folder), goal, _command_line_options(base, options, spread, folder)
             )
-            write_winds(folder, base, winds_found, command_line)
+            write_winds(folder, base, winds_found, repeated)
     return winds_found
 
 
@@ -401,6 +433,8 @@ def battery(
     reserve: float = ENERGY_RESERVE_FRACTION,
     specific_energy: float | None = None,
     every: float = 10.0,
+    out: str | Path | None = None,
+    overwrite: bool = True,
     **options: Unpack[BatteryOptions],
 ) -> BatteryResult:
     """Find the smallest battery with which a mission and every return keep the reserve with a given probability.
@@ -415,6 +449,7 @@ def battery(
     specific_energy: energy per battery mass, Wh/kg, with which the aircraft's mass changes with the battery; None
     keeps the mass.
     every: time between two returns, s.
+    out: folder for ``battery.png`` and ``report.html``; None writes none.  overwrite: True replaces them.
     flights: number of flights.  confidence: confidence of the capacity's interval.
     spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -434,7 +469,36 @@ def battery(
         confidence=options["confidence"],
     )
     workers_used = make_workers(options["workers"], options["scheduler"], options["seed"])
+    if out is not None:
+        check_output_folder(Path(out), overwrite)
     base = open_sample(target, options)
     goal = BatteryGoal(probability, options["confidence"], options["flights"], every, reserve, specific_energy)
     with stage("flying", "flying for a battery") as advance:
-        return find_battery(base, goal, workers_used, advance)
+        result = find_battery(base, goal, workers_used, advance)
+    if out is None:
+        return result
+    question = {
+        "probability": probability,
+        "reserve": reserve,
+        "specific_energy": specific_energy,
+        "every": every,
+        "confidence": options["confidence"],
+    }
+    command = answer_command_line("battery", target, base, options, question)
+    return _with_battery_files(result, Path(out), command, overwrite=overwrite)
+
+
+def _with_battery_files(result: BatteryResult, folder: Path, command: str, *, overwrite: bool) -> BatteryResult:
+    """Write chart and page of a result into a folder, and return the result with the files.
+
+    command: command line that repeats the search; "" if there is none.
+    """
+    # Imported here: only pictures need matplotlib.
+    from logs.views.drawing import png_bytes
+    from planfly.campaigns.answer_pages import battery_page
+    from planfly.campaigns.battery_chart import draw_battery
+
+    with stage("drawing", "drawing the battery"):
+        figure = draw_battery(result)
+        contents = {"battery.png": png_bytes(figure), "report.html": battery_page(result, figure, command).render()}
+    return replace(result, files=replace_files(folder, contents, overwrite=overwrite))

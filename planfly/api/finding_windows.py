@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Unpack
 
-from planfly.api.campaigns import make_workers, open_sample
+from planfly.api.campaigns import answer_command_line, make_workers, open_sample
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_window import (
@@ -24,11 +24,10 @@ from planfly.flight_options import WindowOptions, takes_options
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import WINDOW_FILES, check_output_folder, clean_folder
+from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
 from world.errors import ArgumentError, ForecastError
 from world.extras import requires_extra
-from world.files import write_atomically
 
 _STEP = re.compile(r"(\d+(?:\.\d+)?)\s*(min|h)")
 _MIN_STEP = timedelta(minutes=1)
@@ -60,7 +59,7 @@ def window(
     which the forecast covers the flight.
     every: time between two departures, such as "30min" or "1h".
     probability: probability of a flyable flight at which a departure is open.
-    out: folder for the chart, ``window.png``; None writes none.  overwrite: True replaces it.
+    out: folder for ``window.png`` and ``report.html``; None writes none.  overwrite: True replaces them.
     flights: number of flights of each departure.
     spread, seed, workers, scheduler: see `planfly.campaign`.  For the other options, see `planfly.fly`.
     A script must call this function under ``if __name__ == "__main__":``, because workers import the script.
@@ -90,10 +89,13 @@ def window(
     end = last or last_departure(base, first)
     if (end - first) / step > MAX_DEPARTURES:
         raise ArgumentError.of_argument("every", every, f"expected at most {MAX_DEPARTURES} departures")
-    goal = WindowGoal(departure_times(first, end, step, asked), asked, probability, options["flights"])
+    zone = datetime.fromisoformat(options["at"] or earliest or "").tzinfo or UTC
+    goal = WindowGoal(departure_times(first, end, step, asked), asked, probability, options["flights"], zone)
     with stage("flying", f"flying {len(goal.departures)} departures") as advance:
         result = find_window(base, goal, workers, advance)
-    return result if out is None else _with_chart(result, Path(out), overwrite=overwrite)
+    question = {"from": earliest, "to": latest, "every": every, "probability": probability}
+    command = answer_command_line("window", target, base, options, question)
+    return result if out is None else _with_files(result, Path(out), command, overwrite=overwrite)
 
 
 def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Sequence[datetime]) -> CampaignBase:
@@ -118,18 +120,20 @@ def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Se
     raise errors[0]
 
 
-def _with_chart(result: WindowResult, folder: Path, *, overwrite: bool) -> WindowResult:
-    """Write the chart of a result into a folder, and return the result with the file."""
+def _with_files(result: WindowResult, folder: Path, command: str, *, overwrite: bool) -> WindowResult:
+    """Write chart and page of a result into a folder, and return the result with the files.
+
+    command: command line that repeats the search; "" if there is none.
+    """
     # Imported here: only pictures need matplotlib.
     from logs.views.drawing import png_bytes
+    from planfly.campaigns.answer_pages import window_page
     from planfly.campaigns.window_chart import draw_window
 
     with stage("drawing", "drawing the departures"):
-        picture = png_bytes(draw_window(result))
-    clean_folder(folder, WINDOW_FILES, overwrite=overwrite)
-    for name in WINDOW_FILES:
-        write_atomically(folder / name, picture)
-    return replace(result, files=tuple(folder / name for name in WINDOW_FILES))
+        figure = draw_window(result)
+        contents = {"window.png": png_bytes(figure), "report.html": window_page(result, figure, command).render()}
+    return replace(result, files=replace_files(folder, contents, overwrite=overwrite))
 
 
 def _parse_step(every: str) -> timedelta:

@@ -25,11 +25,10 @@ from planfly.kernel_units.unit_kernels import FLYING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.workflow.output_paths import LINK_FILES, check_output_folder, clean_folder
+from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
 from world.arrays import Floats
 from world.errors import ArgumentError
-from world.files import write_atomically
 from world.frames import to_geo
 from world.scenario import with_link
 
@@ -184,10 +183,7 @@ def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Link
         views: dict[str, View] = {"link": link_chart(setup, drawn), "link-map": link_map(setup, drawn)}
         files = draw_pictures(views)
         files["link-coverage.tif"] = coverage_geotiff(drawn.coverage, setup.scenario.origin)
-    clean_folder(folder, LINK_FILES, overwrite=overwrite)
-    for name in LINK_FILES:
-        write_atomically(folder / name, files[name])
-    return replace(result, files=tuple(folder / name for name in LINK_FILES))
+    return replace(result, files=replace_files(folder, files, overwrite=overwrite))
 
 
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:

@@ -48,23 +48,16 @@ def battery_lines(result: BatteryResult) -> list[str]:
     """Return the lines below the answer: the aircraft's battery, what decides, and how it was found."""
     if not result.completed:
         return []
-
-    def leg_name(number: int) -> str:
-        """Return the name of the legs with a number."""
-        return place_text(requirements.leg(int(np.searchsorted(requirements.setup.route.leg_numbers, number))))
-
-    lines = [_own_battery_line(result), *_mass_lines(result)]
-    requirements, total = route_requirements(result.base.nominal_setup()), len(result.completed)
-    for decision in result.decisions[:_MAX_LISTED]:
-        part = "the end of the mission"
-        if decision.leg >= 0:
-            leg_text = leg_name(decision.leg)
-            part = f"the return that starts at {decision.time:.0f} s ({leg_text})"
-        lines.append(f"decided by {part}: in {decision.flights} of {total} flights")
+    lines, total = [_own_battery_line(result), *_mass_lines(result)], len(result.completed)
+    lines += [
+        f"decided by {part}: in {flights} of {total} flights"
+        for part, flights, _ in decision_rows(result)[:_MAX_LISTED]
+    ]
     energies = result.leg_energies
     if float(energies.sum()) > 0.0:
         largest = sorted(range(len(energies)), key=lambda leg: -float(energies[leg]))[:_MAX_LISTED]
-        parts = [f"{energies[leg]:.1f} Wh ({leg_name(leg)})" for leg in largest]
+        names = leg_names(result)
+        parts = [f"{energies[leg]:.1f} Wh ({names[leg]})" for leg in largest]
         lines.append(f"the mission uses {float(energies.sum()):.1f} Wh (median); most of it: {', '.join(parts)}")
     lost = sum(row.lost_returns > 0 for row in result.completed)
     if result.base.mission.home is None:
@@ -79,6 +72,38 @@ def battery_lines(result: BatteryResult) -> list[str]:
         f" a return every {result.goal.interval:g} s, up to its loiter: the reserve has to cover loiter and landing"
     )
     return [*lines, *return_law_lines(result.base.nominal_setup())]
+
+
+def leg_names(result: BatteryResult) -> list[str]:
+    """Return the name of the legs with each number, as in messages."""
+    requirements = route_requirements(result.base.nominal_setup())
+    numbers = requirements.setup.route.leg_numbers
+    first_legs = np.searchsorted(numbers, np.arange(int(numbers[-1]) + 1)).tolist()
+    return [place_text(requirements.leg(leg)) for leg in first_legs]
+
+
+def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
+    """Return the parts that decide the battery, each with its flights and their share, the most frequent first."""
+    names, total = leg_names(result), len(result.completed)
+    return [
+        (
+            "the end of the mission"
+            if one.leg < 0
+            else f"the return that starts at {one.time:.0f} s ({names[one.leg]})",
+            str(one.flights),
+            f"{one.flights / total:.0%}",
+        )
+        for one in result.decisions
+    ]
+
+
+def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
+    """Return each leg with its median energy and its share of the mission's."""
+    energies, total = result.leg_energies.tolist(), float(result.leg_energies.sum())
+    return [
+        (name, f"{energy:.1f} Wh", f"{energy / total:.0%}" if total > 0.0 else "")
+        for name, energy in zip(leg_names(result), energies, strict=False)
+    ]
 
 
 def _own_battery_line(result: BatteryResult) -> str:

@@ -37,7 +37,7 @@ def campaign_command_line(target: str, goal: Goal, options: Mapping[str, object]
     "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
     """
     target_option = {"prove" if goal.stops else "at_least": goal.target}
-    return _command_line(
+    return command_line(
         "campaign", target, {**target_option, "flights": goal.flights, "confidence": goal.confidence, **options}
     )
 
@@ -52,17 +52,22 @@ def winds_command_line(target: str, goal: WindsGoal, options: Mapping[str, objec
     """
     flights = None if goal.flights == DEFAULT_WIND_FLIGHTS else goal.flights
     goal_options = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
-    return _command_line("winds", target, {**goal_options, "confidence": goal.confidence, **options})
+    return command_line("winds", target, {**goal_options, "confidence": goal.confidence, **options})
 
 
-def _command_line(command: str, target: str, options: Mapping[str, object]) -> str:
-    """Return a command line with quoted options; options that are None or have their default are omitted."""
+def command_line(command: str, target: str, options: Mapping[str, object]) -> str:
+    """Return a command line with quoted options; options that are None or have their default are omitted.
+
+    >>> command_line("ground-risk", "a b.plan", {"glide": True, "controlled": False, "max_speed": 31.0})
+    "planfly ground-risk 'a b.plan' --glide --max-speed 31"
+    """
     parts = ["planfly", command, shlex.quote(target)]
     for name, value in options.items():
-        if value is None or value == _DEFAULTS.get(name):
+        if value is None or value is False or value == _DEFAULTS.get(name):
             continue
+        option = f"--{name.replace('_', '-')}"
         for option_value in value if isinstance(value, list) else [value]:
-            parts += [f"--{name.replace('_', '-')}", shlex.quote(_option_text(option_value))]
+            parts += [option] if option_value is True else [option, shlex.quote(_option_text(option_value))]
     return " ".join(parts)
 
 

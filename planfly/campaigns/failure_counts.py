@@ -46,12 +46,19 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
 
 
 def deciding_rule(by_rule: Sequence[RuleFailures]) -> str:
-    """Return the rule that fails most flights, the most urgent one of several; "" without failures.
+    """Return the rule that fails most flights, the most urgent one of several; "" without failures."""
+    return next(iter(deciding_rules(by_rule)), "")
 
-    >>> deciding_rule(count_failures([[("slope", Place("leg", 1))], [("slope", Place("leg", 2))]]))
-    'slope'
+
+def deciding_rules(by_rule: Sequence[RuleFailures]) -> tuple[str, ...]:
+    """Return the rules that fail most flights, each the same number, the most urgent first; () without failures.
+
+    >>> flights = [[("slope", Place("leg", 1)), ("turn", Place("waypoint", 1))], [("clearance", Place("leg", 2))]]
+    >>> deciding_rules(count_failures([*flights, *flights[1:]])), deciding_rules(count_failures(flights[:1]))
+    (('clearance',), ('slope', 'turn'))
     """
-    return max(by_rule, key=lambda failures: failures.flights).rule if by_rule else ""
+    most = max((failures.flights for failures in by_rule), default=0)
+    return tuple(failures.rule for failures in by_rule if failures.flights == most)
 
 
 def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:

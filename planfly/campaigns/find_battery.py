@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -191,6 +192,7 @@ class BatteryResult:
     mass: stated mass, kg.
     volts: nominal voltage of the battery, V; 0 if unknown.
     has_returns: False if the autopilot's returns are not simulated, so that the battery covers only the mission.
+    files: written files.
     """
 
     goal: BatteryGoal
@@ -205,6 +207,7 @@ class BatteryResult:
     mass: float
     volts: float
     has_returns: bool = True
+    files: tuple[Path, ...] = ()
 
     def __repr__(self) -> str:
         return f"<BatteryResult {self.base.name}: {self.capacity:.0f} Wh>"

@@ -3,14 +3,14 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, tzinfo
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
-from planfly.campaigns.failure_counts import RuleFailures, count_failures, deciding_rule
+from planfly.campaigns.failure_counts import RuleFailures, count_failures, deciding_rules
 from planfly.campaigns.flight_requests import FlightRequest
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Interval, clopper_pearson
@@ -36,12 +36,14 @@ class WindowGoal:
     asked: time of take-off about which the user asks; None for any.
     probability: probability of a flyable flight at which a departure is open.
     flights: number of flights of each departure.
+    zone: offset from UTC in which the user stated the times.
     """
 
     departures: tuple[datetime, ...]
     asked: datetime | None
     probability: float
     flights: int
+    zone: tzinfo = UTC
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,25 @@ class Departure:
         return count_failures(row.failed for row in self.rows)
 
     @property
-    def rule(self) -> str:
-        """Rule that fails most flights; "" without failures."""
-        return deciding_rule(self.failures)
+    def rules(self) -> tuple[str, ...]:
+        """Rules that fail most flights, each the same number; () without failures."""
+        return deciding_rules(self.failures)
+
+    @property
+    def undecided(self) -> int:
+        """Number of flights that are not judged in full."""
+        return sum(row.undecided for row in self.rows)
+
+    def is_judged_in_full(self, probability: float) -> bool:
+        """Return True if the flights that are not judged in full do not decide whether the departure is open.
+
+        probability: probability of a flyable flight at which a departure is open.
+        """
+        if not self.rows:
+            return False
+        least = sum(row.outcome == "flyable" and not row.undecided for row in self.rows)
+        most = sum(row.outcome == "flyable" or row.undecided for row in self.rows)
+        return least / len(self.rows) >= probability or most / len(self.rows) < probability
 
     @property
     def energy_left(self) -> float:
@@ -144,11 +162,13 @@ class WindowResult:
 
     @property
     def is_go(self) -> bool | None:
-        """True if the asked departure is open, or any departure if none is asked; None if that is not known."""
-        asked = self.asked
-        if asked is not None:
-            return self.is_open(asked)
-        opens = [self.is_open(departure) for departure in self.departures]
+        """True if the asked departure is open, or any departure if none is asked; None if that is not known.
+
+        It is not known if the flights that are not judged in full decide it.
+        """
+        departures = self.departures if self.asked is None else (self.asked,)
+        probability = self.goal.probability
+        opens = [self.is_open(one) if one.is_judged_in_full(probability) else None for one in departures]
         return True if any(opens) else None if None in opens else False
 
     @property

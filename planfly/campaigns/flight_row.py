@@ -15,11 +15,13 @@ from typing import Annotated, Any, Literal, get_args, get_type_hints
 import numpy as np
 
 from flight.mission.route import Route
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, closest_to_limit, undecided_findings
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.summary import unjudged_parts
 from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import Draw, draw_flight
@@ -213,6 +215,9 @@ class FlightRow:
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
     marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
+    undecided: True if the flight is not judged in full; the tables do not store it.
+    unjudged: rules that are not judged in a flight without failures, with places and reason as in the verdict's
+    summary; the tables do not store them.
     """
 
     draw: Draw
@@ -229,6 +234,8 @@ class FlightRow:
     seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
     worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
     marginal_passes: tuple[MarginalPass, ...] = ()
+    undecided: bool = False
+    unjudged: tuple[tuple[str, str], ...] = ()
 
     @property
     def closeness(self) -> float:
@@ -275,22 +282,34 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         reference="never",
         findings_only=log is None,
     )
-    track, route = flight.track, varied_flight.setup.route
+    track, route, verdict = flight.track, varied_flight.setup.route, flight.verdict
     has_rows = len(track) > 0
     return FlightRow(
         draw=draw,
-        outcome="flyable" if flight.verdict.flies else "not flyable",
+        outcome="flyable" if verdict.flies else "not flyable",
         ended=flight.ended,
-        failed=list_failed_findings(flight.verdict),
-        margins=find_minimum_margins(flight.verdict.findings),
-        missile_distance=_missile_distance(flight.verdict.findings),
-        energy_left=varied_flight.setup.battery - float(track.energy[-1]) if has_rows else None,
+        failed=list_failed_findings(verdict),
+        margins=find_minimum_margins(verdict.findings),
+        missile_distance=_missile_distance(verdict.findings),
+        energy_left=max(0.0, varied_flight.setup.battery - float(track.energy[-1])) if has_rows else None,
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
         crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
-        marginal_passes=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
+        marginal_passes=find_marginal_passes(verdict.findings, varied_flight.setup.scenario, track),
+        undecided=verdict.undecided,
+        unjudged=find_unjudged_rules(verdict, varied_flight.setup),
         seconds=time.perf_counter() - start_time,
     )
+
+
+def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str, str], ...]:
+    """Return the rules that a verdict without failures does not judge, with places and reason; () with failures."""
+    if not (verdict.flyable or verdict.undecided):
+        return ()
+    texts = dict(unjudged_parts(verdict.findings, setup))
+    for finding in undecided_findings(verdict.findings):
+        texts.setdefault(finding.rule, f"{RULE_WORDS[finding.rule].title} ({finding.reason})")
+    return tuple(texts.items())
 
 
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:

@@ -8,6 +8,12 @@ from planfly.rtl.return_summary import return_law_lines
 from world.population import DENSITY_LIMITS_PER_KM2, Population, density_band
 from world.wording import count_text
 
+# Explanation of the table for an application.
+TABLE_EXPLANATION = (
+    "Larger values count: the operational volume holds the flown contingency volume and that by formula, and the ground"
+    " risk buffer holds the falls and the width by formula. Formulas: SORA 2.5, Annex A, with the values of the guides"
+    " of LBA and FOCA. Class: SORA 2.5, main body, table 2."
+)
 # Statement of what the result is not.
 DISCLAIMER = (
     "This is a computation, not an approval: the authority decides on the population data, the volumes and the class."
@@ -125,20 +131,18 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
 
 def table_text(result: GroundRiskResult) -> str:
     """Return the table for an application, as Markdown."""
-    table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in _table_rows(result))
+    table = "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in table_rows(result))
     conditions = "\n".join(f"- {line}" for line in (*flown_lines(result.base.conditions()), *_flight_lines(result)))
     return (
         f"# Ground risk of {result.base.name}\n\n{answer_line(result)}\n\n"
         f"| quantity | value | source |\n|---|---|---|\n{table}\n\n"
-        "Larger values count: the operational volume holds the flown contingency volume and that by formula, and the"
-        " ground risk buffer holds the falls and the width by formula. Formulas: SORA 2.5, Annex A, with the values of"
-        " the guides of LBA and FOCA. Class: SORA 2.5, main body, table 2.\n\n"
+        f"{TABLE_EXPLANATION}\n\n"
         f"## Flights\n\n{conditions}\n\n## What this is not\n\n{DISCLAIMER}\n"
     )
 
 
-def _table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
-    """Return the rows of the table: quantity, value and source."""
+def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
+    """Return the rows of the table for an application: quantity, value and source; cells in bold begin with "**"."""
     flown, formula, goal = result.flown, result.formula, result.goal
     span = result.aircraft.wing_span
     flown_by = _share_text(result)

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 from numpy.typing import NDArray
@@ -565,12 +566,20 @@ NARROW_WIDTH_IN = 5.0
 _EDGE_IN = 0.15
 # Height of a line of a legend, in.
 _LEGEND_LINE_IN = 0.34
+# Height of a line of a map's legend, which has one column, in.
+_MAP_LEGEND_LINE_IN = 0.21
 # Number of panels in a row.
 _NARROW_PANELS_PER_ROW = 3
 # Size of a panel, in.
 _PANEL_IN = 1.1
 # Size of a panel with its title and numbers, in.
 _PANEL_STEP_IN = 1.6
+# Left edge of a map, in.
+_MAP_LEFT_IN = 0.6
+# Distance between a map, what is below it, and the legend, in.
+_MAP_GAP_IN = 0.55
+# Distance between colour bar, compass and notes, in.
+_MAP_COLUMN_GAP_IN = 0.75
 # Width of a letter, relative to the font size.
 _LETTER_WIDTH_RATIO = 0.57
 # Line spacing, relative to the font size.
@@ -583,6 +592,8 @@ def narrow_figure(figure: Figure) -> Figure:
     >>> float(narrow_figure(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
     """
+    if figure.axes[0].get_aspect() != "auto" and len(figure.axes[0].images) > 0:
+        return _narrow_map(figure)
     old_width, old_height = figure.get_size_inches().tolist()
     panels = [axes for axes in figure.axes if axes.axison]
     legends = [*figure.legends, *(legend for axes in panels if (legend := axes.get_legend()) is not None)]
@@ -632,12 +643,49 @@ def narrow_figure(figure: Figure) -> Figure:
         )
     for text, box_top in texts:
         text.update({"x": _EDGE_IN / NARROW_WIDTH_IN, "y": 1.0 - box_top / height, "ha": "left", "va": "top"})
+    _move_legends(figure, legends, 2)
+    return figure
+
+
+def _move_legends(figure: Figure, legends: Sequence[Legend], columns: int) -> None:
+    """Move legends to the lower left corner of a figure."""
     for legend in legends:
         labels = [text.get_text() for text in legend.get_texts()]
         handles = [handle for handle in legend.legend_handles if handle is not None]
         with clean_style():
-            figure.legend(handles, labels, loc="lower left", ncols=2, fontsize=9)
+            figure.legend(handles, labels, loc="lower left", ncols=columns, fontsize=9)
         legend.remove()
+
+
+def _narrow_map(figure: Figure) -> Figure:
+    """Change a map to a narrow layout: below it colour bar, compass and notes side by side, and then the legend."""
+    map_axes, *side_axes = figure.axes
+    old_width, old_height = figure.get_size_inches().tolist()
+    map_box = map_axes.get_position()
+    map_width = NARROW_WIDTH_IN - _MAP_LEFT_IN - 2.0 * _EDGE_IN
+    map_height = map_width * (map_box.height * old_height) / (map_box.width * old_width)
+    title_height = sum(_wrap_text(title, map_width) for title in _left_title(map_axes))
+    sizes = [(box.width * old_width, box.height * old_height) for box in (axes.get_position() for axes in side_axes)]
+    side_top = _EDGE_IN + title_height + map_height + _MAP_GAP_IN
+    side_height = max((height for _, height in sizes), default=0.0)
+    legends = list(figure.legends)
+    legend_texts = [text.get_text() for legend in legends for text in legend.get_texts()]
+    legend_height = _MAP_LEGEND_LINE_IN * sum(text.count("\n") + 1 for text in legend_texts)
+    height = side_top + side_height + _MAP_GAP_IN + legend_height
+    figure.set_size_inches(NARROW_WIDTH_IN, height)
+    boxes = [(_MAP_LEFT_IN, _EDGE_IN + title_height, map_width, map_height)]
+    left = _MAP_LEFT_IN
+    for width, box_height in sizes:
+        boxes.append((left, side_top, width, box_height))
+        left += width + _MAP_COLUMN_GAP_IN
+    for axes, (box_left, top, width, box_height) in zip(figure.axes, boxes, strict=True):
+        position = box_left / NARROW_WIDTH_IN, 1.0 - (top + box_height) / height
+        axes.set_position((*position, width / NARROW_WIDTH_IN, box_height / height))
+    for number, text in enumerate(figure.texts):
+        text.update(
+            {"x": left / NARROW_WIDTH_IN, "y": 1.0 - (side_top + number * 0.7) / height, "ha": "left", "va": "top"}
+        )
+    _move_legends(figure, legends, 1)
     return figure
 
 

@@ -12,16 +12,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from logs.theme import css_variables
 from logs.verdict.conditions import flown_lines
 from logs.verdict.junit import JunitCase, JunitSuite, answer_case
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
-from logs.views.drawing import page_svg, png_bytes
-from logs.views.report.page import page_template
+from logs.views.drawing import png_bytes
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import deciding_rule, failure_lines, failures_document
@@ -34,6 +31,7 @@ from planfly.campaigns.find_winds import (
 )
 from planfly.campaigns.flight_row import STATION_COUNT, FlightRow, fly_one
 from planfly.campaigns.fly_campaign import open_store
+from planfly.campaigns.page import AnswerPage, AnswerStyle, PageTable, draw_both_widths, render_page
 from planfly.campaigns.pictures import (
     Bar,
     ChartDirection,
@@ -44,7 +42,6 @@ from planfly.campaigns.pictures import (
     draw_probability,
     draw_tornado,
     group_by_speed,
-    narrow_figure,
 )
 from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound, wilson
 from planfly.campaigns.statistics.wind_boundary import needs_more_flights
@@ -73,11 +70,13 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
     command: command line that repeats the campaign.
     """
-    pictures = [_draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
+    pictures = [draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
-    text = _render_page(
+    text = render_page(
         "campaign.html",
+        command_name="campaign",
         name=summary.name,
+        heading="how likely is a flight to succeed",
         answer=summary.estimate.answer,
         lines=lines,
         failures=[
@@ -117,36 +116,6 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         seed=summary.seed,
     )
     return text.encode("utf-8")
-
-
-def _render_page(template: str, **values: object) -> str:
-    """Return the HTML text of a template of this package, filled with values."""
-    return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
-
-
-def winds_page(name: str, figure: Figure, winds: WindsResult, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the HTML page of a go/no-go chart as UTF-8; the figure is changed to the narrow layout.
-
-    rows: cells of a table with a row for each wind direction.
-    """
-    picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
-    page = _render_page(
-        "winds.html",
-        name=name,
-        picture=picture,
-        answer=_ANSWER_STYLES[winds_answer(winds)],
-        lines=wind_lines(winds),
-        rows=rows,
-        command=command,
-    )
-    return page.encode("utf-8")
-
-
-def _draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return HTML with a figure in a wide and a narrow layout; the figure is changed to the narrow layout."""
-    wide_svg = page_svg(figure, caption)
-    narrow_svg = page_svg(narrow_figure(figure), f"{caption} (narrow)")
-    return Markup(f'<div class="wide">{wide_svg}</div><div class="narrow">{narrow_svg}</div>')
 
 
 def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
@@ -364,12 +333,20 @@ WINDS_SCHEMA = "planfly.winds/2"
 # Answer of a search for winds.
 WindsAnswer = Literal["judged", "not flyable", "not judged in full", "not judged"]
 # Style of the page's answer, by the answer.
-_ANSWER_STYLES: dict[WindsAnswer, str] = {
+_ANSWER_STYLES: dict[WindsAnswer, AnswerStyle] = {
     "judged": "",
     "not flyable": "missed",
     "not judged in full": "undecided",
     "not judged": "undecided",
 }
+# Explanation of the boundary on the page.
+_BOUNDARY_EXPLANATION = (
+    "The boundary is the wind in which the mission is flyable with the requested probability. For each direction, a"
+    " regression on the wind and on the drawn quantities is fitted to every failure mode (a rule at a place); its"
+    " residuals follow a normal distribution or, as a second model of equal prior probability, a Gumbel distribution"
+    " with its longer tail. These regressions give the fraction of all draws that fails in a wind. If no flight failed,"
+    " one such distribution of the wind alone is used. The interval is that of the posterior."
+)
 
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
@@ -446,10 +423,31 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
         "conditions": None if winds.conditions is None else asdict(winds.conditions),
     }
     picture = png_bytes(figure)
-    page = winds_page(base.name, figure, winds, rows, command)
+    page = _winds_page(base.name, figure, winds, rows, command).render()
     write_atomically(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
     write_atomically(folder / "winds.png", picture)
     write_atomically(folder / "winds.html", page)
+
+
+def _winds_page(
+    name: str, figure: Figure, winds: WindsResult, rows: Sequence[tuple[str, ...]], command: str
+) -> AnswerPage:
+    """Return the page of a go/no-go chart.
+
+    rows: cells of a table with a row for each wind direction.
+    """
+    titles = ("wind from", "boundary", "interval", "flights", "fails most often", "judged")
+    return AnswerPage(
+        command_name="winds",
+        name=name,
+        heading="wind in which it is flyable",
+        style=_ANSWER_STYLES[winds_answer(winds)],
+        lines=wind_lines(winds),
+        figures=[(figure, "Go/no-go chart: wind from each direction")],
+        tables=[PageTable([(title, "n") for title in titles], rows)],
+        explanation=[_BOUNDARY_EXPLANATION],
+        command=command,
+    )
 
 
 def _calm_document(calm: CalmFailures) -> dict[str, Any]:

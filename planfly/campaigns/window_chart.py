@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from logs import theme
-from logs.verdict.rule_words import RULE_WORDS
 from logs.views.drawing import clean_style, new_figure
 from planfly.campaigns.find_window import WindowResult
+from planfly.campaigns.window_text import rules_text
 
 # matplotlib.dates, which has no types.
 _DATES: Any = dates
@@ -37,6 +37,8 @@ def draw_window(result: WindowResult) -> Figure:
         times = [_number_of(departure.time) for departure in departures]
         width = 0.8 * min((after - before for before, after in itertools.pairwise(times)), default=1.0 / 24.0)
         _draw_probability(probability, result, times, width)
+        for axes in (probability, wind, energy):
+            _hatch_unjudged(axes, result, times, width)
         wind.plot(times, [departure.wind[0] for departure in departures], color=_WIND_COLOUR, marker="o", markersize=3)
         for time, departure in zip(times, departures, strict=True):
             speed, from_deg = departure.wind
@@ -76,6 +78,24 @@ def _number_of(time: datetime) -> float:
     return time.timestamp() / 86_400.0
 
 
+def _hatch_unjudged(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
+    """Hatch the columns of the departures that are not judged.
+
+    times: (d,) matplotlib's numbers of the departures.
+    width: of a column, days.
+    """
+    for time, departure in zip(times, result.departures, strict=True):
+        if not departure.rows:
+            axes.axvspan(
+                time - 0.5 * width,
+                time + 0.5 * width,
+                facecolor="none",
+                edgecolor=_GRID_COLOUR,
+                hatch="///",
+                linewidth=0,
+            )
+
+
 def _draw_probability(axes: Axes, result: WindowResult, times: list[float], width: float) -> None:
     """Draw the fraction of flyable flights of each departure, with its interval and the deciding rule.
 
@@ -84,16 +104,19 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
     """
     colours = {True: _OPEN_COLOUR, False: _CLOSED_COLOUR, None: _UNKNOWN_COLOUR}
     for time, departure in zip(times, result.departures, strict=True):
-        colour = colours[result.is_open(departure)]
         if not departure.rows:
-            axes.text(time, 0.02, "not judged", rotation=90, ha="center", va="bottom", color=colour, fontsize=7)
+            axes.text(
+                time, 0.5, "not judged", rotation=90, ha="center", va="center", color=_UNKNOWN_COLOUR, fontsize=7.5
+            )
             continue
+        is_known = departure.is_judged_in_full(result.goal.probability)
+        colour = colours[result.is_open(departure) if is_known else None]
         axes.bar(time, departure.share, width, color=colour, alpha=0.75)
         low, high = departure.interval
         axes.plot([time, time], [low, high], color=_INK_COLOUR, linewidth=1.0)
-        if departure.rule and len(times) <= _MAX_LABELS:
-            title = RULE_WORDS[departure.rule].title.lower()
-            axes.text(time, 0.03, f"{title}  ", rotation=90, ha="right", va="bottom", color=_INK_COLOUR, fontsize=7.5)
+        if departure.rules and len(times) <= _MAX_LABELS:
+            text = f"{rules_text(departure)}  "
+            axes.text(time, 0.03, text, rotation=90, ha="right", va="bottom", color=_INK_COLOUR, fontsize=7.5)
     axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
     if result.goal.asked is not None:
         place = (_number_of(result.goal.asked), 1.03)
@@ -104,7 +127,7 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
     axes.set_title(
         f"{result.base.name}: {result.goal.flights} flights at each take-off, green with at least"
         f" {result.goal.probability:.0%} flyable\n"
-        "(thin line: 95 % interval; text at a bar: the rule that fails most flights)",
+        "(thin line: 95 % interval; text at a bar: the rules that fail most flights; grey: not judged in full)",
         fontsize=9.5,
         pad=8,
     )

@@ -16,11 +16,14 @@ def answer_line(result: WindowResult) -> str:
     windows = ", ".join(_window_text(*window) for window in result.windows)
     open_text = f"open {windows} UTC" if windows else "no departure is open"
     if asked is None:
-        return f"{open_text}{_best_text(result)}"
+        unknown_text = ", but not judged in full" if windows and result.is_go is None else ""
+        return f"{open_text}{unknown_text}{_best_text(result)}"
     subject = f"take-off at {asked.time:{TIME_FORMAT}} UTC"
     if result.is_open(asked) is None:
         return f"{subject}: not judged: {asked.not_judged}"
     counts = f"{asked.flyable} of {len(asked.rows)} flights are flyable"
+    if result.is_go is None:
+        return f"{subject}: not judged in full: {counts}, {asked.undecided} are not judged in full; {open_text}"
     if result.is_open(asked):
         return f"{subject}: go: {counts}; {open_text}"
     return f"{subject}: no go: {counts}, {goal.probability:g} is asked for; {open_text}{_best_text(result)}"
@@ -41,21 +44,47 @@ def _best_text(result: WindowResult) -> str:
     return f"; the best is {best.time:{TIME_FORMAT}} UTC with {best.flyable} of {len(best.rows)}"
 
 
+def unjudged_lines(result: WindowResult) -> list[str]:
+    """Return a line with the rules that are not judged in some flights, each with its first reason; [] if none is."""
+    texts: dict[str, str] = {}
+    for departure in result.departures:
+        for row in departure.rows:
+            texts = dict(row.unjudged) | texts
+    return [f"Not judged: {'; '.join(texts.values())}"] if texts else []
+
+
+# Columns of the table of departures after the time of take-off.
+DEPARTURE_COLUMNS = ("flyable", "95 % interval", "wind at the start", "least energy", "decided by")
+
+
+def departure_cells(departure: Departure) -> tuple[str, ...]:
+    """Return the cells of a departure below `DEPARTURE_COLUMNS`; a single cell with the reason if it was not flown."""
+    if not departure.rows:
+        return (f"not judged: {departure.not_judged}",)
+    speed, from_deg = departure.wind
+    low, high = departure.interval
+    return (
+        f"{departure.flyable}/{len(departure.rows)}",
+        f"{low:.0%} to {high:.0%}",
+        f"{speed:.1f} m/s from {from_deg:.0f}",
+        "not known" if math.isnan(departure.energy_left) else f"{departure.energy_left:.0f} Wh left",
+        rules_text(departure),
+    )
+
+
+def rules_text(departure: Departure) -> str:
+    """Return the titles of the rules that fail most flights of a departure; "" without failures."""
+    return ", ".join(RULE_WORDS[rule].title.lower() for rule in departure.rules)
+
+
 def window_lines(result: WindowResult) -> list[str]:
     """Return a table with a line for each departure."""
     lines = ["take-off, UTC     flyable   95 % interval  wind at the start   least energy  decided by"]
-    return [*lines, *(_departure_line(departure) for departure in result.departures)]
-
-
-def _departure_line(departure: Departure) -> str:
-    """Return the line of a departure."""
-    start = f"{departure.time:{TIME_FORMAT}}"
-    if not departure.rows:
-        return f"{start}  not judged: {departure.not_judged}"
-    speed, from_deg = departure.wind
-    energy = "not known" if math.isnan(departure.energy_left) else f"{max(0.0, departure.energy_left):.0f} Wh left"
-    low, high = departure.interval
-    rule = RULE_WORDS[departure.rule].title.lower() if departure.rule else ""
-    count = f"{departure.flyable}/{len(departure.rows)}"
-    wind = f"{speed:.1f} m/s from {from_deg:.0f}"
-    return f"{start}  {count:>8}  {low:5.0%} to {high:4.0%}   {wind:<18}  {energy:>12}  {rule}".rstrip()
+    for departure in result.departures:
+        start = f"{departure.time:{TIME_FORMAT}}"
+        cells = departure_cells(departure)
+        widths = (">8", ">13", "<18", ">12", "") if departure.rows else ("",)
+        lines.append(
+            "  ".join([start, *(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))]).rstrip()
+        )
+    return lines

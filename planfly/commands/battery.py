@@ -39,9 +39,12 @@ def add_battery_parser(command_line: LineParser) -> None:
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
-        "--flights", metavar="N", type=number_parser("sample_flights"), help="number of flights (default: 100)"
+        "--flights",
+        metavar="N",
+        type=number_parser("sample_flights"),
+        help="number of flights, 20 to 100,000 (default: 100)",
     )
-    add_result_options(parser)
+    add_result_options(parser, "folder for the page, report.html, and the chart, battery.png (default: none)")
 
 
 def battery(args: argparse.Namespace) -> int:
@@ -58,6 +61,8 @@ def battery(args: argparse.Namespace) -> int:
     print(f"battery   {colour_text(answer_line(result), 'warning' if ok is None else 'good' if ok else 'bad')}")
     for text in (*flown_lines(result.base.conditions()), *battery_lines(result)):
         print(f"  {text}")
+    for path in result.files:
+        print(f"  written {path}")
     write_json_if_requested(args, lambda: _json_answer(str(args.target), result, code))
     return code
 
@@ -93,4 +98,5 @@ def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAns
         ],
         leg_energies_wh=[round(float(energy), 3) for energy in result.leg_energies],
         conditions=result.base.conditions(),
+        files=[str(file) for file in result.files],
     )

@@ -52,9 +52,15 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
         "--glide", action="store_true", help="the ground risk buffer also holds glides after an engine failure"
     )
     group.add_argument(
-        "--flights", metavar="N", type=number_parser("sample_flights"), help="number of flights (default: 100)"
+        "--flights",
+        metavar="N",
+        type=number_parser("sample_flights"),
+        help="number of flights, 20 to 100,000 (default: 100)",
     )
-    add_result_options(parser, "folder for the volumes as KML and GeoJSON, their map and the table (default: none)")
+    add_result_options(
+        parser,
+        "folder for the page, report.html, the volumes as KML and GeoJSON, their map and the table (default: none)",
+    )
 
 
 def ground_risk(args: argparse.Namespace) -> int:

@@ -43,24 +43,25 @@ def add_window_parser(command_line: LineParser) -> None:
         "--flights",
         metavar="N",
         type=number_parser("window_flights"),
-        help="number of flights of each departure (default: 40)",
+        help="number of flights of each departure, 10 to 10,000 (default: 40)",
     )
-    add_result_options(parser, "folder for the chart of the departures, window.png")
+    add_result_options(parser, "folder for the page, report.html, and the chart, window.png (default: none)")
 
 
 def window(args: argparse.Namespace) -> int:
     """Find the departures; return the exit code.
 
-    The exit code is 0 if the asked departure is open (or any, if none is asked), 4 if not, and 3 if it is not judged.
+    The exit code is 0 if the asked departure is open (or any, if none is asked), 4 if not, and 3 if it is not judged
+    in full.
     """
     from logs.verdict.conditions import flown_lines
-    from planfly.campaigns.window_text import answer_line, window_lines
+    from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
 
     result = call_api(planfly.window, args)
     go = result.is_go
     code = INCOMPLETE if go is None else FLYABLE if go else NOT_FLYABLE
     print(f"window    {colour_text(answer_line(result), 'warning' if go is None else 'good' if go else 'bad')}")
-    for text in (*flown_lines(result.base.conditions()), *window_lines(result)):
+    for text in (*unjudged_lines(result), *flown_lines(result.base.conditions()), *window_lines(result)):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")
@@ -71,7 +72,7 @@ def window(args: argparse.Namespace) -> int:
 def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswer":
     """Return the answer of the command for --json."""
     from planfly.campaigns.failure_counts import failures_document
-    from planfly.campaigns.window_text import answer_line
+    from planfly.campaigns.window_text import answer_line, unjudged_lines
     from planfly.terminal.battery_answers import finite
     from planfly.terminal.window_answers import DepartureEntry, WindowAnswer, WindowEntry
 
@@ -83,6 +84,7 @@ def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswe
         asked=None if result.goal.asked is None else result.goal.asked.isoformat(),
         probability=result.goal.probability,
         flights=result.goal.flights,
+        not_judged="".join(unjudged_lines(result)),
         windows=[WindowEntry(first=first.isoformat(), last=last.isoformat()) for first, last in result.windows],
         departures=[
             DepartureEntry(
@@ -96,7 +98,8 @@ def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswe
                 wind_mps=finite(departure.wind[0]),
                 wind_from_deg=finite(departure.wind[1]),
                 energy_left_wh=finite(departure.energy_left),
-                rule=departure.rule,
+                undecided=departure.undecided,
+                rules=list(departure.rules),
                 by_rule=failures_document(departure.failures),
             )
             for departure in result.departures

@@ -56,3 +56,4 @@ class BatteryAnswer:
     leg_energies_wh: list[float]
     """Median energy of each leg, by the leg's number in texts; all legs around a loiter are one."""
     conditions: Conditions
+    files: list[str]

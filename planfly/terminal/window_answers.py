@@ -27,8 +27,10 @@ class DepartureEntry:
     """Mean wind at the start."""
     energy_left_wh: float | None
     """Lowest energy left at the end of a flight."""
-    rule: str
-    """Rule that fails most flights; empty without failures."""
+    undecided: int
+    """Flights that are not judged in full."""
+    rules: list[str]
+    """Rules that fail most flights, each the same number; empty without failures."""
     by_rule: list[dict[str, Any]]
     """Failed flights by rule and place."""
 
@@ -50,12 +52,15 @@ class WindowAnswer:
     what: str
     headline: str
     is_go: bool | None
-    """True if the asked departure is open, or any departure if none is asked; null if it is not known."""
+    """True if the asked departure is open, or any departure if none is asked; null if it is not known, also because
+    flights are not judged in full."""
     asked: str | None
     """Asked time of take-off; null for any."""
     probability: float
     flights: int
     """Flights of each departure."""
+    not_judged: str
+    """Rules that are not judged in some flights, with their reasons; empty if all are judged."""
     windows: list[WindowEntry]
     departures: list[DepartureEntry]
     conditions: Conditions

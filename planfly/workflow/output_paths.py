@@ -2,9 +2,11 @@
 
 import hashlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from world.errors import PlanflyError
+from world.files import write_atomically
 
 # Default folder of results.
 RESULTS = Path("runs")
@@ -59,12 +61,6 @@ RETURN_FILES = (
     "returns.mcap",
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
-# Files of `planfly.link`.
-LINK_FILES = ("link.png", "link-map.png", "link-coverage.tif")
-# Files of `planfly.ground_risk`.
-GROUND_RISK_FILES = ("ground-risk.kml", "ground-risk.geojson", "ground-risk.png", "ground-risk.md")
-# File of `planfly.window`.
-WINDOW_FILES = ("window.png",)
 # Maximum number of parts of a flight that are flown again.
 MAX_REFLOWN_PARTS = 9
 # Files of each part that is flown again, numbered from the second part on.
@@ -139,6 +135,17 @@ def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) ->
     check_output_folder(folder, overwrite)
     prepare_folder(folder, files)
     return folder
+
+
+def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrite: bool) -> tuple[Path, ...]:
+    """Write files into a folder in place of those of an earlier result, and return their paths.
+
+    contents: content of each file by its name.
+    """
+    clean_folder(folder, tuple(contents), overwrite=overwrite)
+    for name, content in contents.items():
+        write_atomically(folder / name, content)
+    return tuple(folder / name for name in contents)
 
 
 def has_placeholder(target: str | Path) -> bool:

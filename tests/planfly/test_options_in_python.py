@@ -54,10 +54,10 @@ RENAMED = {
     ("run", "flights"): ("campaign", "flights"),
 }
 # What only a terminal has, and what Python has in `Verdict.to_junit`; of a replay, how the timeline is printed, and
-# that another function is meant; of a check and a battery, whether the file of --json is replaced.
+# that another function is meant; of a check, whether the file of --json is replaced.
 TERMINAL_ONLY = {
     *("help", "json", "junit", "quiet", "schema", "topic", "shell"),
-    *(("replay", "at_once"), ("replay", "foxglove"), ("check", "overwrite"), ("battery", "overwrite")),
+    *(("replay", "at_once"), ("replay", "foxglove"), ("check", "overwrite")),
 }
 
 

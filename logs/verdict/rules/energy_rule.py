@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from flight.autopilots.parts import BatteryFailsafe
 from logs.verdict.findings import (
     NOT_FLOWN,
@@ -39,17 +41,19 @@ def energy_findings(
     A mission with an endless jump fails.  A guessed battery is not judged.  If the power of the aircraft's model is
     uncertain, an energy that may exceed the limit is undecided, except in an imported log, which has measured energy.
     """
-    setup = requirements.setup
+    setup, envelope = requirements.setup, requirements.setup.envelope
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
     planned_energy, peak_current = predicted_energy(requirements)
-    faults = [_endless_jump_message(requirements, limit)] if setup.route.endless_jump is not None else []
-    is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
+    is_guessed = envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
-    faults += failsafes.faults
+    faults = [*_endless_jump_faults(requirements, limit), *failsafes.faults]
+    # A flight that ends with an empty battery does not show the energy that it needs; the prediction does.
+    is_empty = not geometric and not is_measured and energy >= setup.battery
+    needed_energy = float(np.fmax(energy, planned_energy)) if is_empty else energy
     # Power is log-normal; this is the upper end of 95 %.
-    max_energy = energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd)
+    max_energy = needed_energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
     if energy == 0.0 and planned_energy == 0.0:
         # A model without power data gives 0 W.
@@ -58,17 +62,15 @@ def energy_findings(
     elif math.isnan(energy):
         reason = "the aircraft's power is unknown at these speeds" if geometric else "nothing was flown"
     else:
-        reason = _used_text(requirements, energy, max_current) + (" by prediction" if geometric else "")
-        if not geometric and math.isfinite(planned_energy):
-            reason += f"; {planned_energy:.1f} Wh by prediction"
+        reason = _used_text(requirements, energy, max_current, is_empty=is_empty)
+        if geometric or math.isfinite(planned_energy):
+            reason += " by prediction" if geometric else f"; {planned_energy:.1f} Wh by prediction"
         if is_guessed:
             remedy = "give --battery when the aircraft is made, or battery_wh in the scenario"
             reason = f"the battery's capacity is a guess: {remedy}; {reason}"
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
-        if max_energy > energy and not is_guessed:
-            source = setup.envelope.source
-            reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
+        reason += "" if is_guessed or max_energy <= needed_energy else _max_energy_text(max_energy, envelope.source)
         reason += failsafes.unjudged_text
     undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []
     is_open = is_guessed or is_uncertain or bool(undecided_faults) or math.isnan(energy)
@@ -92,9 +94,16 @@ def energy_findings(
     ]
 
 
-def _endless_jump_message(requirements: RouteRequirements, usable_energy: float) -> Message:
-    """Return a message on an endless jump, with the number of rounds for which the usable energy (Wh) lasts."""
+def _max_energy_text(max_energy: float, source: str) -> str:
+    """Return a clause on the upper end of the needed energy, Wh.  source: source of the aircraft's power."""
+    return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
+
+
+def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float) -> list[Message]:
+    """Return a message on an endless jump, with the rounds for which the usable energy (Wh) lasts; [] without one."""
     route = requirements.setup.route
+    if route.endless_jump is None:
+        return []
     last_waypoint = len(route.items) - 1
     start = last_waypoint
     while start > 0 and route.items[start] == route.items[last_waypoint]:
@@ -106,7 +115,7 @@ def _endless_jump_message(requirements: RouteRequirements, usable_energy: float)
         sum(leg_energies(requirements)[0][start:]) if route.items[start] == route.items[last_waypoint] else math.nan
     )
     duration_text = f": the energy lasts for {usable_energy / round_energy:.0f} rounds" if round_energy > 0.0 else ""
-    return message(f"the jump of item {route.endless_jump} has no end{duration_text}")
+    return [message(f"the jump of item {route.endless_jump} has no end{duration_text}")]
 
 
 def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:
@@ -177,17 +186,20 @@ def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFa
     return f"{cell_text}, above the {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell, and the voltage is not simulated"
 
 
-def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float) -> str:
-    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery."""
-    capacity = requirements.setup.battery
-    if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
+def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float, *, is_empty: bool) -> str:
+    """Describe the energy used (Wh) and the peak current (A), or the fuel used by an aircraft without a battery.
+
+    is_empty: True if the battery or the tank is empty at the end of the flight.
+    """
+    capacity, envelope = requirements.setup.battery, requirements.setup.envelope
+    if envelope.power_level.size and not envelope.volts:
         fraction = energy_used / capacity
         return (
-            f"{energy_used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {fraction:.1%} of the fuel;"
-            " no battery, so no current"
+            f"{energy_used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {fraction:.1%} of the fuel"
+            f"{': the tank is empty' if is_empty else ''}; no battery, so no current"
         )
     current_text = f", peak current {max_current:.1f} A" if math.isfinite(max_current) else ""
-    return f"{energy_used:.1f} Wh of {capacity:.0f} Wh used{current_text}"
+    return f"{energy_used:.1f} Wh of {capacity:.0f} Wh used{current_text}{': the battery is empty' if is_empty else ''}"
 
 
 RULE = Rule(

@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
@@ -217,9 +219,32 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
-    limit_texts = [_limit_text(requirements, leg, limit, source), _certain_limit_text(requirements, leg, limit, source)]
     number = requirements.leg(leg).number
+    airspeed = float(requirements.route.leg_airspeeds[leg])
+    if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
+        return message(no_progress_text, f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s")
+    limit_texts = [_limit_text(requirements, leg, limit, source), _certain_limit_text(requirements, leg, limit, source)]
     return message(f"leg {number} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
+
+
+def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
+    """State ground speed and wind if the aircraft cannot climb or descend on a leg against the wind; otherwise "".
+
+    The horizontal part of the airspeed on the steepest climb or descent is then not larger than the headwind.
+    """
+    speed, envelope = float(requirements.route.leg_airspeeds[leg]), requirements.setup.envelope
+    for altitude in requirements.points[leg : leg + 2, 2].tolist():
+        wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
+        slopes_in_wind, slopes_in_calm_air = (
+            envelope.slope_limits(speed, altitude, *wind),
+            envelope.slope_limits(speed, altitude),
+        )
+        if np.isfinite(slopes_in_calm_air).all() and np.isnan(slopes_in_wind).any():
+            tailwind, crosswind = wind
+            progress = max(0.0, math.sqrt(max(0.0, speed**2 - crosswind**2)) + tailwind)
+            crosswind_text = f" and {abs(crosswind):.1f} m/s of crosswind" if abs(crosswind) >= CALM_WIND_MPS else ""
+            return f"no progress over the ground: {progress:.1f} m/s in {-tailwind:.1f} m/s of headwind{crosswind_text}"
+    return ""
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
@@ -310,8 +335,9 @@ def _flown_faults(
     if fit is not None:
         flown_slope = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
+            limit_text = _no_progress_text(requirements, leg) if limit == 0.0 else ""
             faults["slope"] = message(
-                f"flown at {flown_slope:+.1f}°, steeper than the limit of {math.degrees(limit):.1f}°"
+                f"flown at {flown_slope:+.1f}°, {limit_text or f'steeper than the limit of {math.degrees(limit):.1f}°'}"
             )
         elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")

@@ -9,6 +9,8 @@ import pytest
 
 import planfly
 from flight.mission_files.formats import mission_text
+from planfly.campaigns.answer_pages import battery_page
+from planfly.campaigns.battery_chart import draw_battery
 from planfly.campaigns.battery_text import answer_line, battery_lines
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
@@ -22,6 +24,7 @@ from planfly.campaigns.find_battery import (
     quantile_of_capacities,
 )
 from planfly.campaigns.worker_pool import Workers
+from planfly.cli import main
 from tests.logs.verdict.returns import hill
 from tests.mission_lines import mission, wp
 
@@ -206,3 +209,47 @@ def test_a_found_battery_keeps_the_reserve_in_other_flights(base: CampaignBase) 
     # At a probability of 0.95, fewer than 33 of 40 have a probability of 0.1 %.
     assert kept >= 33
     assert repr(found).startswith("<BatteryResult tight: ")
+
+
+def test_the_chart_has_the_capacities_of_the_flights_and_the_page_what_decides(base: CampaignBase) -> None:
+    rows = [energy_row(0.8 * k, leg_energies=(0.2 * k, 0.6 * k)) for k in range(1, 101)]  # type: ignore[arg-type]
+    rows[:3] = [replace(row, return_energy=90.0, return_time=12.0, return_leg=1) for row in rows[:3]]
+    result = battery_result(base, rows, own=120.0)
+    figure = draw_battery(result)
+    step, *lines = figure.axes[0].lines
+    capacities, shares = step.get_data()
+    assert list(zip(capacities, shares, strict=True))[3][1] == pytest.approx(0.03)
+    assert float(np.max(np.asarray(capacities)[:-1])) == pytest.approx(90.0 / 0.8)
+    probability, found, own = (line.get_label() for line in lines)
+    assert probability == "P = 0.95"
+    assert found == f"found: {result.capacity:.0f} Wh"
+    assert own == "the aircraft's: 120 Wh"
+    page = battery_page(result, figure, "planfly battery tight").render().decode()
+    assert '<td class="">the end of the mission</td><td class="n">97</td><td class="n">97%</td>' in page
+    assert '>3</td><td class="n">3%</td>' in page
+    # The median of 1 to 100 is 50.5: 10.1 Wh of 40.4.
+    assert '<td class="n">10.1 Wh</td><td class="n">25%</td>' in page
+    assert page.count("<svg ") == 2
+
+
+def test_a_battery_of_which_nothing_is_known_has_a_chart(base: CampaignBase) -> None:
+    result = battery_result(base, [energy_row() for _ in range(20)], own=120.0)
+    assert [text.get_text() for text in draw_battery(result).axes[0].texts][-1].startswith("no flight completed")
+    assert '<div class="answer undecided">' in battery_page(result, draw_battery(result), "").render().decode()
+
+
+def test_the_files_of_a_battery(tmp_path: Path) -> None:
+    result = planfly.battery("tight", flights=20, every=60.0, seed=1, workers=1, out=tmp_path / "out")
+    assert [file.name for file in result.files] == ["battery.png", "report.html"]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    command = "planfly battery tight --probability 0.95 --reserve 0.2 --every 60 --flights 20 --seed 1"
+    assert f"<code>{command}</code>" in page
+    with pytest.raises(planfly.PlanflyError, match="exists and is not empty"):
+        planfly.battery("tight", flights=20, out=tmp_path / "out", overwrite=False)
+
+
+@pytest.mark.parametrize(("command", "least"), [("battery", 20), ("ground-risk", 20), ("window", 10)])
+def test_the_help_states_the_numbers_of_flights(command: str, least: int, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    assert f"{least} to 10" in " ".join(capsys.readouterr().out.split())

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,20 @@ import xarray
 
 from logs.verdict.places import Place
 from planfly.campaigns import find_window as find_window_module
+from planfly.campaigns.answer_pages import window_page
 from planfly.campaigns.campaign_base import CampaignBase, open_campaign, vary_flight
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, draw_flight, parse_dispersions
-from planfly.campaigns.find_window import WindowGoal, departure_times, find_window, last_departure
+from planfly.campaigns.find_window import (
+    Departure,
+    WindowGoal,
+    WindowResult,
+    departure_times,
+    find_window,
+    last_departure,
+)
 from planfly.campaigns.flight_row import FlightRow
 from planfly.campaigns.window_chart import draw_window
-from planfly.campaigns.window_text import answer_line, window_lines
+from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import MISSION, SCENARIO
 from tests.planfly.campaigns.made_searches import hire_here
@@ -103,7 +111,7 @@ def test_windows_are_the_runs_of_open_departures(tmp_path: Path) -> None:
     assert result.windows == ((at_hour(0), at_hour(2)), (at_hour(6), at_hour(7)))
     assert [result.is_open(departure) for departure in result.departures] == [True] * 3 + [False] * 3 + [True] * 2
     assert [departure.wind for departure in result.departures[2:4]] == [(4.0, 270.0), (28.0, 270.0)]
-    assert [departure.rule for departure in result.departures] == ["completion"] * 8
+    assert [departure.rules for departure in result.departures] == [("completion",)] * 8
     # The tenth flight has 81 Wh left.
     assert {departure.energy_left for departure in result.departures} == {81.0}
     assert result.is_go is True
@@ -152,6 +160,59 @@ def test_a_departure_beyond_the_forecast_is_not_judged(tmp_path: Path) -> None:
     assert draw_window(result).axes
     # Nothing is known of the departures that could be open.
     assert found(open_in(tmp_path, hourly_winds(28.0, 28.0)), 4.0).is_go is None
+
+
+def changed(result: WindowResult, **changes: object) -> WindowResult:
+    """Change all rows of the first departure of a result."""
+    first, *others = result.departures
+    rows = tuple(replace(row, **changes) for row in first.rows)  # type: ignore[arg-type]
+    return replace(result, departures=(Departure(first.time, first.scenarios, rows), *others))
+
+
+@pytest.mark.usefixtures("made_flights")
+def test_all_rules_that_fail_most_flights_are_named(tmp_path: Path) -> None:
+    result = found(open_in(tmp_path, hourly_winds(28.0, 4.0)), 0.0)
+    failed = (("speed", Place("leg", 0)), ("completion", Place("flight")))
+    tied = changed(result, failed=failed)
+    assert set(tied.departures[0].rules) == {"speed", "completion"}
+    assert window_lines(tied)[1].endswith("  completion, airspeed")
+    texts = [text.get_text().strip() for text in draw_window(tied).axes[0].texts]
+    assert texts == ["completion, airspeed"]
+
+
+@pytest.mark.usefixtures("made_flights")
+@pytest.mark.parametrize(("outcome", "words"), [("flyable", "10 of 10"), ("not flyable", "0 of 10")])
+def test_what_is_not_judged_is_named_and_decides_nothing(outcome: str, words: str, tmp_path: Path) -> None:
+    """Whether the flights are flyable but for the take-off, or not judged in full."""
+    unjudged = (("takeoff", "take-off (PX4's take-off is not simulated)"),)
+    result = found(open_in(tmp_path, hourly_winds(4.0, 4.0)), 0.0, 0.0)
+    result = changed(result, outcome=outcome, undecided=True, unjudged=unjudged)
+    assert result.is_go is None
+    assert f"UTC: not judged in full: {words} flights are flyable, 10 are not judged in full; " in answer_line(result)
+    assert unjudged_lines(result) == ["Not judged: take-off (PX4's take-off is not simulated)"]
+    # Two of ten flights that are not judged do not decide a probability of 0.8.
+    first, *_ = found(open_in(tmp_path, hourly_winds(4.0, 4.0)), 0.0).departures
+    rows = tuple(replace(row, undecided=row.outcome != "flyable") for row in first.rows)
+    assert Departure(first.time, first.scenarios, rows).is_judged_in_full(0.8)
+    assert not Departure(first.time, first.scenarios, rows).is_judged_in_full(0.81)
+
+
+@pytest.mark.usefixtures("made_flights")
+def test_the_page_lists_all_departures_in_both_times(tmp_path: Path) -> None:
+    result = found(open_in(tmp_path, hourly_winds(4.0, 28.0, 28.0)), 3.0)
+    result = replace(result, goal=replace(result.goal, zone=timezone(timedelta(hours=2))))
+    figure = draw_window(result)
+    # The third and fourth departures are hatched in each panel.
+    assert [sum(patch.get_hatch() is not None for patch in axes.patches) for axes in figure.axes] == [2, 2, 2]
+    page = window_page(result, figure, "planfly window x").render().decode()
+    assert '<div class="answer reached">' in page
+    assert "<strong>open 2026-05-01 06:00 UTC</strong>" in page
+    assert '<th scope="col" class="u">take-off, UTC</th><th scope="col" class="u">take-off, UTC+02:00</th>' in page
+    assert page.count('<td class="u">2026-05-01 06:00</td><td class="u">2026-05-01 08:00</td>') == 1
+    assert page.count('<td colspan="5">not judged: ') == 2
+    assert page.count("<svg ") == 2
+    assert "Repeat: <code>planfly window x</code>" in page
+    assert "Repeat" not in window_page(result, draw_window(result), "").render().decode()
 
 
 @pytest.mark.usefixtures("made_flights")

@@ -12,6 +12,7 @@ from flight.simulation.track import TRACK_ROW, as_track
 from logs.recording.reader import read_log
 from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, UNKNOWN_PATH, Finding, make_finding
 from logs.verdict.places import Place
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import parse_dispersions
@@ -21,6 +22,7 @@ from planfly.campaigns.flight_row import (
     clearance_profile,
     find_marginal_passes,
     find_minimum_margins,
+    find_unjudged_rules,
     fly_one,
     list_failed_findings,
     make_lost_row,
@@ -259,6 +261,25 @@ def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:
     ):
         assert not other.flies
         assert list_failed_findings(other)
+
+
+def test_a_flight_names_what_it_does_not_judge_unless_it_fails() -> None:
+    """As the verdict's summary does; a finding that leaves the verdict undecided is named with its reason, too."""
+    setup = make_setup([[0, 0, 500], [0, 3000, 500]])
+    takeoff = make_finding("takeoff", Place("waypoint", 0), ok=None, reason="why")
+    slope = make_finding("slope", Place("leg", 0), ok=None, reason="unsure", check=UNKNOWN_AIRCRAFT)
+    verdict = Verdict((takeoff, slope), flyable=False, complete=True, lines=(), level="flown", unjudged="x")
+    titles = ("takeoff", f"{RULE_WORDS['takeoff'].title} (why)"), ("slope", "slopes (unsure)")
+    assert find_unjudged_rules(verdict, setup) == titles
+    flyable = replace(verdict, findings=(takeoff,), flyable=True, unjudged="")
+    assert find_unjudged_rules(flyable, setup) == titles[:1]
+    failed = make_finding("turn", Place("waypoint", 1), ok=False, reason="x")
+    assert find_unjudged_rules(replace(verdict, findings=(takeoff, failed)), setup) == ()
+
+
+def test_an_empty_battery_has_nothing_left(base: CampaignBase) -> None:
+    empty = fly_one(replace(base, airframe=replace(base.airframe, battery=6.0)), 0)
+    assert (empty.outcome, empty.energy_left) == ("not flyable", 0.0)
 
 
 def test_a_lost_flight_keeps_its_draw(base: CampaignBase) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from logs.verdict.places import Place
-from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import RuleFailures
 from planfly.campaigns.find_winds import MIN_FLIGHTS_PER_DIRECTION, CalmFailures, WindsGoal, WindsResult
@@ -196,11 +195,6 @@ def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> No
         assert winds_answer(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == answer
     # A boundary of 0 m/s whose interval is narrow, from 150 flights, is an answer, too.
     assert winds_answer(replace(judged, calm=CalmFailures(0.0, 4, 1, ()))) == "not flyable"
-    page = page_template("winds.html", "planfly.campaigns").render(
-        name="x", colours="", picture="", answer="undecided", lines=["not settled"], rows=[], command="x"
-    )
-    assert '<div class="answer undecided">' in page
-    assert re.search(r"\.undecided \{ border-color: var\(--open\)", page)
 
 
 def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, tmp_path: Path) -> None:
@@ -289,6 +283,10 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     assert data["lost"] == [1]
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
     page = (tmp_path / "winds.html").read_text()
+    assert '<div class="answer undecided">' in page
+    assert re.search(r"\.undecided \{ border-color: var\(--open\)", page)
+    assert f"<title>{base.name} – planfly winds</title>" in page
+    assert "Repeat: <code>planfly winds x</code>" in page
     assert page.count('<svg role="img" aria-label="Go/no-go chart') == 2
     assert "lost      1 could not be flown" in page
 

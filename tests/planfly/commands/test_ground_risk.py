@@ -39,7 +39,12 @@ def test_a_mission_over_a_population(folder: Path, capsys: pytest.CaptureFixture
         "ground-risk.kml",
         "ground-risk.md",
         "ground-risk.png",
+        "report.html",
     ]
+    page = Path("risk/report.html").read_text(encoding="utf-8")
+    assert '<div class="answer reached">' in page
+    assert "<td><strong>class</strong></td><td><strong>5</strong></td>" in page.replace(' class=""', "")
+    assert "planfly ground-risk tight --population people.tif --population-unit per-km2 --probability 0.95" in page
     features = json.loads(Path("risk/ground-risk.geojson").read_text())["features"]
     geography, volume, footprint = (shapely.geometry.shape(feature["geometry"]) for feature in features)
     assert volume.buffer(1e-6).covers(geography)

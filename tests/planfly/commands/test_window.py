@@ -49,10 +49,13 @@ def test_a_window_around_a_storm(folder: Path, capsys: pytest.CaptureFixture[str
     ]
     assert (answer["is_go"], answer["asked"]) == (True, None)
     storm = answer["departures"][2]
-    assert storm["rule"] == storm["by_rule"][0]["rule"]
+    assert storm["rules"][0] == storm["by_rule"][0]["rule"]
     assert storm["wind_mps"] == pytest.approx(33.0, abs=0.01)
     assert "the forecast ends at 2026-05-01 11:00 UTC" in answer["departures"][5]["not_judged"]
-    assert [Path(file).name for file in answer["files"]] == ["window.png"]
+    assert answer["not_judged"] == ""
+    assert [Path(file).name for file in answer["files"]] == ["window.png", "report.html"]
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert "planfly window short.waypoints --from 2026-05-01T06:00Z --to 2026-05-01T11:00Z --every 1h" in page
     assert (folder / "out" / "window.png").read_bytes().startswith(b"\x89PNG")
     assert "forecast winds.nc" in answer["conditions"]["forecast"]
 

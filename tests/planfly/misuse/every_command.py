@@ -76,8 +76,9 @@ EVERY = {
         Given(("campaign", *_CAMPAIGN, "--flights", "2"), (0, 3, 4), "out"),
         Given(("winds", *_CAMPAIGN, "--flights", "8", "--directions", "4"), (0, 3, 4), "out"),
         Given(
-            ("battery", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--json", "new.json"),
+            ("battery", "short.waypoints", "--scenario", "field.toml", "--flights", "20", "--out", "out"),
             (0, 3, 4),
+            "out",
         ),
         Given(("window", *_CAMPAIGN, "--forecast", "winds.json", *_DEPARTURES), (0, 3, 4), "out"),
         Given(

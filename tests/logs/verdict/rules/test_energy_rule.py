@@ -24,7 +24,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.suggestions import suggest_using_less_energy
 from tests.logs.verdict.judging import failing, judge, of
-from tests.synthetic import bank_radius, fly_path, make_scenario, make_setup
+from tests.synthetic import bank_radius, edited, fly_path, make_scenario, make_setup
 from world.scenario import Scenario
 
 AEROSONDE = load_aircraft("aerosonde")
@@ -249,3 +249,20 @@ def test_px4_without_a_capacity_reads_the_charge_from_the_voltage(threshold: flo
     setup = replace(real_setup(), autopilot=made)
     needed, _ = predicted_energy(route_requirements(setup))
     assert of(judge_geometry(replace(setup, battery=needed / 0.5)), "energy").ok is ok
+
+
+def test_an_empty_battery_is_said_and_what_is_needed_follows_from_the_prediction(setup: FlightSetup) -> None:
+    """At most 1.50871 times the prediction (a logarithm with a deviation of 0.25), not times what the battery had."""
+    unsure = replace(load_envelope(AEROSONDE), source="a data sheet", power_sd=0.25)
+    small = replace(real_setup(table=unsure), battery=20.0)
+    predicted, _ = predicted_energy(route_requirements(small))
+    track = fly_path(small)
+    for used, is_empty in ((20.0005, True), (19.9, False)):
+        energy = np.linspace(0.0, used, len(track), dtype=np.float32)
+        item = of(judge(small, edited(track, energy=energy)), "energy")
+        assert item.ok is False
+        assert ("Wh of 20 Wh used, peak current" in item.reason, ": the battery is empty; " in item.reason) == (
+            True,
+            is_empty,
+        )
+        assert f"at most {1.50871 * (predicted if is_empty else used):.1f} Wh with 95 % probability" in item.reason

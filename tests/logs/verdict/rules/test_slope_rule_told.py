@@ -194,3 +194,21 @@ def test_the_autopilots_throttle_limit_is_named_where_it_limits_the_climb(
     # Two hundredths below the limit the throttle shows nothing of it.
     assert flown(2.0, throttle - 0.02).ok
     assert flown(0.0, throttle).ok
+
+
+def test_a_climb_into_a_wind_as_strong_as_the_airspeed_makes_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 25 m/s, a climb at 13.7 degrees leaves 24.3 m/s forward; level flight has 0.2 m/s over the ground."""
+    headwind = {"speed_mps": 24.8, "from_deg": 0.0}
+    words = "no progress over the ground: 0.2 m/s in 24.8 m/s of headwind"
+    verdict = judge_geometry(make_setup(hill(3.0), wind=headwind))
+    item = of(verdict, "slope", leg(1))
+    assert (item.ok, item.limit) == (False, 0.0)
+    assert item.reason.startswith(f"{words}; leg 1 climbs 3.0° for 2.0 km at 25 m/s")
+    assert verdict.headline.startswith(f"not flyable: slope on leg 1, to item 2 ({words})")
+    measure = SlopeMeasure(slope=LegFit(math.radians(2.0), 0.0, 900.0, is_fitted=True))
+    assert f"flown at +2.0°, {words}" in judged(measure, monkeypatch, 0.0, envelope=True, wind=headwind).reason
+    # 25 cos 13.7 = 24.29 m/s are as much as a headwind of 24.2 m/s leaves.
+    assert "no progress" not in judge_geometry(make_setup(hill(3.0), wind=headwind | {"speed_mps": 24.2})).summary
+    diagonal = {"speed_mps": 24.9, "from_deg": 10.0}
+    slanting = of(judge_geometry(make_setup(hill(3.0), wind=diagonal)), "slope", leg(1))
+    assert "no progress over the ground: 0.1 m/s in 24.5 m/s of headwind and 4.3 m/s of crosswind" in slanting.reason
