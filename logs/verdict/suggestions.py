@@ -32,6 +32,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import FLIGHT, MISSION, Change, Quantity, Suggestion
 from logs.verdict.tolerances import (
+    CALM_WIND_MPS,
     HOME_ERROR_M,
     LEVEL_SLOPE_RAD,
     MIN_EVIDENCE_FLIGHT_S,
@@ -469,6 +470,25 @@ def suggest_flying_lower(
         return ()
     excess = _round_to_meter(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("descent", finding.place, None, excess, "m"),),)
+
+
+def suggest_launch_into_wind(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest a launch into the wind, or on the runway's other course, for a launch with a tailwind."""
+    ground = requirements.ground_phases
+    take_off = None if ground is None else ground.procedures.take_off
+    if take_off is None:
+        return ()
+    wind_east, wind_north = requirements.setup.scenario.wind.velocity_at(take_off.home_altitude)
+    tailwind = wind_east * math.sin(take_off.course) + wind_north * math.cos(take_off.course)
+    if tailwind < CALM_WIND_MPS:
+        return ()
+    course = math.atan2(-wind_east, -wind_north)
+    if take_off.launch.method == "runway":
+        course = take_off.course + math.pi
+    current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (take_off.course, course))
+    return ((Change("launch course", finding.place, current, wanted, "deg"),),)
 
 
 def suggest_staying_inside(

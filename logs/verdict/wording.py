@@ -118,6 +118,8 @@ def _other_change_text(change: Change) -> str:
     match change.what:
         case "home altitude":
             return f"set home to {requested_value:.1f} m AMSL, the ground there, instead of {change.current:.1f} m"
+        case "launch course":
+            return f"launch on a course of {requested_value:.0f}° instead of {change.current:.0f}°, against the wind"
         case "duration":
             return f"shorten the flight by {requested_value:.0f} %"
         case "full throttle" | "no throttle":

@@ -17,7 +17,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.places import Change, RemainingFinding, Suggestion, TriedSuggestions
+from logs.verdict.places import FLIGHT, Change, RemainingFinding, Suggestion, TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
@@ -92,9 +92,9 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
 
 
 def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
-    """Return True if a finding was not judged because the flight ended early."""
+    """Return True if a finding was not judged, or only for a part of the flight, because the flight ended early."""
     has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
-    return has_ended_early and (old_finding is None or old_finding.ok is None)
+    return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
 
 
 def added_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
@@ -320,7 +320,8 @@ class SuggestionTrials:
             except PlanflyError:
                 return
             new_trial = Trial(setup, self.context.airframe.aircraft, self.should_abort)
-            trial = self._trials.setdefault((mission.items, mission.home, setup.battery), new_trial)
+            key = mission.items, mission.home, setup.battery, setup.scenario.launch
+            trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
@@ -336,6 +337,9 @@ class SuggestionTrials:
                 return self.judged.mission, replace(setup, battery=change.wanted * setup.battery)
             case (Change(what="duration") as change,):
                 return self.judged.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
+            case (Change(what="launch course") as change,) if setup.scenario.launch is not None:
+                launch = replace(setup.scenario.launch, course=math.radians(change.wanted))
+                return self.judged.mission, replace(setup, scenario=replace(setup.scenario, launch=launch))
         mission = apply_suggestion(self.context, self.judged, finding, suggestion)
         return mission, self.context.setup(mission)
 

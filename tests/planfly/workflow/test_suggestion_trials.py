@@ -9,7 +9,7 @@ import pytest
 from flight.mission.edits import movable_indices, raise_items
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
-from logs.verdict.places import Change, Place, RemainingFinding, Suggestion
+from logs.verdict.places import FLIGHT, Change, Place, RemainingFinding, Suggestion
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
 from planfly.workflow import suggestion_trials
@@ -21,10 +21,12 @@ from planfly.workflow.suggestion_trials import (
     SuggestionTrials,
     is_improved,
     is_passed,
+    judge_mission_geometry,
     remaining_findings,
     tried_suggestions,
     with_tried_suggestions,
 )
+from tests.mission_lines import setup_of, wp
 from tests.planfly.studio.drafts import drawn_session
 
 SESSION = drawn_session(5, 12)
@@ -93,6 +95,10 @@ def test_what_an_early_end_left_unjudged_is_named() -> None:
     text = suggestion_text((replace(higher(1, 12.0)[0], remaining=remaining),))
     fails_text = "then still fails: clearance at leg 4"
     assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; then still undecided: clearance at leg 5)"
+    # The energy of a flight that ended early passes only for the part that was flown.
+    flown_part, whole = (make_finding("energy", FLIGHT, ok=ok, reason="") for ok in (True, False))
+    assert is_passed(replace(before, findings=(*before.findings, flown_part)), verdict_of(whole), low(1))
+    assert not is_passed(verdict_of(low(1), flown_part), verdict_of(whole), low(1))
     # A flight to the end left nothing unjudged for that reason.
     assert not is_passed(replace(before, complete=True), after, low(1))
 
@@ -118,6 +124,20 @@ def test_a_slope_passes_only_if_the_altitude_is_mended(error_before: float, erro
         for ok, error in ((False, error_before), (True, error_after))
     )
     assert is_passed(verdict_of(steep), verdict_of(gentle), steep) is passes
+
+
+def test_legs_that_are_low_because_home_is_below_the_ground_are_offered_homes_altitude() -> None:
+    """The ground is at 100 m: 80 m above a home at 0 m are 20 m below it, and 80 m above a home on it are enough."""
+    lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0), wp(2000, 2500, 80.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 0"))
+    texts = {finding.suggestion for finding in judged.failed if finding.rule == "clearance"}
+    assert texts == {"set home to 100.0 m AMSL, the ground there, instead of 0.0 m"}
+    # 60 m below the ground there, home is beyond the errors of heights, and 40 m below it is within them.
+    for home, what in ((40.0, "home altitude"), (60.0, "height")):
+        lines = [wp(0, 500 + 1000 * k, 50.0) for k in range(3)]
+        judged = judge_mission_geometry(setup_of(*lines, home=f"36.5 -84.2 {home}"))
+        changes = {finding.suggestions[0][0].what for finding in judged.failed if finding.suggestions}
+        assert changes == {what}
 
 
 @dataclass
