@@ -49,10 +49,8 @@ def energy_findings(
     planned_energy, peak_current = predicted_energy(requirements)
     is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
-    faults = []
-    if setup.route.endless_jump is not None:
-        is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
-        faults = [_endless_jump_message(requirements, limit, energy / planned_energy if is_flown else 1.0)]
+    is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
+    faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0)
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
     faults += failsafes.faults
@@ -100,12 +98,14 @@ def energy_findings(
     ]
 
 
-def _endless_jump_message(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> Message:
-    """Return a message on an endless jump, with the number of rounds for which the usable energy (Wh) lasts.
+def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
+    """Return a fault if a jump is endless, with the number of rounds for which the usable energy (Wh) lasts.
 
     energy_ratio: ratio of the energy as flown to the prediction; 1 if it is not known.
     """
     route = requirements.setup.route
+    if route.endless_jump is None:
+        return []
     last_waypoint = len(route.items) - 1
     start = last_waypoint
     while start > 0 and route.items[start] == route.items[last_waypoint]:
@@ -117,15 +117,15 @@ def _endless_jump_message(requirements: RouteRequirements, usable_energy: float,
     round_energy = sum(energies[start:]) if route.items[start] == route.items[last_waypoint] else math.nan
     fault = f"the jump of item {route.endless_jump} has no end"
     if not round_energy > 0.0:
-        return message(fault)
+        return [message(fault)]
     # The first round, the path to it, and the rest of the mission, which an endless jump never reaches.
     first_energy = _energy_without_jump(requirements)
     if not math.isfinite(first_energy):
         first_energy = sum(energies[:start])
     repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
     if repeats < 0:
-        return message(f"{fault}: the energy does not last for a round")
-    return message(f"{fault}: the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")
+        return [message(f"{fault}: the energy does not last for a round")]
+    return [message(f"{fault}: the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:
