@@ -59,7 +59,8 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
     A failed flight has this text only if the planned route fails, too.
     """
     is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
-    if not is_judged or not verdict.failed or any(finding.suggestions for finding in verdict.failed):
+    has_hint = any(finding.suggestions for finding in verdict.failed) or all(map(_is_required_return, verdict.failed))
+    if not is_judged or has_hint:
         return ""
     if verdict.level == "geometric":
         return "no change was found"
@@ -69,10 +70,15 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
     return f"no change was found by flying{further_text}"
 
 
+def _is_required_return(finding: Finding) -> bool:
+    """Return True for a finding on the returns that a scenario requires."""
+    return finding.rule == "return" and finding.limit_source == "scenario"
+
+
 def _failed_lines(rule: RuleFindings) -> list[str]:
     """Return the lines for a failed rule.
 
-    They name the worst finding, its suggestion, and the places of the other failed findings.
+    They name the worst finding, its suggestion, or that of another if it has none, and the other places that failed.
     """
     worst_finding, *other_findings = rule.failed
     rule_name = rule.words.word
@@ -82,7 +88,10 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     lines = [colour_text("  failed  ", "bad") + f"{places_text} {worst_finding.where}: {worst_finding.reason}"]
     if worst_finding.suggestions:
         lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
-    elif rule.words.name == "return" and worst_finding.limit_source == "scenario":
+    elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):
+        helped_text = f"at {helped_finding.where}: {helped_finding.suggestion}"
+        lines.append(colour_text("          would pass: ", "hint") + helped_text)
+    elif _is_required_return(worst_finding):
         lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
     if other_findings:
         other_places = "; ".join(map(_place_and_value, other_findings[:_MAX_LISTED]))

@@ -6,7 +6,7 @@ import pytest
 
 from logs.verdict.findings import make_finding
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.places import FLIGHT, LevelAnswer, Place
+from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
 from logs.verdict.verdict import Verdict
 from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, judge
@@ -49,10 +49,23 @@ def test_a_verdict_by_geometry_refers_neither_to_flights_nor_to_itself() -> None
     assert texts(without_suggestions(verdict), suggests=True) == ["no change was found"]
 
 
+def test_a_suggestion_of_another_than_the_worst_finding_names_its_place() -> None:
+    higher = ((Change("height", Place("leg", 5), None, 12.0, "m"),),)
+    worst, other = (
+        make_finding("clearance", Place("leg", leg), ok=False, reason="low", limit=30.0, margin=margin, at_least=True)
+        for leg, margin in ((1, -80.0), (5, -11.0))
+    )
+    verdict = replace(judge_geometry(make_setup(ROUTE)), findings=(worst, replace(other, suggestions=higher)))
+    assert texts(verdict, suggests=True) == ["at leg 5: raise both ends of leg 5 by 12 m"]
+    verdict = replace(verdict, findings=(replace(worst, suggestions=higher), other))
+    assert texts(verdict, suggests=True) == ["raise both ends of leg 5 by 12 m"]
+
+
 def test_required_returns_that_fail_refer_to_their_own_suggestions() -> None:
     unsafe = make_finding("return", FLIGHT, ok=False, reason="3 returns hit the ground", source="scenario")
     verdict = replace(judge_geometry(make_setup(ROUTE)), findings=(unsafe,))
     hint = "would help: planfly returns --suggest looks for a remedy"
     assert any(line.endswith(hint) for line in verdict_lines(verdict, ()))
+    assert texts(verdict, suggests=True) == []
     own_end = replace(unsafe, place=Place("waypoint", 4), limit_source="none")
     assert not any(line.endswith(hint) for line in verdict_lines(replace(verdict, findings=(own_end,)), ()))
