@@ -98,6 +98,23 @@ def set_altitude(mission: Mission, index: int, amsl: float, current_amsl: float)
     return _with_replaced_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_round_to_milli(amsl)))
 
 
+def set_loiter_radius(mission: Mission, index: int, radius: float) -> Mission:
+    """Return the mission with another radius (m) of a loiter's item, which keeps its direction.
+
+    >>> items = tuple(MissionItem(k, c, 3, (2.0, -80.0, -80.0, 0.0), 46.0, 8.0, 75.0) for k, c in ((1, 18), (2, 31)))
+    >>> [set_loiter_radius(Mission(None, items), k, 94.0).items[k].params for k in (0, 1)]
+    [(2.0, -80.0, -94.0, 0.0), (2.0, -94.0, -80.0, 0.0)]
+    """
+    item = movable_item(mission, index)
+    p1, p2, p3, p4 = item.params
+    # A loiter to an altitude states its radius as the second parameter.
+    if item.command == Command.NAV_LOITER_TO_ALT:
+        p2 = math.copysign(radius, p2)
+    else:
+        p3 = math.copysign(radius, p3)
+    return _with_replaced_item(mission, index, replace(item, params=(p1, p2, p3, p4)))
+
+
 def insertion_index(mission: Mission, previous_index: int) -> int:
     """Return the index for a new waypoint after an item, behind all actions at that item.
 

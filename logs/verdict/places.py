@@ -15,7 +15,8 @@ from world.json_schema import DocumentConfig
 PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"]
 
 # Quantity of a change.
-# - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn".
+# - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn",
+#   "radius" that a loiter's item states, "home altitude", "launch course" of the scenario.
 # - Changes by a step: "height" (higher) or "descent" (lower) of a leg or of the path at a zone; "inset" of the path
 #   from the area's edges; "distance" from a missile; "north", "east", "south" or "west" of the path at a zone;
 #   "duration" of the flight.
@@ -27,6 +28,9 @@ Quantity = Literal[
     "rise",
     "airspeed",
     "turn",
+    "radius",
+    "home altitude",
+    "launch course",
     "height",
     "descent",
     "inset",
@@ -94,6 +98,16 @@ class ItemMove(DocumentConfig):
 
 
 @dataclass(frozen=True, slots=True)
+class RemainingFinding(DocumentConfig):
+    """Finding that is open after a change, on a part of the mission that was not judged, or that failed, before."""
+
+    rule: str
+    place: Place
+    fails: bool
+    """True if it fails, false if it is undecided."""
+
+
+@dataclass(frozen=True, slots=True)
 class Change(DocumentConfig):
     """One change of the plan."""
 
@@ -108,6 +122,8 @@ class Change(DocumentConfig):
     """Upper end of the range of passing values; `wanted` is its lower end."""
     moves: tuple[ItemMove, ...] = field(default=(), compare=False)
     """Moves of items with which the suggestion passed its trial, stated with its last change; all else is unmoved."""
+    remaining: tuple[RemainingFinding, ...] = field(default=(), compare=False)
+    """Findings that remain open after the suggestion, stated with its last change."""
 
 
 # Changes to make together.  A finding has alternative suggestions, any of which would make it pass.

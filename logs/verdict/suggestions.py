@@ -11,6 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
+from flight.mission.items import OVER_HOME
+from flight.mission.itinerary import stated_loiter
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.path_sweeps import path_spheres
@@ -27,8 +30,10 @@ from logs.verdict.measures.route_requirements import (
 )
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
-from logs.verdict.places import FLIGHT, Change, Quantity, Suggestion
+from logs.verdict.places import FLIGHT, MISSION, Change, Quantity, Suggestion
 from logs.verdict.tolerances import (
+    CALM_WIND_MPS,
+    HOME_ERROR_M,
     LEVEL_SLOPE_RAD,
     MIN_EVIDENCE_FLIGHT_S,
     MIN_LEG_LENGTH_M,
@@ -45,6 +50,7 @@ from logs.verdict.tolerances import (
 )
 from logs.verdict.trials import first_that_passes
 from world.airspace.zone_kernels import ZoneRecords, zone_records
+from world.frames import to_map
 from world.kernels import Records
 from world.terrain import Terrain
 
@@ -127,6 +133,9 @@ def _smallest_shift(
         shifted_moves[axis] = moves[axis] + sign * shift
     return None
 
+
+# Greatest step to which an autopilot rounds the radius of a loiter, m.
+_MAX_RADIUS_ROUNDING_M = 10
 
 # Relative size of a change, and the suggestion.
 _SizedSuggestion = tuple[float, Suggestion]
@@ -248,6 +257,29 @@ def suggest_stating_bank(
         return ()
     current, wanted = (math.degrees(bank) for bank in (requirements.setup.max_bank, requirements.possible_bank))
     return ((Change("stated bank", finding.place, current, wanted, "deg"),),)
+
+
+def suggest_larger_loiter(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest the radius that a loiter's item must state for the bank limit in this wind."""
+    if finding.check == UNKNOWN_AIRCRAFT:
+        return suggest_stating_bank(requirements, aligned, finding)
+    item = next((item for item in requirements.setup.mission.items if item.seq == finding.place.item), None)
+    loiter, radius_of = None if item is None else stated_loiter(item), requirements.setup.autopilot.loiters.radius_of
+    if loiter is None or finding.limit is None or not finding.planned or finding.planned >= finding.limit:
+        return ()
+    # The flown radius grows with the altitude; the autopilot rounds the stated radius, to 10 m at most.
+    scale = finding.planned / radius_of(loiter) if radius_of(loiter) else math.nan
+    if not math.isfinite(scale):
+        return ()
+    needed_radius = finding.limit / scale
+    candidates = (float(math.ceil(needed_radius) + k) for k in range(_MAX_RADIUS_ROUNDING_M + 1))
+    radius = first_that_passes(
+        candidates,
+        lambda radius: radius_of(replace(loiter, radius=math.copysign(radius, loiter.radius))) >= needed_radius,
+    )
+    return () if radius is None else ((Change("radius", finding.place, abs(loiter.radius), radius, "m"),),)
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
@@ -396,16 +428,32 @@ def suggest_wider_berth(
     return ((Change("distance", finding.place, None, extra_distance, "m"),),)
 
 
+def home_height(setup: FlightSetup) -> float:
+    """Return the height of the mission's home above the ground there, m.
+
+    The height is NaN if no item is placed relative to home, or if home's altitude or the ground there is unknown.
+    """
+    home, terrain = setup.mission.home, setup.scenario.terrain
+    is_used = setup.plan is None and any(item.frame in OVER_HOME for item in setup.mission.items)
+    if home is None or terrain is None or not is_used:
+        return math.nan
+    east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
+    return home.alt - float(terrain.height(float(east), float(north)))
+
+
 def suggest_flying_higher(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg higher above the ground."""
+    """Suggest flying a leg higher above the ground, or home on the ground if home's altitude is that far below it."""
     if finding.limit is None or finding.margin is None:
         return ()
     shortfall = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
     if finding.planned is not None:
         # A flight that ended early did not reach the lowest point.
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
+    home, depth = requirements.setup.mission.home, -home_height(requirements.setup)
+    if home is not None and depth > HOME_ERROR_M and depth >= shortfall - SUGGESTION_LENGTH_MARGIN_M:
+        return ((Change("home altitude", MISSION, home.alt, round(home.alt + depth, 1), "m"),),)
     return (
         ((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),),)
         if shortfall > SUGGESTION_LENGTH_MARGIN_M
@@ -422,6 +470,25 @@ def suggest_flying_lower(
         return ()
     excess = _round_to_meter(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("descent", finding.place, None, excess, "m"),),)
+
+
+def suggest_launch_into_wind(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest a launch into the wind, or on the runway's other course, for a launch with a tailwind."""
+    ground = requirements.ground_phases
+    take_off = None if ground is None else ground.procedures.take_off
+    if take_off is None:
+        return ()
+    wind_east, wind_north = requirements.setup.scenario.wind.velocity_at(take_off.home_altitude)
+    tailwind = wind_east * math.sin(take_off.course) + wind_north * math.cos(take_off.course)
+    if tailwind < CALM_WIND_MPS:
+        return ()
+    course = math.atan2(-wind_east, -wind_north)
+    if take_off.launch.method == "runway":
+        course = take_off.course + math.pi
+    current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (take_off.course, course))
+    return ((Change("launch course", finding.place, current, wanted, "deg"),),)
 
 
 def suggest_staying_inside(

@@ -72,6 +72,8 @@ def change_text(change: Change) -> str:
     'lower both ends of leg 3 by 12 m'
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
     'lower both ends of leg 3, to item 5, by 12 m'
+    >>> change_text(Change("radius", Place("waypoint", 4, item=5), 80.0, 94.0, "m"))
+    'give item 5 a radius of 94 m instead of 80 m'
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
     'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """
@@ -99,6 +101,10 @@ def change_text(change: Change) -> str:
         case "north" | "east" | "south" | "west":
             verb = "stay in" if change.place.kind == "inclusion" else "pass"
             return f"{verb} {change.place.name} {requested_value:.0f} m further {change.what}"
+        case "radius":
+            return (
+                f"set the radius of item {change.place.item} to {requested_value:g} m instead of {change.current:g} m"
+            )
         case "inset":
             return f"bring the path {requested_value:.0f} m further inside the area"
         case "distance":
@@ -110,6 +116,10 @@ def _other_change_text(change: Change) -> str:
     """Phrase a change of anything but the path as an instruction."""
     requested_value = change.wanted
     match change.what:
+        case "home altitude":
+            return f"set home to {requested_value:.1f} m AMSL, the ground there, instead of {change.current:.1f} m"
+        case "launch course":
+            return f"launch on a course of {requested_value:.0f}° instead of {change.current:.0f}°, against the wind"
         case "duration":
             return f"shorten the flight by {requested_value:.0f} %"
         case "full throttle" | "no throttle":
@@ -167,7 +177,14 @@ def suggestion_text(suggestion: Suggestion) -> str:
     else:
         text = " and ".join(map(change_text, suggestion))
     moves = [move for change in suggestion for move in change.moves]
-    return f"{text} (move {moves_text(moves)})" if moves else text
+    remaining = [finding for change in suggestion for finding in change.remaining]
+    notes = [f"move {moves_text(moves)}"] if moves else []
+    notes += [
+        f"then still {state}: {', '.join(f'{item.rule} at {place_text(item.place)}' for item in items)}"
+        for state, fails in (("fails", True), ("undecided", False))
+        if (items := [item for item in remaining if item.fails is fails])
+    ]
+    return f"{text} ({'; '.join(notes)})" if notes else text
 
 
 def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:

@@ -97,7 +97,7 @@ def check(args: argparse.Namespace) -> int:
     write_json_if_requested(args, lambda: _verdict_answer(result.verdict, returns, code))
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
-    print_verdict(result.verdict, result.setup.notes)
+    print_verdict(result.verdict, result.setup.notes, result.setup)
     print_returns_line(returns.line)
     return code
 

@@ -55,7 +55,7 @@ def fly(args: argparse.Namespace) -> int:
     log = args.log if is_log_named else FLY_LOG
     flight = call_api(planfly.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
     print_warnings(flight.setup.scenario.notes)
-    print_verdict(flight.verdict, flight.setup.notes)
+    print_verdict(flight.verdict, flight.setup.notes, flight.setup)
     print_returns_line(flight.returns_line)
     if flight.log is None:
         print("log       none: nothing was flown")

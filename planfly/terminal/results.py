@@ -7,16 +7,21 @@ from typing import TYPE_CHECKING
 from planfly.terminal.command_parser import colour_text
 
 if TYPE_CHECKING:
+    from flight.simulation.setup import FlightSetup
     from logs.recording.reader import FlightLog
     from logs.verdict.verdict import Verdict
 
 
-def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
-    """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule."""
-    # Imported here because --help does not need it.
-    from planfly.terminal.verdict_lines import verdict_lines
+def print_verdict(verdict: "Verdict", notes: Iterable[str], setup: "FlightSetup | None" = None) -> None:
+    """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule.
 
-    print("\n".join(verdict_lines(verdict, notes)))
+    setup: setup of the judged flight, to find out whether its planned route has suggestions; None if there is none.
+    """
+    # Imported here because --help does not need them.
+    from planfly.terminal.verdict_lines import verdict_lines
+    from planfly.workflow.suggestion_trials import has_geometric_suggestion
+
+    print("\n".join(verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))))
 
 
 def print_returns_line(line: str) -> None:

@@ -1,6 +1,6 @@
 """Format a verdict as lines for a terminal."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
@@ -17,20 +17,27 @@ _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "missio
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
-def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
+def never_suggests() -> bool:
+    """Return False: no change is suggested for the planned route."""
+    return False
+
+
+def verdict_lines(
+    verdict: Verdict, notes: Iterable[str], suggests_by_geometry: Callable[[], bool] = never_suggests
+) -> list[str]:
     """Return the lines of a verdict for a terminal.
 
     They are the summary, the failures, the finding closest to its limit for each rule, and the notes.
+
+    suggests_by_geometry: returns True if changes of the planned route are suggested without a flight; called only if
+    the flight has no suggestion.
     """
     presentation = verdict.present()
     lines = [colour_text(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
     for rule in presentation.failed_rules:
         lines += _failed_lines(rule)
-    if _needs_geometric_suggestions(verdict, presentation.failed_rules):
-        lines.append(
-            colour_text("          would pass: ", "hint")
-            + "no change was found by flying; planfly check --geometry suggests changes for the planned route"
-        )
+    no_change_text = _no_change_text(verdict, suggests_by_geometry)
+    lines += [colour_text("          would pass: ", "hint") + no_change_text] if no_change_text else []
     lines += [
         f"  open    {rule_word(finding.rule)} at {finding.where}: {finding.reason}"
         for finding in presentation.undecided[: 2 * _MAX_LISTED]
@@ -46,19 +53,32 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     return [*lines, *(f"  note    {note}" for note in notes)]
 
 
-def _needs_geometric_suggestions(verdict: Verdict, failed_rules: Sequence[RuleFindings]) -> bool:
-    """Return True if no failed finding has a suggestion, but the planned route fails too, for which there are some."""
-    has_suggestion = any(finding.suggestions for rule in failed_rules for finding in rule.failed)
-    fails_by_geometry = any(
-        level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels
-    )
-    return bool(failed_rules) and not has_suggestion and fails_by_geometry
+def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) -> str:
+    """State that no change passed its trial, if no failed finding has a suggestion; return "" otherwise.
+
+    A failed flight has this text only if the planned route fails, too.
+    """
+    is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
+    has_hint = any(finding.suggestions for finding in verdict.failed) or all(map(_is_required_return, verdict.failed))
+    if not is_judged or has_hint:
+        return ""
+    if verdict.level == "geometric":
+        return "no change was found"
+    if not any(level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels):
+        return ""
+    further_text = "; planfly check --geometry suggests changes for the planned route" if suggests_by_geometry() else ""
+    return f"no change was found by flying{further_text}"
+
+
+def _is_required_return(finding: Finding) -> bool:
+    """Return True for a finding on the returns that a scenario requires."""
+    return finding.rule == "return" and finding.limit_source == "scenario"
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
     """Return the lines for a failed rule.
 
-    They name the worst finding, its suggestion, and the places of the other failed findings.
+    They name the worst finding, its suggestion, or that of another if it has none, and the other places that failed.
     """
     worst_finding, *other_findings = rule.failed
     rule_name = rule.words.word
@@ -68,6 +88,11 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     lines = [colour_text("  failed  ", "bad") + f"{places_text} {worst_finding.where}: {worst_finding.reason}"]
     if worst_finding.suggestions:
         lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
+    elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):
+        helped_text = f"at {helped_finding.where}: {helped_finding.suggestion}"
+        lines.append(colour_text("          would pass: ", "hint") + helped_text)
+    elif _is_required_return(worst_finding):
+        lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
     if other_findings:
         other_places = "; ".join(map(_place_and_value, other_findings[:_MAX_LISTED]))
         more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""

@@ -7,12 +7,12 @@ would remain where it is.  Suggestions about the aircraft, such as a larger batt
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude
+from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude, set_loiter_radius
 from flight.mission.items import LANDINGS, Command, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
@@ -67,7 +67,7 @@ def apply_suggestion(
     if any(change.what == "distance" for change in suggestion):
         choices = [_Choice(max_moves, radially) for max_moves, radially in product((1, None), (False, True))]
     elif [change.what for change in suggestion] == ["rise"]:
-        choices = [_Choice(end_fraction=end_fraction) for end_fraction in (0.5, 1.0, 0.0)]
+        choices = [_Choice(end_fraction=end_fraction) for end_fraction in (None, 1.0, 0.0, 0.5)]
     for choice in choices:
         edited_mission = _EditedMission(context, judged_mission, choice)
         try:
@@ -131,12 +131,13 @@ class _Choice:
 
     max_moves: greatest number of waypoints to move away from a missile; None for all.
     radially: True if each of these waypoints moves in its own direction from the missile.
-    end_fraction: share of a change of a leg's rise that is made at the leg's end; the rest is made at its start.
+    end_fraction: share of a change of a leg's rise that is made at the leg's end; the rest is made at its start.  None
+        for a half, and for all of it at the end of the leg that does not end the route.
     """
 
     max_moves: int | None = None
     radially: bool = False
-    end_fraction: float = 0.5
+    end_fraction: float | None = None
 
 
 class _EditedMission:
@@ -227,11 +228,13 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving its ends, or one end if the other ends the route."""
+    """Reduce the climb or descent of a leg by moving its ends, or only one of them."""
     leg = _changed_leg(change, edited.route)
     excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
-    end_fraction = 0.0 if is_last and not is_first else 1.0 if is_first and not is_last else edited.choice.end_fraction
+    end_fraction = edited.choice.end_fraction
+    if end_fraction is None:
+        end_fraction = 0.0 if is_last and not is_first else 1.0 if is_first and not is_last else 0.5
     edited.move_items([leg], np.array([0.0, 0.0, (1.0 - end_fraction) * excess]))
     edited.move_items([leg + 1], np.array([0.0, 0.0, -end_fraction * excess]))
 
@@ -274,15 +277,35 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
 
 
 def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Raise or lower a leg, or the legs that violate a zone, by a step."""
-    altitude_change = change.wanted if change.what == "height" else -change.wanted
+    """Raise or lower a leg, or the legs that violate a zone, by a step.
+
+    A waypoint between two legs moves by the larger of their steps.
+    """
+    sign = 1.0 if change.what == "height" else -1.0
     legs = (
         [_changed_leg(change, edited.route)]
         if change.place.kind == "leg"
         else violated_legs(edited.requirements, finding)
     )
-    ends = sorted({end for leg in legs for end in (leg, leg + 1)})
-    edited.move_items(ends, np.array([0.0, 0.0, altitude_change]))
+    for waypoint in sorted({end for leg in legs for end in (leg, leg + 1)}):
+        previous_step = sign * float(edited.current_position(waypoint)[2] - edited.route.positions[waypoint, 2])
+        if change.wanted > previous_step:
+            edited.move_items([waypoint], np.array([0.0, 0.0, sign * (change.wanted - previous_step)]))
+
+
+def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+    """Set the altitude of home, above which the altitudes of items are stated."""
+    if edited.mission.home is not None and edited.mission.home.alt != change.wanted:
+        edited.mission = replace(edited.mission, home=replace(edited.mission.home, alt=change.wanted))
+        edited.is_changed = True
+
+
+def _change_loiter_radius(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+    """Set the radius of a loiter's item; it circles in the same direction as before."""
+    index = None if change.place.index is None else edited.item_index(change.place.index)
+    if index is not None:
+        edited.mission = set_loiter_radius(edited.mission, index, change.wanted)
+        edited.is_changed = True
 
 
 def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding) -> None:
@@ -355,6 +378,8 @@ _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] 
     "turn": _make_turn_gentler,
     "height": _change_altitude,
     "descent": _change_altitude,
+    "home altitude": _set_home_altitude,
+    "radius": _change_loiter_radius,
     "inset": _move_inside_area,
     "distance": _move_away_from_missile,
     **dict.fromkeys(_SIDE_DIRECTIONS, _move_sideways),

@@ -154,9 +154,11 @@ class MissionContext:
 
     def setup(self, mission: Mission) -> FlightSetup:
         """Make the flight setup of a mission.  Raises MissionError for a mission that cannot be laid out."""
-        # The mission of the setup names its autopilot, so compare the items, not the missions.
-        if mission.items is self.opened_setup.mission.items and self.scenario is self.opened_setup.scenario:
-            return self.opened_setup
+        opened = self.opened_setup
+        # The mission of the setup names its autopilot, so compare the items and home, not the missions.
+        is_opened_mission = mission.items is opened.mission.items and mission.home == opened.mission.home
+        if is_opened_mission and self.scenario is opened.scenario:
+            return opened
         return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.place_mission(mission))
 
     def judge(self, mission: Mission) -> JudgedMission:

@@ -1,8 +1,9 @@
 """Trials of the suggestions of a verdict; a suggestion is offered only if its trial passes.
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight.  It passes if its
-finding is then ok, no more findings fail than before, and none becomes undecided.  A step that is too small, such as a
-height, is enlarged by the missing part.  A suggestion that passed states the moves of the items.
+finding is then ok, and every finding that passed before still passes.  A step that is too small, such as a height, is
+enlarged by the missing part.  A suggestion that passed states the moves of the items, and the findings that remain
+open on a part of the mission that was not flown before.
 """
 
 import math
@@ -13,11 +14,12 @@ from itertools import islice
 
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, undecided_findings
+from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.places import Change, Suggestion, TriedSuggestions
+from logs.verdict.places import FLIGHT, Change, RemainingFinding, Suggestion, TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
@@ -39,6 +41,8 @@ MAX_TRIED_LEGS = 5000
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
+# Greatest share of a leg's height error that may remain with a suggestion for its slope.
+MAX_HEIGHT_ERROR_SHARE = 0.5
 # Factor on the part that a step still lacks.
 _GROWTH_FACTOR = 1.5
 # Length added to the part that a step still lacks, m.
@@ -53,32 +57,96 @@ def finding_key(finding: Finding) -> tuple[str, str, int | None, str]:
     return finding.rule, finding.place.kind, finding.place.index, finding.place.name
 
 
-def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a finding does not fail after a change, and no more findings fail than before."""
-    return len(new_verdict.failed) <= len(old_verdict.failed) and finding_key(finding) not in map(
-        finding_key, new_verdict.failed
-    )
+def _worst_findings(verdict: Verdict) -> dict[tuple[str, str, int | None, str], Finding]:
+    """Return the worst finding of each rule at each place of a verdict."""
+    worst: dict[tuple[str, str, int | None, str], Finding] = {}
+    for finding in sorted(verdict.findings, key=worst_first_key):
+        worst.setdefault(finding_key(finding), finding)
+    return worst
+
+
+def _is_undecided(finding: Finding) -> bool:
+    """Return True if a finding leaves a verdict undecided."""
+    return bool(undecided_findings((finding,)))
+
+
+def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
+    """Return the findings that fail or leave the verdict undecided only after a change, each with the finding before.
+
+    A finding that passed before is among them if it is not judged after the change.  The finding before is None if
+    there was none.
+    """
+    old_findings = _worst_findings(old_verdict)
+    pairs = []
+    for key, finding in _worst_findings(new_verdict).items():
+        old = old_findings.get(key)
+        if finding.ok is False:
+            is_new = old is None or old.ok is not False
+        elif _is_undecided(finding):
+            is_new = old is None or not _is_undecided(old)
+        else:
+            is_new = finding.ok is None and old is not None and old.ok is True
+        if is_new:
+            pairs.append((old, finding))
+    return pairs
+
+
+def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
+    """Return True if a finding was not judged, or only for a part of the flight, because the flight ended early."""
+    has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
+    return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
 
 
 def added_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
-    """Return the findings that fail only after a change, and those that leave the verdict open only after it."""
-    failed_before = set(map(finding_key, old_verdict.failed))
-    open_before = {finding_key(finding) for finding in old_verdict.findings if finding.ok is not True}
+    """Return the findings that a change makes fail, or leaves undecided or not judged although they passed before.
+
+    A finding that was not judged because the flight ended early is not among them.
+    """
     return [
-        *(finding for finding in new_verdict.failed if finding_key(finding) not in failed_before),
-        *(finding for finding in undecided_findings(new_verdict.findings) if finding_key(finding) not in open_before),
+        finding
+        for old, finding in _newly_open_findings(old_verdict, new_verdict)
+        if not _was_unreached(old_verdict, old) and (finding.ok is False or old is None or old.ok is not False)
     ]
 
 
-def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a change improves the verdict and makes no finding undecided.
+def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
+    """Return the findings of a changed mission that its verdict before does not name.
 
-    The finding itself must be decided after the change, even if it was undecided before.
+    They fail or are undecided after the change, and either were not judged before, because the flight ended early, or
+    failed before and are only undecided now.
     """
-    open_before = {finding_key(item) for item in old_verdict.findings if item.ok is not True}
-    undecided_after = set(map(finding_key, undecided_findings(new_verdict.findings)))
-    is_decided = all(item.ok for item in new_verdict.findings if finding_key(item) == finding_key(finding))
-    return is_improved(old_verdict, new_verdict, finding) and is_decided and undecided_after <= open_before
+    added_keys = set(map(finding_key, added_findings(old_verdict, new_verdict)))
+    return tuple(
+        RemainingFinding(finding.rule, finding.place, finding.ok is False)
+        for _, finding in _newly_open_findings(old_verdict, new_verdict)
+        if finding_key(finding) not in added_keys
+    )
+
+
+def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
+    """Return True if a finding does not fail after a change, and the change makes no other finding fail."""
+    has_new_failures = any(added.ok is False for added in added_findings(old_verdict, new_verdict))
+    return not has_new_failures and finding_key(finding) not in map(finding_key, new_verdict.failed)
+
+
+def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
+    """Return True if a finding passes after a change, or is gone, and no finding that passed before is open.
+
+    A slope passes only if the flown altitude is nearer to the leg than before.
+    """
+    new_finding = _worst_findings(new_verdict).get(finding_key(finding))
+    if new_finding is not None and (new_finding.ok is not True or _keeps_height_error(finding, new_finding)):
+        return False
+    return not added_findings(old_verdict, new_verdict)
+
+
+def _keeps_height_error(old_finding: Finding, new_finding: Finding) -> bool:
+    """Return True if a leg is flown at about the same wrong altitude before and after a change."""
+    old_error, new_error = (
+        next((abs(fact.value) for fact in finding.facts if fact.what == "height error"), 0.0)
+        for finding in (old_finding, new_finding)
+    )
+    return new_error > max(HEIGHT_ERROR_LIMIT_M, MAX_HEIGHT_ERROR_SHARE * old_error)
 
 
 def _finding_text(finding: Finding) -> str:
@@ -117,6 +185,11 @@ def judge_mission_geometry(setup: FlightSetup) -> Verdict:
     requirements = route_requirements(setup)
     verdict = judge_geometry(setup, requirements)
     return with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
+
+
+def has_geometric_suggestion(setup: FlightSetup) -> bool:
+    """Return True if a geometric trial of a change of the planned route passes."""
+    return any(finding.suggestions for finding in judge_mission_geometry(setup).failed)
 
 
 def with_tried_suggestions(judged_mission: JudgedMission) -> Verdict:
@@ -187,7 +260,9 @@ class SuggestionTrials:
             return None
         (*first_changes, last_change), trial = passed_candidate
         moves = item_moves(self.context, self.judged.mission, trial.setup.mission)
-        return PassedTrial(finding, (*first_changes, replace(last_change, moves=moves)), trial.setup)
+        remaining = remaining_findings(*self._compared_verdicts(trial))
+        last_change = replace(last_change, moves=moves, remaining=remaining)
+        return PassedTrial(finding, (*first_changes, last_change), trial.setup)
 
     def explain_refusal(self, finding: Finding, number: int) -> str:
         """Return the reason why no geometric trial of a suggestion passes: the finding stays, or others are added."""
@@ -217,13 +292,20 @@ class SuggestionTrials:
 
         A trial beyond the allowed number of flights fails.
         """
-        if self.judged.verdict.level != "flown":
-            return is_passed(self._current_trial.geometry_verdict, trial.geometry_verdict, finding)
-        if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
-            return False
-        if "flight_verdict" not in vars(trial):
-            self._flights_left -= 1
-        return self._flights_left >= 0 and is_passed(self.judged.verdict, trial.flight_verdict, finding)
+        if self.judged.verdict.level == "flown":
+            if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
+                return False
+            if "flight_verdict" not in vars(trial):
+                self._flights_left -= 1
+            if self._flights_left < 0:
+                return False
+        return is_passed(*self._compared_verdicts(trial), finding)
+
+    def _compared_verdicts(self, trial: Trial) -> tuple[Verdict, Verdict]:
+        """Return the verdicts before and after a trial's change, on flights or by geometry as the judged verdict."""
+        if self.judged.verdict.level == "flown":
+            return self.judged.verdict, trial.flight_verdict
+        return self._current_trial.geometry_verdict, trial.geometry_verdict
 
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield a suggestion and then larger suggestions, each with its trial.
@@ -238,7 +320,8 @@ class SuggestionTrials:
             except PlanflyError:
                 return
             new_trial = Trial(setup, self.context.airframe.aircraft, self.should_abort)
-            trial = self._trials.setdefault((mission.items, setup.battery), new_trial)
+            key = mission.items, mission.home, setup.battery, setup.scenario.launch
+            trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
@@ -254,6 +337,9 @@ class SuggestionTrials:
                 return self.judged.mission, replace(setup, battery=change.wanted * setup.battery)
             case (Change(what="duration") as change,):
                 return self.judged.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
+            case (Change(what="launch course") as change,) if setup.scenario.launch is not None:
+                launch = replace(setup.scenario.launch, course=math.radians(change.wanted))
+                return self.judged.mission, replace(setup, scenario=replace(setup.scenario, launch=launch))
         mission = apply_suggestion(self.context, self.judged, finding, suggestion)
         return mission, self.context.setup(mission)
 
@@ -264,9 +350,8 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     Returns None without such a change.
 
     verdict: verdict on the mission with the suggestion applied.
-    If the finding itself is now ok, the steps that another leg needs for the same rule are added.
+    If the finding itself is now ok, the changes that other legs need for the same rule are added.
     """
-    kinds = {change.what for change in suggestion}
     same_finding = [
         open_finding
         for open_finding in verdict.findings
@@ -277,29 +362,38 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
         for failed_finding in verdict.failed
         if failed_finding.rule == finding.rule and failed_finding.place.kind == "leg"
     ]
-    for open_finding in (*same_finding, *same_rule_legs):
-        for needed_suggestion in open_finding.suggestions:
-            if {change.what for change in needed_suggestion} == kinds:
-                if kinds == {"length"}:
-                    return _merge_lengths(suggestion, needed_suggestion)
-                if kinds <= _STEP_KINDS:
-                    return _merge_steps(suggestion, needed_suggestion)
-                if kinds <= _ENERGY_KINDS:
-                    return (_merge_energy_changes(suggestion[0], needed_suggestion[0]),)
+    larger_suggestion = None
+    for open_finding in same_finding or same_rule_legs:
+        larger_suggestion = _add_needed_change(larger_suggestion or suggestion, open_finding) or larger_suggestion
+    return larger_suggestion
+
+
+def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
+    """Return a suggestion enlarged by the change of the same kind that an open finding needs; None without one."""
+    kinds = {change.what for change in suggestion}
+    for needed_suggestion in open_finding.suggestions:
+        if {change.what for change in needed_suggestion} == kinds:
+            if kinds == {"length"}:
+                return _merge_lengths(suggestion, needed_suggestion)
+            if kinds <= _STEP_KINDS:
+                return _merge_steps(suggestion, needed_suggestion)
+            if kinds <= _ENERGY_KINDS:
+                return (_merge_energy_changes(suggestion[0], needed_suggestion[0]),)
     return None
 
 
 def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
-    """Return the steps of a suggestion, increased by the enlarged steps still needed.
+    """Return the steps of a suggestion with the steps still needed.
 
-    Steps are added to the step of the same kind at the same place.
+    A step at a place that already has one of the same kind is enlarged and added to it.
     """
-    further_steps = [replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_steps]
-    steps: dict[object, Change] = {}
-    for change in (*suggestion, *further_steps):
+    steps = {(change.what, change.place.kind, change.place.index): change for change in suggestion}
+    for change in needed_steps:
         key = change.what, change.place.kind, change.place.index
-        previous_step = steps[key].wanted if key in steps else 0.0
-        steps[key] = replace(change, wanted=float(round(previous_step + change.wanted)))
+        wanted = change.wanted
+        if key in steps:
+            wanted = steps[key].wanted + _GROWTH_FACTOR * change.wanted + _GROWTH_M
+        steps[key] = replace(change, wanted=float(round(wanted)))
     return tuple(steps.values())
 
 

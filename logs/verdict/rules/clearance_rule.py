@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.mission.items import OVER_HOME, Command
+from flight.mission.items import Command
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import suggest_flying_higher
+from logs.verdict.suggestions import home_height, suggest_flying_higher
 from logs.verdict.tolerances import (
     BELOW_HOME_M,
     CLEARANCE_TOLERANCE_M,
@@ -22,7 +22,7 @@ from logs.verdict.tolerances import (
 )
 from logs.verdict.wording import place_text_within
 from world.arrays import Floats
-from world.frames import to_geo, to_map
+from world.frames import to_geo
 from world.terrain import Terrain
 
 # Greatest depth below ground of the last row of a flight that hits the ground, m: a tick of 1/60 s at 50 m/s is 0.8 m.
@@ -64,7 +64,7 @@ def clearance_findings(
             findings.append(
                 _flown_finding(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
             )
-    return [*_home_above_ground_findings(requirements, terrain, findings), *findings]
+    return [*_home_above_ground_findings(requirements, findings), *findings]
 
 
 def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
@@ -127,22 +127,15 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
 
 
-def _home_above_ground_findings(
-    requirements: RouteRequirements, terrain: Terrain, leg_findings: list[Finding]
-) -> list[Finding]:
+def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: list[Finding]) -> list[Finding]:
     """Report a mission whose home lies above the ground as undecided if a leg would be too low with home on the ground.
 
     An autopilot sets home to its own position when it is armed, and all heights above home are lowered with it.
 
     leg_findings: findings on the legs with the mission's own home.
     """
-    setup = requirements.setup
-    home = setup.mission.home
-    if home is None or setup.plan is not None or not any(item.frame in OVER_HOME for item in setup.mission.items):
-        return []
-    east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
-    height = home.alt - float(terrain.height(float(east), float(north)))
-    # The height is NaN outside the terrain data; then nothing is reported.
+    height = home_height(requirements.setup)
+    # The height is NaN if it is unknown; then nothing is reported.
     if not height > HOME_ERROR_M or not any(
         finding.margin is not None and 0.0 <= finding.margin < height for finding in leg_findings
     ):

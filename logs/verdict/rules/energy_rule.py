@@ -1,11 +1,14 @@
 """The energy rule: compare the energy from battery or tank, predicted and flown, with the usable energy."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from flight.autopilots.parts import BatteryFailsafe
+from flight.mission.items import Command
+from flight.mission.route import make_route
 from logs.verdict.findings import (
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
@@ -16,7 +19,7 @@ from logs.verdict.findings import (
     message,
 )
 from logs.verdict.measures.energy import leg_energies, predicted_energy
-from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
@@ -27,6 +30,8 @@ from logs.verdict.tolerances import (
     NOMINAL_CELL_VOLTAGE_V,
     UNDECIDED_FRACTION,
 )
+from logs.verdict.wording import count_text
+from world.errors import PlanflyError
 
 _MAH_PER_AH = 1000.0
 # V.  Rounding of a threshold for the whole battery, for each cell.
@@ -46,9 +51,11 @@ def energy_findings(
     planned_energy, peak_current = predicted_energy(requirements)
     is_guessed = envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
+    is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
-    faults = [*_endless_jump_faults(requirements, limit), *failsafes.faults]
+    jump_faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0)
+    faults = [*jump_faults, *failsafes.faults]
     # A flight that ends with an empty battery does not show the energy that it needs; the prediction does.
     is_empty = not geometric and not is_measured and energy >= setup.battery
     needed_energy = float(np.fmax(energy, planned_energy)) if is_empty else energy
@@ -99,8 +106,11 @@ def _max_energy_text(max_energy: float, source: str) -> str:
     return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
 
 
-def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float) -> list[Message]:
-    """Return a message on an endless jump, with the rounds for which the usable energy (Wh) lasts; [] without one."""
+def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
+    """Return a fault if a jump is endless, with the number of rounds for which the usable energy (Wh) lasts.
+
+    energy_ratio: ratio of the energy as flown to the prediction; 1 if it is not known.
+    """
     route = requirements.setup.route
     if route.endless_jump is None:
         return []
@@ -111,11 +121,41 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float) 
     # Find the start of the last round: the previous waypoint of the item with which the route ends.
     while start > 0 and route.items[start] != route.items[last_waypoint]:
         start -= 1
-    round_energy = (
-        sum(leg_energies(requirements)[0][start:]) if route.items[start] == route.items[last_waypoint] else math.nan
+    energies = leg_energies(requirements)[0]
+    round_energy = sum(energies[start:]) if route.items[start] == route.items[last_waypoint] else math.nan
+    fault = f"the jump of item {route.endless_jump} has no end"
+    if not round_energy > 0.0:
+        return [message(fault)]
+    # The first round, the path to it, and the rest of the mission, which an endless jump never reaches.
+    first_energy = _energy_without_jump(requirements)
+    if not math.isfinite(first_energy):
+        first_energy = sum(energies[:start])
+    repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
+    if repeats < 0:
+        return [message(f"{fault}: the energy does not last for a round")]
+    return [message(f"{fault}: the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")]
+
+
+def _energy_without_jump(requirements: RouteRequirements) -> float:
+    """Predict the energy of the mission without its endless jump, Wh; NaN if its route is not known."""
+    setup = requirements.setup
+    items = tuple(
+        replace(item, params=(item.params[0], 0.0, *item.params[2:]))
+        if item.seq == setup.route.endless_jump and item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG)
+        else item
+        for item in setup.mission.items
     )
-    duration_text = f": the energy lasts for {usable_energy / round_energy:.0f} rounds" if round_energy > 0.0 else ""
-    return [message(f"the jump of item {route.endless_jump} has no end{duration_text}")]
+    if items == setup.mission.items:
+        return math.nan
+    mission, scenario = replace(setup.mission, items=items), setup.scenario
+    try:
+        route = make_route(
+            *(mission, scenario.origin, scenario.terrain, setup.airspeed, scenario.flight.fly_over, setup.limits),
+            setup.autopilot.route_rules,
+        )
+        return predicted_energy(route_requirements(replace(setup, mission=mission, route=route)))[0]
+    except PlanflyError:
+        return math.nan
 
 
 def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:

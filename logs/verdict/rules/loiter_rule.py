@@ -27,7 +27,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.suggestions import suggest_stating_bank
+from logs.verdict.suggestions import suggest_larger_loiter
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
     LOITER_LAPS_TOLERANCE,
@@ -449,6 +449,6 @@ RULE = Rule(
     ),
     judge=end_loiter_findings,
     merge=merge_loiter_findings,
-    suggest=suggest_stating_bank,
+    suggest=suggest_larger_loiter,
     log=LogNeeds(needs_aircraft=True),
 )

@@ -94,6 +94,16 @@ def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did()
     assert "length" in told
 
 
+def test_raises_of_neighbouring_legs_combine_by_the_larger() -> None:
+    """Item 3 ends leg 1, which needs 30 m, and begins leg 2, which needs 50 m."""
+    context, judged = judged_mission()
+    finding = make_finding("clearance", Place("leg", 1), ok=False, reason="")
+    changes = [Change("height", Place("leg", leg), None, metres, "m") for leg, metres in ((1, 30.0), (2, 50.0))]
+    for suggestion in (tuple(changes), tuple(reversed(changes))):
+        moves = item_moves(context, judged.mission, apply_suggestion(context, judged, finding, suggestion))
+        assert {move.item: move.up for move in moves} == pytest.approx({2: 30.0, 3: 50.0, 4: 50.0}, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("what", "wanted"), [("length", 80.004), ("rise", 0.0), ("height", 0.0), ("north", 0.0), ("airspeed", None)]
 )

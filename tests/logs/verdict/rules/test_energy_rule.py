@@ -24,6 +24,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.suggestions import suggest_using_less_energy
 from tests.logs.verdict.judging import failing, judge, of
+from tests.mission_lines import setup_of, wp
 from tests.synthetic import bank_radius, edited, fly_path, make_scenario, make_setup
 from world.scenario import Scenario
 
@@ -179,10 +180,30 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     radius, sharp, right = bank_radius(), math.radians(135.0), math.radians(90.0)
     cut = 1.5 * (2.0 * math.tan(sharp / 2.0) - sharp) + 2.0 * math.tan(right / 2.0) - right
     power = endless.envelope.power(25.0, 500.0, 0.0)
-    rounds = 800.0 / (power * (2000.0 * math.sqrt(2.0) + 4000.0 - cut * radius) / 25.0 / 3600.0)
-    said = int(item.reason.split("lasts for ")[1].split(" rounds")[0])
-    assert said == pytest.approx(rounds, abs=0.6)
+    round_energy = power * (2000.0 * math.sqrt(2.0) + 4000.0 - cut * radius) / 25.0 / 3600.0
+    # The first round comes from 1, so that its first leg is 2000 m long, and its turn at 2 is a right angle.
+    first_cut = 0.5 * (2.0 * math.tan(sharp / 2.0) - sharp) + 2.0 * (2.0 * math.tan(right / 2.0) - right)
+    first_energy = power * (6000.0 - first_cut * radius) / 25.0 / 3600.0
+    # Of 1000 Wh, 20 % are the reserve.
+    repeats = math.floor((800.0 - first_energy) / round_energy)
+    assert f"the energy lasts for {repeats + 1} rounds, with a count of {repeats} (" in item.reason
     assert item.brief.startswith("the jump of item 5 has no end")
+
+
+def test_the_rounds_of_an_endless_jump_leave_the_rest_of_the_mission_and_the_reserve() -> None:
+    """A mission with the stated count passes, and with one more it does not; its last leg is longer than a round."""
+
+    def energy(count: int) -> Finding:
+        square = [wp(0, 500), wp(0, 1500), wp(1000, 1500), wp(1000, 500)]
+        setup = setup_of(*square, f"0 177 2 {count} 0 0 0 0 0", wp(-4000, -4000), home="36.5 -84.2 300")
+        return of(judge_geometry(replace(setup, battery=200.0)), "energy")
+
+    words = energy(-1).brief.split()
+    count = int(words[-1])
+    assert words[words.index("rounds,") - 1] == str(count + 1)
+    assert count > 2
+    assert energy(count).ok
+    assert energy(count + 1).ok is False
 
 
 def test_an_aircraft_that_burns_fuel_has_no_current() -> None:

@@ -10,9 +10,14 @@ from flight.autopilots.autopilot import StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.flown_phases import flown_phases
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.suggestions import suggest_launch_into_wind
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved, with_hole
 from world.airfield import Launch
+from world.scenario_tables import LaunchMethod
+from world.wind import Wind
 
 
 def test_a_good_take_off_passes_and_the_rules_of_the_items_are_silent() -> None:
@@ -35,6 +40,35 @@ def test_a_flight_whose_motor_never_started_says_so_and_not_that_it_landed_badly
     assert "less than TKOFF_THR_MINACC 15: the motor never starts" in one.reason
     assert "it must reach 60 m" in one.reason
     assert found(flown.setup, flown.track, "touchdown", flown.flight.ended).ok is None
+
+
+@pytest.mark.parametrize(
+    ("from_deg", "method", "wanted"),
+    # The launch is on 90 degrees.
+    [
+        (270.0, "catapult", 270.0),
+        (225.0, "hand", 225.0),
+        (225.0, "runway", 270.0),
+        (90.0, "hand", None),
+        (0.0, "hand", None),
+    ],
+)
+def test_a_launch_with_a_tailwind_is_offered_the_course_against_it(
+    from_deg: float, method: LaunchMethod, wanted: float | None
+) -> None:
+    flown = flown_circuit()
+    requirements, _ = flown_phases(route_requirements(flown.setup), flown.track)
+    finding, ground = found(flown.setup, flown.track, "launch"), requirements.ground_phases
+    assert ground is not None
+    assert ground.procedures.take_off is not None
+    take_off = replace(ground.procedures.take_off, launch=replace(RAIL, method=method))
+    procedures = replace(ground.procedures, take_off=take_off)
+    scenario = replace(flown.setup.scenario, wind=Wind(9.0, math.radians(from_deg)))
+    setup = replace(flown.setup, scenario=scenario)
+    windy = replace(requirements, setup=setup, ground_phases=replace(ground, procedures=procedures))
+    changes = [change for (change,) in suggest_launch_into_wind(windy, None, finding)]
+    assert [change.wanted for change in changes] == ([] if wanted is None else [wanted])
+    assert all(change.current == 90.0 for change in changes)
 
 
 def test_a_climb_over_unknown_ground_is_not_judged() -> None:

@@ -1,5 +1,6 @@
 """A loiter's corners are one finding, its legs the worst of each rule."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -10,7 +11,8 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.loiter_rule import loiter_circles
-from tests.logs.verdict.judging import judge, of
+from logs.verdict.suggestions import suggest_larger_loiter
+from tests.logs.verdict.judging import judge, of, suggested
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import fly_path
 
@@ -44,6 +46,23 @@ def test_a_circle_too_small_for_the_bank_limit_fails_and_says_what_it_needs() ->
     assert item.margin < 0.0
     assert item.brief == item.reason.partition(" (")[0]
     assert f"the aircraft needs {item.limit:.0f} m in this wind" in item.reason
+
+
+def test_a_circle_too_small_for_the_bank_limit_is_offered_the_radius_that_its_item_must_state() -> None:
+    """planfly's guidance flies the stated radius."""
+    setup = loiter(70.0, wind=8.0)
+    item = of(judge_geometry(setup), "loiter")
+    assert item.limit is not None
+    change = suggested(item, "radius")
+    assert (change.current, change.wanted, change.place.item) == (70.0, math.ceil(item.limit), 2)
+    assert of(judge_geometry(loiter(change.wanted, wind=8.0)), "loiter").ok
+    assert of(judge_geometry(loiter(change.wanted - 2.0, wind=8.0)), "loiter").ok is False
+    # A circle that is flown 1.25 times as large as stated.
+    wider = replace(item, planned=1.25 * 70.0, limit=100.0)
+    [(change,)] = suggest_larger_loiter(route_requirements(setup), None, wider)
+    assert change.wanted == 80.0
+    # One that is large enough fails for another reason.
+    assert suggest_larger_loiter(route_requirements(setup), None, replace(item, planned=101.0, limit=100.0)) == ()
 
 
 def test_legs_of_a_circle_give_the_worst_of_each_rule() -> None:
