@@ -50,6 +50,7 @@ class RuleWords:
     unjudged_unit: noun, in the singular, with which the headline counts findings that were not judged.
     explains_unjudged: True if the summary states why the rule was not judged.
     is_warning: True if the rule's findings are warnings, which decide no verdict.
+    tolerance_purpose: what the tolerance of the rule's limit is for; "" to omit it.
     """
 
     name: str
@@ -63,6 +64,7 @@ class RuleWords:
     unjudged_unit: str = "leg"
     explains_unjudged: bool = False
     is_warning: bool = False
+    tolerance_purpose: str = ""
 
     @property
     def word(self) -> str:
@@ -171,6 +173,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             question="Was each waypoint reached, within the radius that the mission or the autopilot sets for it?",
             margin=Margin("closest approach", "m", 10.0),
             phrase=missed_waypoint_phrase,
+            tolerance_purpose="navigation and gusts",
         ),
         RuleWords(
             name="corridor",

@@ -140,22 +140,38 @@ def open_campaign(
     aircraft cannot fly.
     """
     if isinstance(target, Plan) or is_mission_file(target):
-        setup = open_flight(target, options)
-        # Use the name without the folder, because the folder does not affect the flight.
-        base = _make_base_from_setup(setup, dispersions, Path(setup.mission.source).name)
-    else:
-        fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
-        scenario = fences.add_to_scenario(load_scenario_with_options(target, options))
-        has_plan_file = plan_file is not None and plan_file.is_file()
-        plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
-        if has_plan_file and plan.scenario.to_json() != scenario.to_json():
-            differences = describe_differences(*(flatten_inputs(one.to_json()) for one in (plan.scenario, scenario)))
-            name = target if isinstance(target, str) else scenario.name
-            message = f"{plan_file}: this plan was made for another scenario, not {name}: {differences}"
-            raise MissionError(message, file=str(plan_file))
-        if plan_file is not None and not has_plan_file:
-            write_atomically(plan_file, plan_json(plan))
-        base = _make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed))
+        return campaign_of_setup(open_flight(target, options), dispersions)
+    fences, seed = read_named_fences(options.get("fence") or ()), options.get("seed")
+    scenario = fences.add_to_scenario(load_scenario_with_options(target, options))
+    has_plan_file = plan_file is not None and plan_file.is_file()
+    plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
+    if has_plan_file and plan.scenario.to_json() != scenario.to_json():
+        differences = describe_differences(*(flatten_inputs(one.to_json()) for one in (plan.scenario, scenario)))
+        name = target if isinstance(target, str) else scenario.name
+        message = f"{plan_file}: this plan was made for another scenario, not {name}: {differences}"
+        raise MissionError(message, file=str(plan_file))
+    if plan_file is not None and not has_plan_file:
+        write_atomically(plan_file, plan_json(plan))
+    return _checked(_make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed)))
+
+
+def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
+    """Return the base of a campaign that flies the mission of a setup, with the draws of its aircraft.
+
+    Raises SpreadError for dispersions with medians at which the aircraft cannot fly.
+    """
+    # Use the name without the folder, because the folder does not affect the flight.
+    mission = replace(setup.mission, source=Path(setup.mission.source).name)
+    scenario, airframe = setup.scenario, airframe_for_setup(setup)
+    placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
+    dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
+    return _checked(
+        CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
+    )
+
+
+def _checked(base: CampaignBase) -> CampaignBase:
+    """Return the base.  Raises PlanflyError if its aircraft cannot fly at the medians, or if it has no valid route."""
     check_level_flight_at_medians(base)
     # Refuse a mission without a valid route now, not in a worker.
     base.nominal_setup()
@@ -183,18 +199,6 @@ def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersio
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain)
     dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed_mission, plan, dispersions, seed, scenario.name)
-
-
-def _make_base_from_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
-    """Return the base of a campaign that flies the mission of a setup.
-
-    source: name of the mission in messages.
-    """
-    mission = replace(setup.mission, source=source)
-    scenario, airframe = setup.scenario, airframe_for_setup(setup)
-    placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
-    dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
-    return CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
 
 
 def check_level_flight_at_medians(base: CampaignBase) -> None:

@@ -34,6 +34,7 @@ class PlaceResult(NamedTuple):
 
     ok: True if the place passes the rule, False if it fails, None if it was not judged.
     value, margin: value and margin in ``unit``, or None if there are none.
+    cause: what a failure was seen by, if its value is within the limit; "" otherwise.
     place: description of the place, with the item numbers of its own mission.
     scale: smallest noticeable difference of the margin.
     level: "flown" or "planned", according to the value, or "not reached" if the flight ended before the place; only
@@ -47,6 +48,7 @@ class PlaceResult(NamedTuple):
     place: str
     scale: float | None = None
     level: str = _FLOWN
+    cause: str = ""
 
     @property
     def text(self) -> str:
@@ -87,12 +89,30 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
         if places_reached and not _is_reached(finding.place, places_reached):
             level = _NOT_REACHED
         result = PlaceResult(
-            finding.ok, value, finding.margin, finding.unit, description, RULE_WORDS[finding.rule].scale, level
+            finding.ok,
+            value,
+            finding.margin,
+            finding.unit,
+            description,
+            RULE_WORDS[finding.rule].scale,
+            level,
+            _other_cause(finding, value),
         )
         previous = results.get((finding.rule, key))
         if previous is None or _severity_key(result) < _severity_key(previous):
             results[finding.rule, key] = result
     return FlightResults(item_contents, results, seconds)
+
+
+def _other_cause(finding: Finding, value: float | None) -> str:
+    """Return what a failed finding was seen by, if its value does not show it; "" otherwise.
+
+    value: the value of the finding that is compared, in its unit.
+    """
+    if finding.ok is not False or finding.limit is None or value is None:
+        return ""
+    is_within_limit = value >= finding.limit if finding.at_least else value <= finding.limit
+    return finding.brief if is_within_limit else ""
 
 
 def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
@@ -169,13 +189,14 @@ def describe_changes(previous: FlightResults | None, current: FlightResults) -> 
     >>> low = FlightResults(items, {leg: PlaceResult(False, 22.0, -38.0, "m", "leg to item 2")}, 500.0)
     >>> high = FlightResults(items, {leg: PlaceResult(True, 61.0, 1.0, "m", "leg to item 2")}, 512.0)
     >>> describe_changes(low, high)
-    ['leg to item 2: clearance 22 m \u2192 61 m, now passes', '12 s longer']
+    ['leg to item 2: clearance, height above ground 22 m \u2192 61 m, now passes', '12 s longer']
     >>> describe_changes(high, high), describe_changes(None, high)
     (['nothing'], [])
     >>> not_reached = PlaceResult(None, 62.0, None, "m", "leg to item 2", level="not reached")
     >>> ended_before = FlightResults(items, {leg: not_reached}, 500.0)
     >>> describe_changes(low, ended_before), describe_changes(ended_before, low)
-    (['leg to item 2: clearance 22 m, not flown now'], ['leg to item 2: clearance 22 m, fails now, not flown before'])
+    (['leg to item 2: clearance, height above ground 22 m, not flown now'],
+    ['leg to item 2: clearance, height above ground 22 m, fails now, not flown before'])
     """
     if previous is None:
         return []
@@ -240,14 +261,32 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:
-    """Describe a change at a place: the rule, the old value if it is of the same level, the new value and state."""
+    """Describe a change at a place: the rule, the old value if it is of the same level, the new value and state.
+
+    The values of a failure that they do not show are replaced by its cause.
+    """
+    causes = [shown.cause for shown in (result, old_result) if shown is not None and shown.cause]
+    if causes:
+        return f"{result.place}: {RULE_WORDS[rule].word} ({causes[0]}), {state_text}"
     values = dict.fromkeys(
         shown_result.text
         for shown_result in (old_result, result)
         if shown_result is not None and shown_result.text and shown_result.level == result.level
     )
     values_text = " \u2192 ".join(values)
-    return f"{result.place}: {RULE_WORDS[rule].word} {values_text}".rstrip() + f", {state_text}"
+    name = _quantity_name(rule) if values else RULE_WORDS[rule].word
+    return f"{result.place}: {name} {values_text}".rstrip() + f", {state_text}"
+
+
+def _quantity_name(rule: str) -> str:
+    """Return the name of a rule, followed by the quantity that it compares if that is another word.
+
+    >>> _quantity_name("slope"), _quantity_name("departure")
+    ('slope', 'loss of control, largest bank')
+    """
+    words = RULE_WORDS[rule]
+    quantity = "" if words.margin is None else words.margin.quantity
+    return words.word if quantity in ("", words.word) else f"{words.word}, {quantity}"
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
@@ -280,7 +319,7 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
         change_lines.append(
             (
                 relative_change,
-                f"closest to its limit: {RULE_WORDS[rule].word} {old_result.text} \u2192 {result.text}"
+                f"closest to its limit: {_quantity_name(rule)} {old_result.text} \u2192 {result.text}"
                 f" ({place_description})",
             )
         )

@@ -11,12 +11,16 @@ from world.errors import MissionError
 _MAX_FILES = 200
 _READABLE_SUFFIXES = (*DROPPED_SUFFIXES, *PARAMETER_FILES)
 _LISTED_SUFFIXES = tuple(suffix for suffix in _READABLE_SUFFIXES if suffix not in MAP_SUFFIXES)
+# Bytes that a plan or a mission contains, by suffixes that files without a mission have, too.
+_MISSION_MARKS = {".json": b"planfly.plan/", ".txt": b"QGC WPL"}
+# Size of the part of a file that is searched for these bytes.
+_SEARCHED_BYTES = 2**20
 
 
 def folder_message(folder: Path | None) -> Json:
     """Return a message for the page with the missions, plans, logs and parameter files of a folder.
 
-    Links to files in other folders are left out.
+    Links to files in other folders are left out, and so are texts and JSON documents without a mission.
 
     >>> folder_message(Path("no such folder"))["files"]
     []
@@ -26,7 +30,9 @@ def folder_message(folder: Path | None) -> Json:
     try:
         resolved_folder = folder.resolve(strict=True)
         files = sorted(
-            file for file in resolved_folder.iterdir() if file.suffix.lower() in _LISTED_SUFFIXES and file.is_file()
+            file
+            for file in resolved_folder.iterdir()
+            if file.suffix.lower() in _LISTED_SUFFIXES and file.is_file() and _may_contain_mission(file)
         )
     except OSError:
         return {"folder": "", "files": []}
@@ -34,6 +40,16 @@ def folder_message(folder: Path | None) -> Json:
         "folder": home_relative_text(resolved_folder),
         "files": [file.name for file in files[:_MAX_FILES] if file.resolve().parent == resolved_folder],
     }
+
+
+def _may_contain_mission(file: Path) -> bool:
+    """Return False for a text or a JSON document that is no mission or plan, and for a file that cannot be read."""
+    mark = _MISSION_MARKS.get(file.suffix.lower(), b"")
+    try:
+        with file.open("rb") as stream:
+            return mark in stream.read(_SEARCHED_BYTES if mark else 0)
+    except OSError:
+        return False
 
 
 def home_relative_text(path: Path) -> str:

@@ -76,7 +76,7 @@ class Jobs:
 
     def start_first_task(self, session: Session) -> None:
         """Start a flight of the opened mission, or a search for a path if a scenario was opened."""
-        if session.document.to_plan and not session.is_changed:
+        if session.document.to_plan and not session.is_edited:
             self._uses_first_path = True
             self._submit_task(
                 LONG_WORKER,
@@ -115,7 +115,7 @@ class Jobs:
 
         Until then the mission of the scenario is a placeholder.
         """
-        return self._uses_first_path and not session.is_changed
+        return self._uses_first_path and not session.is_edited
 
     def discard_results(self) -> None:
         """Cancel all tasks and discard all results, because another mission was opened."""
@@ -127,8 +127,8 @@ class Jobs:
     # Requests.
 
     def fly(self, session: Session) -> None:
-        """Fly the current mission and cancel a flight in progress; do nothing for a scenario without a path."""
-        if session.document.to_plan and not session.is_changed:
+        """Fly the current mission and cancel a flight in progress; do nothing while a first path is planned."""
+        if self.is_planning_first_path(session):
             return
         self._submit_task(
             FLIGHT_WORKER, "fly", "planfly.studio.worker_tasks.fly", (session.context, session.mission), session.rev

@@ -6,13 +6,12 @@ Can it return home, how likely is it to succeed, does the battery last, when can
 from collections import Counter
 from collections.abc import Iterable
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 from flight.mission.items import Mission
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.returns_text import headline, point_of_no_return_text, range_text
-from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.campaign_base import CampaignBase, campaign_of_setup
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.worker_pool import Workers
@@ -103,16 +102,7 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
 
 def _campaign_base(context: EditContext, mission: Mission) -> CampaignBase:
     """Return the base of a campaign that flies a mission with planfly's default dispersions."""
-    return CampaignBase(
-        scenario=context.scenario,
-        airframe=context.airframe,
-        mission=mission,
-        placed=context.place_mission(mission),
-        plan=context.setup(mission).plan,
-        dispersions=default_dispersions(),
-        seed=context.seed,
-        name=Path(mission.source).stem,
-    )
+    return campaign_of_setup(context.setup(mission), default_dispersions())
 
 
 def run_battery_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:

@@ -158,6 +158,11 @@ class Session:
         return self.mission is not self.history.first
 
     @property
+    def is_edited(self) -> bool:
+        """True if the mission was edited, also if all edits were undone."""
+        return self.is_changed or bool(self.history.steps)
+
+    @property
     def file_kind(self) -> str:
         """Format of the file that the mission may overwrite; "" if there is none."""
         return self.document.kind if self.document.path is not None else ""
@@ -511,8 +516,7 @@ class Session:
     @property
     def needs_autosave(self) -> bool:
         """True if the mission or the settings differ from the opened document, or from the autosave."""
-        is_edited = self.is_changed or bool(self.history.steps)
-        return is_edited or self.must_autosave or self.context.scenario is not self.document.setup.scenario
+        return self.is_edited or self.must_autosave or self.context.scenario is not self.document.setup.scenario
 
     def autosave_path(self, file: Path) -> Path:
         """Return the autosave path of the current document.

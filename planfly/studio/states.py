@@ -143,17 +143,28 @@ def _rule_name(finding: Finding) -> str:
     return RULE_WORDS[finding.rule].word
 
 
-def _closeness(finding: Finding) -> float:
+def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
     """Return the margin of a finding, relative to the margin below which it is shown as near its limit.
 
     That margin is a tenth of the limit, and at most the scale of the rule's margin.
+
+    tolerance: added to the margin, in the finding's unit.
     """
     scale = RULE_WORDS[finding.rule].scale or math.inf
     near_margin = min(scale, _NEAR_FRACTION * abs(finding.limit)) if finding.limit else scale
-    return (finding.margin or 0.0) / near_margin if math.isfinite(near_margin) else math.inf
+    return ((finding.margin or 0.0) + tolerance) / near_margin if math.isfinite(near_margin) else math.inf
 
 
 def _value_text(finding: Finding) -> str:
-    """Return the rule, the value and the limit of a finding, such as "slope 5.2° (6.0°)"."""
-    value, limit = finding.compared_texts()
-    return f"{_rule_name(finding)} {value}" + (f" ({limit})" if limit else "")
+    """Return the rule, the value and the limit of a finding, such as "slope 5.2° (≤ 6.0°)".
+
+    If only the tolerance leaves room, the limit is stated without it, followed by the tolerance and its purpose.
+    """
+    value, limit_text = finding.compared_texts()
+    closeness, tolerance = _closeness(finding), finding.tolerance or 0.0
+    if finding.limit is not None and closeness < 1.0 and _closeness(finding, tolerance) >= 1.0:
+        sign, joint = finding.limit_sign, "less" if finding.at_least else "plus"
+        purpose, tolerance_text = RULE_WORDS[finding.rule].tolerance_purpose, quantity_text(tolerance, finding.unit)
+        limit_text = f"{sign} {quantity_text(finding.limit, finding.unit)}, {joint}"
+        limit_text += f" {tolerance_text} for {purpose}" if purpose else f" a tolerance of {tolerance_text}"
+    return f"{_rule_name(finding)} {value}" + (f" ({limit_text})" if limit_text else "")

@@ -17,6 +17,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, closest_approaches, project_onto_leg
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
 from logs.verdict.rule import Rule
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import EQUAL_DISTANCE_TOLERANCE_M, ROUNDING_M
 from logs.verdict.wording import place_text, place_text_within
 from world.arrays import Floats
@@ -159,7 +160,8 @@ def _acceptance_text(condition: AcceptanceCondition) -> str:
     radius_owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
         condition.source, "the fly-by path's"
     )
-    error_text = f" plus {condition.tolerance:.1f} m for navigation and gusts" if condition.tolerance else ""
+    purpose = RULE_WORDS["waypoint"].tolerance_purpose
+    error_text = f" plus {condition.tolerance:.1f} m for {purpose}" if condition.tolerance else ""
     return f"the waypoint counts as reached within {condition.radius:.0f} m ({radius_owner} radius){error_text}"
 
 

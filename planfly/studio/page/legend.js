@@ -25,14 +25,20 @@ export function drawLegend(box, world) {
   }));
 }
 
-// North is up; the arrow points where the wind blows to.
-export function drawCompass(box, { wind_speed: speed, wind_from: from }) {
-  const words = speed > 0 ? `wind ${speed.toFixed(1)} m/s from ${String(Math.round(from) % 360).padStart(3, "0")}\u00b0` : "no wind";
-  const dial = svg("svg", { viewBox: "-24 -32 48 56", "aria-hidden": "true" });
+// The arrow points where the wind blows to.  north: degrees from the upward direction of the view to north, clockwise.
+export function drawCompass(box, { wind_speed: speed, wind_from: from, forecast }, north = 0) {
+  const words = speed > 0 ? `wind ${speed.toFixed(1)} m/s from ${bearing(from)}` : "no wind", more = forecast ? "mean at the start" : "";
+  const dial = svg("svg", { viewBox: "-32 -32 64 64", "aria-hidden": "true" });
   svg("circle", { r: 20 }, dial);
-  svg("path", { d: "M0-20V-13" }, dial);
-  svg("text", { y: -22, "text-anchor": "middle" }, dial).textContent = "N";
-  if (speed > 0) svg("path", { d: "M0-14V14M-5 7 0 14 5 7", class: "wind", transform: `rotate(${from})` }, dial);
-  clear(box).append(dial, element("span", {}, words));
-  box.setAttribute("aria-label", `North is up; ${words}`);
+  const turned = svg("g", { class: "north", transform: `rotate(${north})` }, dial);
+  svg("path", { d: "M0-20V-13" }, turned);
+  svg("text", { "text-anchor": "middle", "dominant-baseline": "central", transform: `translate(0 -26) rotate(${-north})` }, turned).textContent = "N";
+  if (speed > 0) svg("path", { d: "M0-14V14M-5 7 0 14 5 7", class: "wind", transform: `rotate(${from})` }, turned);
+  clear(box).append(dial, element("span", {}, words, ...(more ? [element("small", {}, more)] : [])));
+  const side = bearing(north) === bearing(0) ? "up" : `${bearing(north)} clockwise from up`;
+  box.setAttribute("aria-label", `North is ${side}; ${[words, more].filter(Boolean).join(", ")}`);
+}
+
+function bearing(degrees) {
+  return `${String(((Math.round(degrees) % 360) + 360) % 360).padStart(3, "0")}\u00b0`;
 }

@@ -50,6 +50,8 @@ export class Panel {
     this.files = [];
     this.saveForm = "waypoints";
     this.answers = {};
+    // Questions that were asked on this page, whose answers are to be seen when they come.
+    this.asked = new Set();
   }
 
   show(name) {
@@ -87,10 +89,18 @@ export class Panel {
   forget() {
     this.flight = undefined;
     this.answers = {};
+    this.asked.clear();
+    this.file = undefined;
+    if (this.lossBox) clear(this.lossBox);
   }
 
   sheet(sheet) {
     this.now = sheet;
+    // What was said of a file holds of the mission that is in it.
+    if (this.file && this.file.rev !== sheet.rev) {
+      clear(this.lossBox).append(element("p", { class: "more" }, `${this.file.text}, before the last change.`));
+      this.file = undefined;
+    }
     if (this.waysOf !== undefined && this.waysOf !== sheet.rev) {
       this.waysOf = undefined;
       this.app.ways([]);
@@ -146,23 +156,24 @@ export class Panel {
       const trying = trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
       box.append(element("h2", {}, titleOf(flownFailed, " in flight")), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed.map((one) => this.finding(one, true, planned(one)))));
     }
-    const passed = now.findings.filter((one) => one.ok);
-    if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, false))));
+    const isFlown = flight && !stale, passed = (isFlown ? flight : now).findings.filter((one) => one.ok);
+    if (passed.length) box.append(element("h2", {}, `Closest to its limit ${isFlown ? "in flight" : "by geometry"}, by rule`), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, isFlown))));
     if (now.notes.length) box.append(element("h2", {}, "Notes"), element("ul", { class: "notes" }, ...now.notes.slice(0, 20).map((text) => element("li", {}, text))));
-    const long = element("div", { class: "asks" },
+    box.append(element("div", { class: "asks" },
       element("h2", {}, "Ask more"),
-      this.ask("returns", "Can it return home?", "a return to launch from every point of the route"),
-      this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"),
-      this.ask("battery", "How large a battery?", "24 flights with their returns; the reserve is kept in 95 of 100"),
-      this.ask("ground_risk", "Whom does it fly over?", "12 flights: volumes by SORA 2.5"),
-      this.about?.settings.forecast ? this.ask("window", "When can I take off?", "10 flights at each hour of the next 12 in the forecast") : null);
-    box.append(long);
-    for (const [job, title] of Object.entries(QUESTIONS)) if (this.answers?.[job]) box.append(this.result(title, this.answers[job]));
+      ...this.ask("returns", "Can it return home?", "a return to launch from every point of the route"),
+      ...this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"),
+      ...this.ask("battery", "How large a battery?", "24 flights with their returns; the reserve is kept in 95 of 100"),
+      ...this.ask("ground_risk", "Whom does it fly over?", "12 flights: volumes by SORA 2.5"),
+      ...(this.about?.settings.forecast ? this.ask("window", "When can I take off?", "10 flights at each hour of the next 12 in the forecast") : [])));
     return undefined;
   }
 
+  // A question, with its answer below it.
   ask(job, words, more) {
-    return element("p", {}, element("button", { type: "button", "data-job": job, onclick: () => this.app.send({ kind: job }) }, words), element("small", {}, more));
+    const ask = () => { this.asked.add(job); this.app.send({ kind: job }); };
+    const question = element("p", {}, element("button", { type: "button", "data-job": job, onclick: ask }, words), element("small", {}, more));
+    return this.answers?.[job] ? [question, this.result(job, this.answers[job])] : [question];
   }
 
   answerOf(name, answer, verdict, more) {
@@ -329,7 +340,9 @@ export class Panel {
       setTimeout(() => URL.revokeObjectURL(url), 10000);
     }
     const lost = losses.length ? element("ul", {}, ...losses.map((text) => element("li", {}, text))) : null;
-    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is ${where ? "saved" : "downloaded"}`), ` ${where ? `in ${where}` : "by your browser"}. `, losses.length ? "It lacks:" : "It contains the whole mission."), ...(lost ? [lost] : []));
+    const place = `${where ? "saved" : "downloaded"} ${where ? `in ${where}` : "by your browser"}`;
+    this.file = { rev: this.now.rev, text: `${name} was ${place}` };
+    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is ${place}. `), losses.length ? "It lacks:" : "It contains the whole mission."), ...(lost ? [lost] : []));
     this.reveal("files");
   }
 
@@ -363,11 +376,13 @@ export class Panel {
     this.stopped(job);
     this.answers[job] = message;
     this.drawVerdict();
+    if (!this.asked.delete(job) || this.app.now.dragging) return;
+    this.boxes.verdict.querySelector(`[data-answer="${job}"]`)?.scrollIntoView({ block: "nearest" });
   }
 
-  result(title, { rev, state, headline, lines }) {
+  result(job, { rev, state, headline, lines }) {
     const stale = rev !== this.now.rev;
-    return element("section", { class: stale ? "card stale" : "card", "data-state": state }, element("h2", {}, title),
+    return element("section", { class: stale ? "card stale" : "card", "data-state": state, "data-answer": job }, element("h2", {}, QUESTIONS[job]),
       stale ? element("p", { class: "more" }, "before the last change") : null, element("p", {}, headline), ...lines.slice(0, 16).map((line) => element("p", { class: "line" }, line)));
   }
 }

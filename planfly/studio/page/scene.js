@@ -5,8 +5,10 @@ import { groundAt } from "/axes.js";
 const FACES = 90, RISE = 3;
 
 export class Scene {
-  constructor(canvas) {
+  // onTurn: called when the view has turned.
+  constructor(canvas, onTurn) {
     this.canvas = canvas;
+    this.onTurn = onTurn;
     Object.assign(this, { turn: -0.5, tilt: 0.55, zoom: 1 });
     const held = { on: false };
     canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); Object.assign(held, { on: true, x: event.clientX, y: event.clientY }); });
@@ -16,9 +18,10 @@ export class Scene {
       this.tilt = Math.min(1.5, Math.max(0.12, this.tilt + (event.clientY - held.y) * 0.006));
       Object.assign(held, { x: event.clientX, y: event.clientY });
       this.later();
+      this.onTurn();
     });
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => { held.on = false; });
-    canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.zoom = Math.min(12, Math.max(0.4, this.zoom * Math.exp(-event.deltaY * 0.0014))); this.later(); }, { passive: false });
+    canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.enlarge(Math.exp(-event.deltaY * 0.0014)); }, { passive: false });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.later());
   }
 
@@ -37,6 +40,16 @@ export class Scene {
     if (this.asked || this.canvas.hidden) return;
     this.asked = true;
     requestAnimationFrame(() => { this.asked = false; this.draw(); });
+  }
+
+  enlarge(factor) {
+    this.zoom = Math.min(12, Math.max(0.4, this.zoom * factor));
+    this.later();
+  }
+
+  // Direction of north as drawn without tilt, degrees clockwise from up.
+  northward() {
+    return (-180 * this.turn) / Math.PI;
   }
 
   colour(name) {

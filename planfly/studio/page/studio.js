@@ -10,6 +10,7 @@ import { Profile } from "/profile.js";
 import { Scene } from "/scene.js";
 
 const $ = (id) => document.getElementById(id);
+const STOPPED = "Stopped; earlier results stay.";
 const map = new MapView($("map")), profile = new Profile($("profile"));
 const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {}, committed: false, queue: [] };
 let fitted = 0, scene = null;
@@ -22,8 +23,22 @@ function onWorld(world) {
   setGround();
   panel.world(world);
   drawLegend($("legend").querySelector("ul"), world);
-  drawCompass($("compass"), world.settings);
+  turnCompass();
   if (now.model) drawAll();
+}
+
+// The compass of the map, or of the scene while it is shown.
+function turnCompass() {
+  if (now.world) drawCompass($("compass"), now.world.settings, inScene() ? scene.northward() : 0);
+}
+
+function inScene() {
+  return scene && !$("scene").hidden;
+}
+
+// What to do by hand, for those who have not made an edit.
+function showBegin() {
+  $("begin").hidden = inScene() || Boolean(now.sheet?.undo || now.sheet?.redo);
 }
 
 // Ground that came for another world is not shown in this one.
@@ -78,8 +93,7 @@ function onSheet(sent) {
   }
   say(sheet.planning ? "Planning a path" : `Geometry: ${sheet.verdict.headline}`);
   document.documentElement.dataset.rev = sheet.rev;
-  // Who has made an edit knows how.
-  $("begin").hidden = Boolean(sheet.undo || sheet.redo);
+  showBegin();
   if (now.nudged && !now.queue.length) app.flush();
   else pump();
 }
@@ -247,8 +261,13 @@ function onFlown(flown) {
 }
 
 function onWorking(work) {
-  const begins = !now.work[work.job];
+  const begins = now.work[work.job]?.number !== work.number;
   now.work[work.job] = work;
+  // What was stopped before is of no interest to who asks for more.
+  if (begins && (now.stopping || $("message").textContent === STOPPED)) {
+    now.stopping = false;
+    complain("");
+  }
   progress();
   answers();
   panel.working(work, begins);
@@ -272,7 +291,7 @@ function onStopped({ job }) {
   progress();
   if (now.stopping && !Object.values(now.work).some(Boolean)) {
     now.stopping = false;
-    complain("Stopped; earlier results stay.");
+    complain(STOPPED);
   }
   answers();
   panel.stopped(job);
@@ -517,7 +536,12 @@ const link = new Link({
   choices: (message) => panel.choices(message),
   ways: (message) => { now.work.plan = null; progress(); panel.ways(message); answers(); },
   saved: (message) => { complain(""); showName(now.sheet.name, message.unsaved); panel.saved(message); },
-  ...Object.fromEntries(Object.keys(QUESTIONS).map((job) => [job, (message) => { now.work[job] = null; progress(); panel.answered(job, message); }])),
+  ...Object.fromEntries(Object.entries(QUESTIONS).map(([job, title]) => [job, (message) => {
+    now.work[job] = null;
+    progress();
+    panel.answered(job, message);
+    say(`${title}: ${message.headline}`);
+  }])),
   fault: onFault,
   stale: () => { app.refused(); complain("Another page has changed the mission; this is its current state."); },
   picture: (picture) => { now.picture = picture; setGround(); },
@@ -536,15 +560,22 @@ $("stop").onclick = () => {
   if (now.stopping) complain("Stopping \u2026", true);
 };
 for (const [id, factor] of [["zoom-in", 1.5], ["zoom-out", 1 / 1.5]]) {
-  $(id).onclick = () => { map.view.zoom(factor, map.view.width / 2, map.view.height / 2); map.layOut(); };
+  $(id).onclick = () => {
+    if (inScene()) return scene.enlarge(factor);
+    map.view.zoom(factor, map.view.width / 2, map.view.height / 2);
+    return map.layOut();
+  };
 }
-$("fit").onclick = () => map.fit();
+$("fit").onclick = () => (inScene() ? scene.enlarge(1 / scene.zoom) : map.fit());
 $("three").onclick = () => {
   const on = $("scene").hidden;
   $("scene").hidden = !on;
   $("three").setAttribute("aria-pressed", String(on));
-  if (on && !scene) scene = new Scene($("scene"));
+  if (on && !scene) scene = new Scene($("scene"), turnCompass);
   if (on) { scene.resize(map.view.width, map.view.height); scene.show(now); }
+  turnCompass();
+  showBegin();
+  app.leave();
 };
 
 function sizes() {
@@ -558,7 +589,7 @@ function sizes() {
   }
   profile.resize(Math.max(50, side.width), Math.max(50, side.height));
   if (now.model) map.layOut();
-  if (scene && !$("scene").hidden) { scene.resize(map.view.width, map.view.height); scene.show(now); }
+  if (inScene()) { scene.resize(map.view.width, map.view.height); scene.show(now); }
 }
 new ResizeObserver(sizes).observe($("views"));
 sizes();

@@ -7,8 +7,8 @@ import numpy as np
 
 from flight.mission import edits
 from flight.mission.items import Command, Frame
-from logs.verdict.findings import Finding, make_finding
-from logs.verdict.places import Place
+from logs.verdict.findings import Finding, make_finding, message
+from logs.verdict.places import FLIGHT, Place
 from planfly.studio import messages
 from planfly.studio.changes import FlightResults, describe_changes, flight_results
 from planfly.studio.session import Session
@@ -27,12 +27,14 @@ def test_a_height_that_fails_and_is_mended_is_said_with_its_leg_and_figures() ->
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))
     low = figures_of(session, 103.0)
     said = describe_changes(before, low)
-    words = re.compile(r"(leg to item \d+): clearance ([\d.]+) m \u2192 ([-\d.]+) m, fails now")
+    words = re.compile(r"(leg to item \d+): clearance, height above ground ([\d.]+) m \u2192 ([-\d.]+) m, fails now")
     place, was, now = next(found.groups() for line in said if (found := words.fullmatch(line)))
     assert float(was) > 60.0 > float(now)
     assert said[-1] == "3 s longer"
     session.step_history("undo")
-    assert f"{place}: clearance {now} m \u2192 {was} m, now passes" in describe_changes(low, figures_of(session))
+    assert f"{place}: clearance, height above ground {now} m \u2192 {was} m, now passes" in describe_changes(
+        low, figures_of(session)
+    )
     assert describe_changes(before, figures_of(session)) == ["nothing"]
 
 
@@ -104,8 +106,43 @@ def test_a_place_is_compared_by_its_flown_laps_and_never_with_one_that_was_not_f
     later += [approach(first_to_2 + 1, 0.07, 2.75), approach(second_to_2 + 1, 0.07), approach(last, 0.08, 2200.0)]
     before, after = (flight_results(mission, route, findings, 100.0) for findings in (hill, later))
     assert describe_changes(before, after) == [
-        "item 3: waypoint 2200 m, fails now, not flown before",
-        "leg to item 2: clearance -0.3 m \u2192 40 m, now passes",
-        "item 2: waypoint 937 m \u2192 2.75 m, now passes",
+        "item 3: waypoint, closest approach 2200 m, fails now, not flown before",
+        "leg to item 2: clearance, height above ground -0.3 m \u2192 40 m, now passes",
+        "item 2: waypoint, closest approach 937 m \u2192 2.75 m, now passes",
     ]
-    assert describe_changes(after, before)[-1] == "item 3: waypoint 2200 m, not flown now"
+    assert describe_changes(after, before)[-1] == "item 3: waypoint, closest approach 2200 m, not flown now"
+
+
+def bank(largest: float, contact: str = "") -> Finding:
+    """The flight's bank, of 60 degrees at most, and where it met the ground."""
+    faults = [message(contact, " on leg 2")] if contact else []
+    return make_finding(
+        "departure",
+        FLIGHT,
+        ok=not faults,
+        reason="",
+        faults=faults,
+        flown=largest,
+        limit=60.0,
+        tolerance=0.0,
+        margin=60.0 - largest,
+        unit="deg",
+    )
+
+
+def test_a_value_that_is_within_its_limit_is_not_named_for_a_failure_of_another_cause() -> None:
+    session = drawn_session(5, 12)
+    mission, route = session.mission, session.judged.setup.route
+    lost, flew, turned = (
+        flight_results(mission, route, [one], 100.0)
+        for one in (bank(26.6, "ground contact at 484.3 s"), bank(40.4), bank(75.0, "bank 75\u00b0 at 9.0 s"))
+    )
+    ground = "flight: loss of control (ground contact at 484.3 s)"
+    assert describe_changes(lost, flew) == [f"{ground}, now passes"]
+    assert describe_changes(flew, lost) == [f"{ground}, fails now"]
+    assert describe_changes(flew, turned) == [
+        "flight: loss of control, largest bank 40.4\u00b0 \u2192 75\u00b0, fails now"
+    ]
+    assert describe_changes(flew, flight_results(mission, route, [bank(45.0)], 100.0)) == [
+        "closest to its limit: loss of control, largest bank 40.4\u00b0 \u2192 45\u00b0 (flight)"
+    ]

@@ -16,6 +16,8 @@ from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, tel
 from tests.planfly.studio.drafts import drawn_session, world_of
 from world.errors import MissionError, PlanflyError
 
+ROOT = Path(__file__).parents[3]
+
 
 def zipped_kml(path: Path) -> Path:
     with zipfile.ZipFile(path, "w") as archive:
@@ -80,6 +82,16 @@ def test_a_map_of_planflys_own_is_not_listed_and_says_that_it_has_no_mission(tmp
     assert folder_message(tmp_path)["files"] == ["m.waypoints"]
     with pytest.raises(PlanflyError, match=r"m\.kml: contains a map but no mission: open the mission file"):
         open_document(str(tmp_path / "m.kml"), MissionOptions(scenario="jacksboro"))
+
+
+def test_only_json_and_text_with_a_mission_is_listed(tmp_path: Path) -> None:
+    """A forecast, a kept session, and notes are not offered."""
+    written_plan(tmp_path / "p.json")
+    written_mission(tmp_path / "m.txt")
+    (tmp_path / "forecast.json").write_text((ROOT / "examples" / "jacksboro-forecast.json").read_text())
+    (tmp_path / "kept.json").write_text('{"schema": "planfly.studio/1"}')
+    (tmp_path / "notes.txt").write_text("a mission for Tuesday")
+    assert folder_message(tmp_path)["files"] == ["m.txt", "p.json"]
 
 
 def test_no_path_leads_out_of_the_folder(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Works of the studio's processes: what pages are told of their progress and end, and trials after a failed flight."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ from planfly.studio import jobs as jobs_module
 from planfly.studio import messages
 from planfly.studio.documents import open_document, straight_plan
 from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
-from planfly.studio.session import Session
+from planfly.studio.session import Session, open_session
 from planfly.studio.worker_process import Answer, Task
 from planfly.studio.worker_tasks import fly, try_suggestions
 from planner.search.plan_front import FrontPlan
@@ -102,6 +103,20 @@ def test_a_scenario_is_planned_first_and_not_judged_meanwhile(jobs: Jobs) -> Non
     (work,) = asked(jobs, LONG_WORKER)
     jobs.handle_answer(LONG_WORKER, Answer(work.number, "fault", "no"), session)
     assert not jobs.is_planning_first_path(session)
+
+
+def test_a_line_to_which_an_undo_leads_back_is_flown(jobs: Jobs, tmp_path: Path) -> None:
+    """Before and after a restart, whose edits are one step."""
+    session = Session.from_document(open_document("tight", MissionOptions()), MissionOptions())
+    session._show_plan(straight_plan(session.context.scenario, 1))
+    session.autosave(tmp_path / "kept.json")
+    restarted, restored = open_session("tight", MissionOptions(), tmp_path / "kept.json")
+    assert restored
+    for each in (session, restarted):
+        each.step_history("undo")
+        assert not each.is_changed
+        jobs.fly(each)
+        assert asked(jobs, FLIGHT_WORKER).pop().payload == (each.context, each.mission)
 
 
 def answer_of(jobs: Jobs, session: Session, function: Any) -> dict[str, Any]:

@@ -6,12 +6,17 @@ from typing import Any
 
 import pytest
 
+import planfly
+from aircraft.data_sheet import DataSheet
 from flight.mission.items import Mission
+from planfly.campaigns.campaign_base import open_campaign
+from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.worker_pool import Workers
 from planfly.flight_options import MissionOptions
 from planfly.studio import long_worker_tasks
 from planfly.studio.documents import open_document
 from planfly.studio.edit_context import EditContext
+from planfly.workflow.data_sheets import make_data_sheet_folder
 from world.errors import MissionError
 
 ROOT = Path(__file__).parents[3]
@@ -31,6 +36,14 @@ def few_flights(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(long_worker_tasks, "_WINDOW_FLIGHTS", 2)
     monkeypatch.setattr(long_worker_tasks, "_WINDOW_SPAN", timedelta(hours=1))
     assert Workers(count=1) == long_worker_tasks._WORKERS
+
+
+@pytest.fixture(scope="module")
+def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the aircraft of a data sheet, of which 512 draws are known."""
+    folder = tmp_path_factory.mktemp("sheet") / "foam"
+    make_data_sheet_folder(folder, DataSheet(mass=2.1, span=1.6, cruise=15.0, stall=10.0))
+    return folder
 
 
 def opened(folder: Path, **options: Any) -> tuple[EditContext, Mission]:
@@ -59,3 +72,25 @@ def test_a_battery_is_found(few_flights: None, tmp_path: Path) -> None:
     answer = long_worker_tasks.run_battery_task(opened(tmp_path), lambda *_: None)
     assert " Wh (" in answer["headline"]
     assert any(line.startswith("3 flights") for line in answer["lines"])
+
+
+def test_the_aircraft_of_a_data_sheet_varies_as_in_the_commands(sheet: Path, tmp_path: Path) -> None:
+    """By its draws: all inputs of the flights are those of the command, but the code."""
+    options: MissionOptions = {"aircraft": sheet, "wind": (4.0, 300.0), "seed": 5, "terrain": "jacksboro"}
+    own = long_worker_tasks._campaign_base(*opened(tmp_path, **options))
+    base = open_campaign(str(tmp_path / "short.waypoints"), default_dispersions(), options)
+    assert own.dispersions.draws is not None
+    assert own.inputs() == base.inputs()
+    assert own.airframe.battery == base.airframe.battery
+
+
+def test_the_flights_of_a_data_sheets_aircraft_are_those_of_the_api(
+    few_flights: None, sheet: Path, tmp_path: Path
+) -> None:
+    options: dict[str, Any] = {"aircraft": sheet, "wind": (4.0, 300.0), "seed": 5, "terrain": "jacksboro"}
+    answer = long_worker_tasks.run_campaign_task(opened(tmp_path, **options), lambda *_: None)
+    flown = planfly.campaign(
+        tmp_path / "short.waypoints", flights=3, workers=1, out=tmp_path / "campaign", **options
+    ).summary.estimate.tally
+    assert flown.flown == 3
+    assert answer["headline"].startswith(f"{flown.flyable} of 3 flights are flyable")

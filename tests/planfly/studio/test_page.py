@@ -237,6 +237,51 @@ def test_it_opens_with_the_mission_and_asks_for_nothing_elsewhere(page: Browser,
     assert page.value("document.querySelector('#compass .wind').getAttribute('transform')") == "rotate(250)"
 
 
+# The compass of a forecast's wind: its words, as they are shown and as they are read out.
+FORECAST_COMPASS = """import('/legend.js').then(({ drawCompass }) => {
+  const box = document.createElement('p');
+  drawCompass(box, { wind_speed: 4, wind_from: 300, forecast: 'forecast a.nc' });
+  return [box.querySelector('span').textContent, box.ariaLabel];
+})"""
+
+
+def test_the_compass_turns_with_the_scene_and_says_which_wind_it_has(page: Browser) -> None:
+    """The scene is turned by half a radian at first, north to the right, and by 0.008 for each pixel of a drag."""
+    label = "document.getElementById('compass').ariaLabel"
+    shown = "document.getElementById('begin').checkVisibility()"
+    assert page.value(shown)
+    page.value("document.getElementById('three').click()")
+    assert page.value(label) == "North is 029\u00b0 clockwise from up; wind 5.0 m/s from 250\u00b0"
+    assert not page.value(shown)
+    # As the scene draws it: from above, a point to the north lies to the right of up by this angle.
+    north = page.value(
+        "import('/scene.js').then(({ Scene }) => { const one = new Scene(document.createElement('canvas'));"
+        " Object.assign(one, { east: [0, 0], north: [0, 0], base: 0, scale: 1, width: 0, height: 0 });"
+        " one.tilt = Math.PI / 2;"
+        " const [[x, y], [u, v]] = [one.point(0, 0, 0), one.point(0, 1, 0)];"
+        " return 180 / Math.PI * Math.atan2(u - x, y - v); })"
+    )
+    assert north == pytest.approx(28.6, abs=0.1)
+    drag(page, centre(page, "#scene"), (100.0, 0.0))
+    page.wait_for(f"{label}.startsWith('North is 343\u00b0 clockwise')", 5.0)
+    turned = page.value("document.querySelector('#compass .north').getAttribute('transform')")
+    assert float(turned[7:-1]) == pytest.approx(28.65 - 45.84, abs=0.01)
+    page.value("document.getElementById('three').click()")
+    assert page.value(label).startswith("North is up")
+    assert page.value(shown)
+    words = "wind 4.0 m/s from 300\u00b0"
+    assert page.value(FORECAST_COMPASS) == [f"{words}mean at the start", f"North is up; {words}, mean at the start"]
+
+
+def test_what_is_said_of_a_saved_file_ends_with_the_next_change(page: Browser) -> None:
+    saved(page)
+    said = "document.querySelector('#panel-files [role=status]').textContent"
+    page.wait_for(f"{said} === 'm.waypoints is downloaded by your browser. It contains the whole mission.'")
+    drag(page, centre(page, ".mark .dot", 2), (40.0, 25.0))
+    page.wait_for(f"{said} === 'm.waypoints was downloaded by your browser, before the last change.'")
+    undo_all(page)
+
+
 def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
     before = saved(page)
     drag(page, centre(page, ".mark .dot", 2), (40.0, 25.0), let_go=False)
@@ -398,11 +443,11 @@ FINDINGS = """import('/panel.js').then(({ Panel }) => {
     headline: '', lines: [], failed: 1 };
   const finding = (rule, where, ok, ...suggestions) => (
     { rule, where, ok, suggestions, number: sent.length + suggestions.length, kind: 'leg', index: null, text: '' });
-  const show = (planned, flown) => {
+  const show = (planned, flown, rev = 1) => {
     const app = { now: { work: {} }, commit: (one) => sent.push([one.finding, one.flown]) };
     const box = document.createElement('div');
     const now = { rev: 1, verdict, notes: [], findings: planned };
-    const flight = { rev: 1, verdict, changes: [], autopilot: '', seconds: 1, findings: flown };
+    const flight = { rev, verdict, changes: [], autopilot: '', seconds: 1, findings: flown };
     Object.assign(Object.create(Panel.prototype), { app, boxes: { verdict: box }, now, flight }).buildVerdict();
     box.querySelector('.apply')?.click();
     const parts = box.querySelectorAll(':scope > h2, :scope > .findings > li');
@@ -411,12 +456,13 @@ FINDINGS = """import('/panel.js').then(({ Panel }) => {
   const leg = (ok, ...more) => finding('slopes', 'leg 1', ok, ...more);
   const [other, open] = [finding('clearance', 'leg 2', false), finding('slopes', 'leg 3', null)];
   return [show([leg(false, raise), other], [leg(false), open]),
-    show([], [leg(null)]), show([leg(null)], [leg(true)]), sent];
+    show([], [leg(null)]), show([leg(null)], [leg(true)]), sent,
+    show([leg(true)], [finding('slopes', 'leg 3', true)]), show([leg(true)], [finding('slopes', 'leg 3', true)], 0)];
 })"""
 
 
 def test_a_place_is_listed_once_under_a_title_of_what_it_is(page: Browser) -> None:
-    both, flown, planned, sent = page.value(FINDINGS)
+    both, flown, planned, sent, closest, stale = page.value(FINDINGS)
     assert both == [
         "What fails",
         "clearance leg 2",
@@ -428,6 +474,35 @@ def test_a_place_is_listed_once_under_a_title_of_what_it_is(page: Browser) -> No
     assert planned[0] == "What is not judged"
     # The geometry's own finding is applied.
     assert sent == [[1, False]]
+    # Below the card of the flight stand the flight's numbers, until the mission is changed.
+    assert closest == ["Closest to its limit in flight, by rule", "slopes leg 3"]
+    assert stale == ["Closest to its limit by geometry, by rule", "slopes leg 1"]
+
+
+# A panel less high than its questions: where an answer stands, and whether it is seen when it comes.
+ANSWER = """import('/panel.js').then(({ Panel }) => {
+  const box = document.createElement('div'), verdict = { state: 'ok', answer: 'flyable', headline: '', lines: [] };
+  Object.assign(box.style, { position: 'fixed', top: 0, width: '380px', height: '160px', overflow: 'auto' });
+  document.body.append(box);
+  const app = { now: { work: {} }, send: () => {} }, now = { rev: 1, verdict, notes: [], findings: [] };
+  const panel = Object.assign(Object.create(Panel.prototype), { app, boxes: { verdict: box }, now, answers: {} });
+  panel.asked = new Set();
+  panel.drawVerdict();
+  box.querySelector('[data-job=battery]').click();
+  const seen = ['returns', 'battery'].map((job) => {
+    panel.answered(job, { rev: 1, state: 'ok', headline: `of ${job}`, lines: [] });
+    const card = box.querySelector(`[data-answer=${job}]`);
+    const [a, b] = [card, box].map((one) => one.getBoundingClientRect());
+    const { job: asked } = card.previousElementSibling.querySelector('button').dataset;
+    return [asked, a.top >= b.top && a.bottom <= b.bottom + 1];
+  });
+  box.remove();
+  return seen;
+})"""
+
+
+def test_an_answer_stands_below_its_question_and_is_seen_where_it_was_asked(page: Browser) -> None:
+    assert page.value(ANSWER) == [["returns", False], ["battery", True]]
 
 
 def test_a_drag_ends_where_another_page_changes_the_items(page: Browser, studio: Studio) -> None:
@@ -517,6 +592,10 @@ def test_stop_and_a_mended_error_are_said(page: Browser) -> None:
     page.value("document.querySelector('[data-job=campaign]').click()")
     # The button shows at once that its work has begun.
     page.wait_for("document.querySelector('[data-job=campaign]').dataset.share !== undefined", 2.0)
+    page.value("document.getElementById('stop').click()")
+    page.wait_for(f"{message}.textContent === 'Stopped; earlier results stay.'", 60.0)
+    page.value("document.querySelector('[data-job=returns]').click()")
+    page.wait_for(f"{message}.hidden", 5.0)
     page.value("document.getElementById('stop').click()")
     page.wait_for(f"{message}.textContent === 'Stopped; earlier results stay.'", 60.0)
     page.value("document.getElementById('tab-files').click()")

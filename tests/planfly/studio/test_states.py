@@ -48,6 +48,38 @@ def test_a_limit_of_zero_leaves_the_scale_of_its_rule() -> None:
         assert found.state == state
 
 
+@pytest.mark.parametrize(
+    ("rule", "limit", "value", "at_least", "tolerance", "text"),
+    [
+        # Passed at 1.42 m of a radius of 1.5 m, which is little; with its tolerance the limit is 6.13 m.
+        ("waypoint", 1.5, 1.42, False, 4.63, "waypoint 1.42 m (\u2264 1.5 m, plus 4.63 m for navigation and gusts)"),
+        ("clearance", 50.0, 51.0, True, 20.0, "clearance 51 m (\u2265 50 m, less a tolerance of 20 m)"),
+        # Far from the limit, or close to it with the tolerance, too: the limit with its tolerance is enough.
+        ("waypoint", 1.5, 0.3, False, 4.63, "waypoint 0.3 m (\u2264 6.13 m)"),
+        ("clearance", 50.0, 51.0, True, 0.1, "clearance 51 m (\u2265 49.9 m)"),
+    ],
+)
+def test_a_place_says_what_its_limit_is_without_the_tolerance_that_leaves_it_room(
+    rule: str, limit: float, value: float, at_least: bool, tolerance: float, text: str
+) -> None:
+    margin = value - limit if at_least else limit - value
+    finding = make_finding(
+        rule,
+        Place("waypoint", 1),
+        ok=True,
+        reason="",
+        planned=value,
+        limit=limit,
+        margin=margin,
+        tolerance=tolerance,
+        unit="m",
+        at_least=at_least,
+    )
+    found = finding_state(finding)
+    assert found is not None
+    assert found.text == text
+
+
 @pytest.mark.parametrize(("beside", "near"), [(2.2, True), (9.0, True), (40.0, False)])
 def test_a_leg_close_to_a_missile_is_near(beside: float, near: bool) -> None:
     scenario, _ = world_of("jacksboro")
