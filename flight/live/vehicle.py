@@ -262,6 +262,7 @@ class Vehicle:
         parameters: Parameters,
         standby: Standby,
         battery: float,
+        volts: float,
         show: ShowText,
     ) -> None:
         """Start the flight process.
@@ -271,12 +272,13 @@ class Vehicle:
         parameters: parameters that stations may read, and partly set.
         standby: aircraft before it has a mission.
         battery: energy of the full battery, Wh.
+        volts: battery voltage, V; 0 without a battery.
         show: function that shows a text at the terminal.
         """
         self.link = link
         self.arming = ArmingState()
         self.server = MissionServer(go_to=self._go_to)
-        self.status = Status(standby.snapshot, standby.home, battery=battery)
+        self.status = Status(standby.snapshot, standby.home, battery=battery, volts=volts)
         self.downlink = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
         self.requests = Requests(self.arming, parameters, self.status, self._set_start_item)
         self._standby = standby

@@ -76,6 +76,7 @@ def _make_vehicle(
         parameters,
         standby,
         airframe.battery,
+        airframe.aircraft.battery_voltage,
         lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
     )
 
