@@ -45,7 +45,8 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
         return "; ".join(["flyable", *notes, *source_notes])
     failed_findings = _failed_by_urgency(findings)
     if not failed_findings and (open_text := undecided_text(findings)):
-        return "; ".join([f"not judged in full: {open_text}", *source_notes])
+        notes = [*_near_miss_notes(findings), *_altitude_notes(findings)]
+        return "; ".join([f"not judged in full: {open_text}", *notes, *source_notes])
     named_findings = _headline_findings(failed_findings)
     unnamed_count = len(failed_findings) - len(named_findings)
     text = (

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+from aircraft.envelope import ground_slope
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
@@ -65,6 +66,7 @@ def _leg_finding(
     method = "route"
     if measure is not None:
         performance_faults = _performance_faults(requirements, leg, measure)
+        performance_faults += _rate_limit_faults(requirements, leg, measure)
         flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
         facts += [text for name, text in _flown_facts(requirements, measure) if name not in flown_faults]
         # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
@@ -315,12 +317,10 @@ def _flown_faults(
             )
         elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
-    if measure.height_error is not None:
-        error = abs(measure.height_error)
-        max_height_error = SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
-        if error > max_height_error:
-            side = "above" if measure.height_error > 0.0 else "below"
-            faults["height"] = message(f"{error:.0f} m {side} the leg", f" (at most {max_height_error:.0f} m)")
+    if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
+        side = "above" if measure.height_error > 0.0 else "below"
+        limit_text = f" (at most {_height_error_limit(measure):.0f} m)"
+        faults["height"] = message(f"{abs(measure.height_error):.0f} m {side} the leg", limit_text)
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
@@ -357,6 +357,41 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
             f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
             f" it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
+            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
+        )
+    ]
+
+
+def _height_error_limit(measure: SlopeMeasure) -> float:
+    """Return the largest height error of a leg that is no fault, m."""
+    return SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
+
+
+def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
+    """Return a fault if the autopilot's climb or sink limit is below a leg's slope, and the flight shows the miss.
+
+    An imported log has to state the parameter.
+    """
+    setup, planned_slope = requirements.setup, float(requirements.slopes[leg])
+    is_climb = planned_slope >= 0.0
+    sign = 1.0 if is_climb else -1.0
+    rate_limit = setup.autopilot.speeds.climb_limit if is_climb else setup.autopilot.speeds.sink_limit
+    parameters = setup.autopilot.parameters
+    is_stated = setup.source is None or (
+        parameters is not None and rate_limit.name.split(" ")[0] in parameters.by_origin("file")
+    )
+    misses_leg = measure.height_error is not None and -sign * measure.height_error > _height_error_limit(measure)
+    if not (rate_limit.name and is_stated and misses_leg):
+        return []
+    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
+    slope = ground_slope(math.asin(min(1.0, rate_limit.rate / speed)), speed, *wind)
+    if not slope < abs(planned_slope) - ABILITY_TOLERANCE_RAD:
+        return []
+    return [
+        message(
+            f"{rate_limit.name} permits a {'climb' if is_climb else 'descent'} of {math.degrees(slope):.1f}°"
+            f" at {speed:.1f} m/s",
             f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]

@@ -99,7 +99,9 @@ def battery_voltage(log: FlightLog) -> float:
     if log.setup.envelope.volts > 0.0:
         return log.setup.envelope.volts
     track = log.track
-    time, current, energy = (np.asarray(values, dtype=np.float64) for values in (track.time, track.current, track.energy))
+    time, current, energy = (
+        np.asarray(values, dtype=np.float64) for values in (track.time, track.current, track.energy)
+    )
     charge = float(np.sum(np.diff(time) * current[1:]))  # As
     return float(energy[-1] - energy[0]) * 3600.0 / charge if charge > 0.0 else np.nan
 
