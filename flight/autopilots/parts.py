@@ -144,6 +144,10 @@ class RateLimit(NamedTuple):
         return cls(values[name], f"{name} {values[name]:g} m/s") if values[name] else cls()
 
 
+# Limit of an autopilot that limits no rate.
+_NO_RATE_LIMIT = RateLimit()
+
+
 @dataclass(frozen=True)
 class SpeedRules:
     """Rules by which an autopilot flies commanded airspeeds; by default they are true airspeeds without limits.
@@ -164,8 +168,8 @@ class SpeedRules:
     cruise_parameter: str = ""
     max_throttle: float = 1.0
     max_throttle_name: str = ""
-    climb_limit: RateLimit = RateLimit()
-    sink_limit: RateLimit = RateLimit()
+    climb_limit: RateLimit = _NO_RATE_LIMIT
+    sink_limit: RateLimit = _NO_RATE_LIMIT
 
     def true_airspeed_factor(self, amsl: float) -> float:
         """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""
