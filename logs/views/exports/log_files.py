@@ -99,11 +99,8 @@ def battery_voltage(log: FlightLog) -> float:
     if log.setup.envelope.volts > 0.0:
         return log.setup.envelope.volts
     track = log.track
-    time, current, energy = (
-        np.asarray(values, dtype=np.float64) for values in (track.time, track.current, track.energy)
-    )
-    charge = float(np.sum(np.diff(time) * current[1:]))  # As
-    return float(energy[-1] - energy[0]) * 3600.0 / charge if charge > 0.0 else np.nan
+    charge = float(np.sum(np.diff(track.time) * track.current[1:].astype(np.float64)))  # As
+    return float(track.energy[-1] - track.energy[0]) * 3600.0 / charge if charge > 0.0 else np.nan
 
 
 # ----------------------------------------------------------------------
