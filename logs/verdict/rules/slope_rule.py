@@ -2,10 +2,21 @@
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 from aircraft.envelope import ground_slope
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.findings import (
+    GROUND_FOLLOWING_ERROR,
+    UNKNOWN_AIRCRAFT,
+    Fact,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+)
 from logs.verdict.measures.acceptance import step_height
+from logs.verdict.measures.ground_following import follows_ground, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -19,6 +30,7 @@ from logs.verdict.tolerances import (
     HEIGHT_ERROR_LIMIT_M,
     LEVEL_SLOPE_RAD,
     MIN_LEG_LENGTH_M,
+    NEGLIGIBLE_STEP_M,
     PLAN_TOLERANCE_RAD,
     SATURATED_TIME_S,
     SHORT_LEG_HEIGHT_ERROR_LIMIT_M,
@@ -60,6 +72,11 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
+    ground = None if faults else _steep_ground(requirements, leg, measure)
+    if ground is not None:
+        planned_slope, limit, source = ground.slope, ground.limit, ground.source
+        sign = math.copysign(1.0, planned_slope)
+        faults = [_steep_ground_message(requirements, leg, ground)]
     # A fault of the plan states the planned slope itself.
     facts = facts if faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
@@ -68,19 +85,19 @@ def _leg_finding(
         performance_faults = _performance_faults(requirements, leg, measure)
         performance_faults += _rate_limit_faults(requirements, leg, measure)
         flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-        facts += [text for name, text in _flown_facts(requirements, measure) if name not in flown_faults]
+        facts += [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
         # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
         # on the leg is only reported.
         facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
         faults += performance_faults if requirements.envelope else [*flown_faults.values(), *performance_faults]
-        fit = measure.slope
-        method = "not flown"
+        fit = measure.slope if ground is None else None
+        method = "not flown" if ground is None else "route"
         if fit is not None:
             method_text = "least squares" if fit.is_fitted else "least squares, short leg,"
             method = f"{method_text} over {fit.length:.0f} m"
     ok: bool | None = not faults
     check = ""
-    uncertainty = _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
+    uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
     if not faults and uncertainty:
         ok, check = None, UNKNOWN_AIRCRAFT
     facts = [uncertainty, *facts] if uncertainty else facts
@@ -124,6 +141,59 @@ def _planned_slope_messages(
         else:
             facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
     return faults + _steep_arc_faults(requirements, leg), facts
+
+
+class _SteepGround(NamedTuple):
+    """Ground that a leg follows and that is steeper than the aircraft or its autopilot can fly.
+
+    slope, length, excess: as in `GroundSlope`.
+    limit: rad, positive.
+    source: source of the limit: "scenario", "aircraft" or "autopilot".
+    name: parameter of the autopilot with its value; "" for the other sources.
+    """
+
+    slope: float
+    length: float
+    excess: float
+    limit: float
+    source: str
+    name: str
+
+
+def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
+    """Return the ground that a leg cannot follow; None if the height that is missed is negligible.
+
+    A flight decides by the height above ground that it missed, and is limited by the autopilot's rates, too.
+    """
+    if not follows_ground(requirements, leg):
+        return None
+    if measure is not None and (
+        measure.height_error is None or abs(measure.height_error) <= _height_error_limit(measure)
+    ):
+        return None
+    steepest = None
+    for is_climb in (True, False):
+        (limit, source), name = slope_limit(requirements, leg, is_climb=is_climb), ""
+        if measure is not None:
+            rate_slope, rate_name = _rate_limit_slope(requirements, leg, is_climb=is_climb)
+            limit, source, name = (rate_slope, "autopilot", rate_name) if rate_slope < limit else (limit, source, name)
+        ground = steepest_ground(requirements, leg, limit, is_climb=is_climb)
+        if ground is not None and ground.excess > (NEGLIGIBLE_STEP_M if steepest is None else steepest.excess):
+            steepest = _SteepGround(*ground, limit, source, name)
+    return steepest
+
+
+def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _SteepGround) -> Message:
+    """Return a message on ground that a leg cannot follow, and on the limit."""
+    limit_text = f"{ground.name} permits {math.degrees(ground.limit):.1f}°"
+    if not ground.name:
+        limit_text = _limit_text(requirements, leg, ground.limit, ground.source, is_climb=ground.slope >= 0.0)
+    brief = (
+        f"leg {requirements.leg(leg).number} follows the ground {'up' if ground.slope >= 0.0 else 'down'}"
+        f" {math.degrees(abs(ground.slope)):.1f}° for {_distance_text(ground.length)}"
+    )
+    rest = f"; {limit_text}, so that it misses the height over the ground by up to {ground.excess:.0f} m"
+    return message(brief, rest, placed=True)
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
@@ -219,12 +289,15 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
-    limit_texts = [_limit_text(requirements, leg, limit, source), _certain_limit_text(requirements, leg, limit, source)]
+    limit_texts = [
+        _limit_text(requirements, leg, limit, source, is_climb=planned_slope >= 0.0),
+        _certain_limit_text(requirements, leg, limit, source),
+    ]
     number = requirements.leg(leg).number
     return message(f"leg {number} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
 
 
-def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
+def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, is_climb: bool) -> str:
     """Describe the limit on a leg's slope (rad) and, for the aircraft's own limit, the influence of the wind."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
@@ -237,7 +310,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
-    calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if requirements.slopes[leg] >= 0.0 else 1]
+    calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if is_climb else 1]
     wind_text = f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
     if abs(crosswind) > abs(tailwind):
         wind_text = f"{abs(crosswind):.0f} m/s crosswind"
@@ -266,13 +339,14 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
     )
 
 
-def _flown_facts(requirements: RouteRequirements, measure: SlopeMeasure) -> list[tuple[str, str]]:
+def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[tuple[str, str]]:
     """Return texts on how a leg was flown, each with the name of its quantity: (name, text)."""
     facts = []
     if measure.slope is not None:
         facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of the leg"))
+        line = "the leg's height over the ground" if follows_ground(requirements, leg) else "the leg"
+        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
     facts += [
         (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
         for name, duration, _, _ in _throttle_times(measure)
@@ -285,7 +359,8 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
     """Return the measurements of a flown leg as facts."""
     if measure is None:
         return []
-    facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
+    error_name = GROUND_FOLLOWING_ERROR if follows_ground(requirements, leg) else "height error"
+    facts = [] if measure.height_error is None else [Fact(error_name, measure.height_error, "m")]
     if measure.slope is not None:
         error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
         facts.append(Fact("slope error", error, "deg"))
@@ -319,8 +394,9 @@ def _flown_faults(
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
         side = "above" if measure.height_error > 0.0 else "below"
+        line = "its height over the ground" if follows_ground(requirements, leg) else "the leg"
         limit_text = f" (at most {_height_error_limit(measure):.0f} m)"
-        faults["height"] = message(f"{abs(measure.height_error):.0f} m {side} the leg", limit_text)
+        faults["height"] = message(f"{abs(measure.height_error):.0f} m {side} {line}", limit_text)
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
@@ -367,31 +443,38 @@ def _height_error_limit(measure: SlopeMeasure) -> float:
     return SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
 
 
-def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the autopilot's climb or sink limit is below a leg's slope, and the flight shows the miss.
+def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
+    """Return the slope over the ground at the autopilot's climb or sink limit on a leg, rad, and the limit's name.
 
-    An imported log has to state the parameter.
+    The slope is infinite without a limit, and in an imported flight whose log does not state the parameter.
     """
-    setup, planned_slope = requirements.setup, float(requirements.slopes[leg])
-    is_climb = planned_slope >= 0.0
-    sign = 1.0 if is_climb else -1.0
+    setup = requirements.setup
     rate_limit = setup.autopilot.speeds.climb_limit if is_climb else setup.autopilot.speeds.sink_limit
     parameters = setup.autopilot.parameters
-    is_stated = setup.source is None or (
-        parameters is not None and rate_limit.name.split(" ")[0] in parameters.by_origin("file")
-    )
-    misses_leg = measure.height_error is not None and -sign * measure.height_error > _height_error_limit(measure)
-    if not (rate_limit.name and is_stated and misses_leg):
-        return []
+    stated_names = {} if parameters is None else parameters.by_origin("file")
+    if not rate_limit.name or (setup.source is not None and rate_limit.name.split(" ")[0] not in stated_names):
+        return math.inf, ""
     speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
     wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     slope = ground_slope(math.asin(min(1.0, rate_limit.rate / speed)), speed, *wind)
-    if not slope < abs(planned_slope) - ABILITY_TOLERANCE_RAD:
+    return (math.inf if math.isnan(slope) else slope), rate_limit.name
+
+
+def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
+    """Return a fault if the autopilot's climb or sink limit is below a leg's slope, and the flight shows the miss."""
+    planned_slope = float(requirements.slopes[leg])
+    sign = 1.0 if planned_slope >= 0.0 else -1.0
+    slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)
+    if (
+        slope >= abs(planned_slope) - ABILITY_TOLERANCE_RAD
+        or measure.height_error is None
+        or -sign * measure.height_error <= _height_error_limit(measure)
+    ):
         return []
+    speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
-            f"{rate_limit.name} permits a {'climb' if is_climb else 'descent'} of {math.degrees(slope):.1f}°"
-            f" at {speed:.1f} m/s",
+            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s",
             f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]
