@@ -82,14 +82,8 @@ def _leg_finding(
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
-        performance_faults = _performance_faults(requirements, leg, measure)
-        performance_faults += _rate_limit_faults(requirements, leg, measure)
-        flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-        facts += [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
-        # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
-        # on the leg is only reported.
-        facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
-        faults += performance_faults if requirements.envelope else [*flown_faults.values(), *performance_faults]
+        flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
+        faults, facts = faults + flown_faults, facts + flown_facts
         fit = measure.slope if ground is None else None
         method = "not flown" if ground is None else "route"
         if fit is not None:
@@ -123,6 +117,24 @@ def _leg_finding(
         check=check,
         facts=_measured_facts(requirements, leg, measure),
     )
+
+
+def _flown_messages(
+    requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
+) -> tuple[list[Message], list[str]]:
+    """Return the faults of a leg as flown, and facts.
+
+    If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error on
+    the leg is only reported.
+    """
+    performance_faults = _performance_faults(requirements, leg, measure) + _rate_limit_faults(
+        requirements, leg, measure
+    )
+    flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
+    facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
+    if requirements.envelope:
+        return performance_faults, facts + [fault.brief for fault in flown_faults.values()]
+    return [*flown_faults.values(), *performance_faults], facts
 
 
 def _planned_slope_messages(
