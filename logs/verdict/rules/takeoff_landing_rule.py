@@ -15,7 +15,7 @@ from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.rule import Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
@@ -207,9 +207,11 @@ TAKEOFF = Rule(
     name="takeoff",
     tolerances=("PLAN_TOLERANCE_RAD",),
     judge=takeoff_findings,
+    log=LogNeeds(needs_aircraft=True),
 )
 LANDING = Rule(
     name="landing",
     tolerances=("PLAN_TOLERANCE_RAD",),
     judge=landing_findings,
+    log=LogNeeds(needs_aircraft=True),
 )
