@@ -307,10 +307,12 @@ class Vehicle:
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
-    def load_fence(self, fences: Sequence[MissionItem]) -> None:
-        """Load a fence from a file, as if a station had uploaded it; later missions are judged with it."""
-        self.server.lists[MissionType.FENCE] = tuple(fences)
-        self.server.changed.add(MissionType.FENCE)
+    def load_fence(self, fences: Sequence[MissionItem], rally: Sequence[MissionItem] = ()) -> None:
+        """Load fence and rally points from files, as if a station had uploaded them; they apply to later missions."""
+        for kind, items in ((MissionType.FENCE, fences), (MissionType.RALLY, rally)):
+            if items:
+                self.server.lists[kind] = tuple(items)
+                self.server.changed.add(kind)
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Serve until ``stop`` returns True, then end the flight and its process."""
