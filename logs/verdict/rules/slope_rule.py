@@ -36,6 +36,7 @@ from logs.verdict.tolerances import (
     SHORT_LEG_HEIGHT_ERROR_LIMIT_M,
     SLOPE_TOLERANCE_RAD,
     SPEED_TOLERANCE_MPS,
+    UNDECIDED_FRACTION,
 )
 from logs.verdict.wording import place_text
 from world.wind import W20
@@ -214,21 +215,32 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     Only the aircraft's own limits are considered: a tighter limit of the scenario says nothing about its ability.
     """
     planned_slope, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
-    limits, certain_limits, verb, deviation = (
-        (requirements.climb, requirements.certain_climb, "climbs", envelope.climb_sd)
+    limits, certain_limits, verb = (
+        (requirements.climb, requirements.certain_climb, "climbs")
         if planned_slope >= 0.0
-        else (requirements.dive, requirements.certain_dive, "descends", envelope.descent_sd)
+        else (requirements.dive, requirements.certain_dive, "descends")
     )
     limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
     # Without the aircraft's limits there is no uncertain limit.
     if abs(planned_slope) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
-    angles = abs(planned_slope), limit, deviation, certain_limit
+    angles = abs(planned_slope), limit, _limit_deviation(requirements, leg, limit, certain_limit), certain_limit
     slope, limit_deg, deviation_deg, certain_deg = (math.degrees(angle) for angle in angles)
     return (
         f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°, so"
         f" only {certain_deg:.1f}° is certain"
     )
+
+
+def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
+    """Return the standard deviation of an uncertain aircraft's limit (rad), over the ground like the limit itself.
+
+    It is the deviation in still air if the certain part of the limit (rad) ends at 0.
+    """
+    envelope = requirements.setup.envelope
+    if certain_limit <= 0.0:
+        return envelope.climb_sd if float(requirements.slopes[leg]) >= 0.0 else envelope.descent_sd
+    return (limit - certain_limit) / UNDECIDED_FRACTION
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
@@ -251,7 +263,7 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
     certain_limit = float((requirements.certain_climb if is_climb else requirements.certain_dive)[leg])
     if source != "aircraft" or not certain_limit < limit:
         return ""
-    deviation = math.degrees(envelope.climb_sd if is_climb else envelope.descent_sd)
+    deviation = math.degrees(_limit_deviation(requirements, leg, limit, certain_limit))
     return (
         f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) {math.degrees(certain_limit):.1f}° is certain"
     )
