@@ -252,11 +252,11 @@ def test_a_command_that_moves_nothing_is_the_stated_reason(name: str, tmp_path: 
     ("source", "stated", "expected"), [("a data sheet", 16.0, 16.0), ("flight logs", 16.0, 15.904)]
 )
 def test_the_stated_stall_speed_of_a_data_sheet_is_the_slowest_level_flight(
-    source: str, stated: float, expected: float, computed: dict[bool, Envelope], monkeypatch: pytest.MonkeyPatch
+    source: str, expected: float, computed: dict[bool, Envelope], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """16 m/s EAS at 2000 m, where the standard atmosphere has 0.8217 of the density at sea level, are 17.65 m/s."""
     monkeypatch.setattr(flight.dynamics.envelope_tables, "read_uncertainty", lambda _: Uncertainty(source, 0.05, 0.05))
-    found = load_envelope(replace(AEROSONDE, stall_speed=stated))
+    found = load_envelope(replace(AEROSONDE, stall_speed=16.0))
     assert found.level_speeds(0.0)[0] == pytest.approx(expected, abs=1e-3)
     assert found.level_speeds(2000.0)[0] == pytest.approx(expected / math.sqrt(0.8217), rel=2e-3)
     assert found.level_speeds(0.0)[1] == computed[False].level_speeds(0.0)[1]
