@@ -54,6 +54,9 @@ def takeoff_findings(
     if waypoint == 0 or not has_own_position:
         reason = f"to {altitude:.0f} m AMSL over home, on a course that the autopilot chooses"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
+    source = requirements.setup.source
+    if source is not None and not source.aircraft_known:
+        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), "the aircraft is not named (--aircraft)")]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
 
@@ -207,7 +210,6 @@ TAKEOFF = Rule(
     name="takeoff",
     tolerances=("PLAN_TOLERANCE_RAD",),
     judge=takeoff_findings,
-    log=LogNeeds(needs_aircraft=True),
 )
 LANDING = Rule(
     name="landing",
