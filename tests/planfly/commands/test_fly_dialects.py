@@ -26,8 +26,9 @@ LEGS = {
     "qgc_amsl.plan": 4,
     "qgc_takeoff.plan": 7,
 }
-# What fails of them if ArduPlane flies: a jump without end, and a command of PX4's that ArduPlane refuses.
-NOT_FLYABLE = {"endless.waypoints": "energy", "qgc.waypoints": "mission"}
+# What fails of them if ArduPlane flies: a jump without end, a command of PX4's that ArduPlane refuses, and ground that
+# is too steep to follow.
+NOT_FLYABLE = {"endless.waypoints": "energy", "qgc.waypoints": "mission", "mavproxy_terrain.txt": "slope"}
 # What leaves them open: a course that is the autopilot's, a climb that is too steep, a waypoint without a position.
 OPEN = {
     "mission_planner.waypoints": "the take-off at waypoint 0 (item 1) is not judged",
