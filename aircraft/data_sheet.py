@@ -459,7 +459,7 @@ def _estimate_coefficients(sheet: DataSheet, aircraft_class: AircraftClass, prio
     weight = _weight(sheet)
     cruise_lift = weight / (0.5 * SHEET_DENSITY * sheet.cruise**2 * area)
     lift_max = weight / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
-    # The elevator reaches its stop at the sheet's stall speed.
+    # The elevator that the sheet's stall speed needs is short of its stop, so that it can pull in turns and gusts.
     elevator_travel = aircraft_class.elevator_stall - CRUISE_ELEVATOR
     alpha_range = (lift_max - cruise_lift - aircraft_class.lift_elevator * elevator_travel) / slope
     cruise_alpha = min(CRUISE_ALPHA, MAX_STALL_ALPHA - alpha_range)

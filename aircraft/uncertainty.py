@@ -20,6 +20,8 @@ from world.files import did_you_mean, read_small_file, read_toml, utf8_text
 
 # Files with uncertainties; the first of them that exists is read.
 UNCERTAINTY_FILES = ("posterior.toml", "uncertainty.toml")
+# Source of a model that was made from a data sheet.
+SHEET_SOURCE = "a data sheet"
 # File of draws.
 DRAWS_FILE = "draws.csv"
 # Number of draws in a file.
@@ -114,7 +116,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         raise FlightError(f"{file}: {error.strerror}", file=file) from None
     except ValueError as error:
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
-    source = table.get("source", "flight logs" if file.name == UNCERTAINTY_FILES[0] else "a data sheet")
+    source = table.get("source", "flight logs" if file.name == UNCERTAINTY_FILES[0] else SHEET_SOURCE)
     if not isinstance(source, str) or not source.strip():
         raise FlightError.at(str(file), "source", source, "expected a text", shown=repr(source))
     _check_keys(table, file)

@@ -127,6 +127,27 @@ class SpeedLimits(NamedTuple):
     nearest: bool = False
 
 
+class RateLimit(NamedTuple):
+    """Largest climb or sink rate that an autopilot demands, m/s, and its parameter with its value; "" for no limit."""
+
+    rate: float = math.inf
+    name: str = ""
+
+    @classmethod
+    def of_parameters(cls, **values: float) -> "RateLimit":
+        """Return the limit of the smallest of several parameters, m/s; a value of 0 limits nothing.
+
+        >>> RateLimit.of_parameters(FW_T_CLMB_R_SP=3.0, FW_T_CLMB_MAX=5.0)
+        RateLimit(rate=3.0, name='FW_T_CLMB_R_SP 3 m/s')
+        """
+        name = min(values, key=lambda each: values[each] or math.inf)
+        return cls(values[name], f"{name} {values[name]:g} m/s") if values[name] else cls()
+
+
+# Limit of an autopilot that limits no rate.
+_NO_RATE_LIMIT = RateLimit()
+
+
 @dataclass(frozen=True)
 class SpeedRules:
     """Rules by which an autopilot flies commanded airspeeds; by default they are true airspeeds without limits.
@@ -138,6 +159,7 @@ class SpeedRules:
     cruise_parameter: parameter of the cruise airspeed; "" without such a parameter.
     max_throttle: upper limit of the throttle in flight, 0..1; 1 for full throttle.
     max_throttle_name: parameter of this limit with its value in the autopilot's unit; "" for full throttle.
+    climb_limit, sink_limit: largest rates at which the autopilot changes its altitude.
     """
 
     limits: SpeedLimits | None = None
@@ -146,6 +168,8 @@ class SpeedRules:
     cruise_parameter: str = ""
     max_throttle: float = 1.0
     max_throttle_name: str = ""
+    climb_limit: RateLimit = _NO_RATE_LIMIT
+    sink_limit: RateLimit = _NO_RATE_LIMIT
 
     def true_airspeed_factor(self, amsl: float) -> float:
         """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""

@@ -12,7 +12,7 @@ from platformdirs import user_cache_dir
 
 from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
-from aircraft.uncertainty import read_uncertainty
+from aircraft.uncertainty import SHEET_SOURCE, read_uncertainty
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import (
     QUANTITIES,
@@ -58,6 +58,8 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         tables = compute_tables(aircraft, motor_braking)
         write_tables(file, key, tables)
     uncertainty = read_uncertainty(aircraft.folder)
+    if uncertainty is not None and uncertainty.source == SHEET_SOURCE:
+        tables["level_speed_min"] = _stated_min_speeds(tables, aircraft.stall_speed)
     return Envelope(
         source="" if uncertainty is None else uncertainty.source,
         climb_sd=0.0 if uncertainty is None else uncertainty.climb_sd,
@@ -74,6 +76,17 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         volts=aircraft.battery_voltage,
         **tables,
     )
+
+
+def _stated_min_speeds(tables: Mapping[str, Floats], stall_speed: float) -> Floats:
+    """Return the lowest airspeeds of level flight by altitude, m/s, at sea level at least the stated stall speed (m/s).
+
+    The model of a data sheet flies a few per cent slower: it reaches the stated stall speed with the elevator short of
+    its stop, and without the lift of the propeller.
+    """
+    model_speeds = tables["level_speed_min"]
+    factor = max(1.0, stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0
+    return np.asarray(np.minimum(factor * model_speeds, tables["level_speed_max"]).round(9))
 
 
 def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:

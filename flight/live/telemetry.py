@@ -240,6 +240,10 @@ _SENSORS = (
     | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 )
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+# Voltage of SYS_STATUS if no battery is measured, mV.
+_NOT_MEASURED_MV = 65535
+# Current of SYS_STATUS if no battery is measured, 0.01 A.
+_NOT_MEASURED_CA = -1
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
@@ -284,6 +288,7 @@ class Status:
     mode: ArduPlane's number.
     ready: True if the vehicle is armed, or if arming would be accepted.
     battery: energy of the full battery, Wh.
+    volts: battery voltage, V; 0 or NaN if the aircraft has no battery or its voltage is unknown.
     load: busy fraction of the event loop's time.
     current: number of the current mission item.
     total: number of mission items without home.
@@ -299,6 +304,7 @@ class Status:
     flying: bool = False
     ready: bool = True
     battery: float = 1.0
+    volts: float = 0.0
     load: float = 0.0
     current: int = 0
     total: int = 0
@@ -391,13 +397,14 @@ def _sys_status_message(status: Status) -> Any:
     healthy_sensors = _SENSORS | (_PREARM if status.ready else 0)
     remaining_fraction = max(0.0, 1.0 - status.snapshot.energy / status.battery)
     present_sensors = _SENSORS | _PREARM
+    has_battery = status.volts > 0.0
     return mavlink.MAVLink_sys_status_message(
         present_sensors,
         present_sensors,
         healthy_sensors,
         min(1000, round(status.load * 1000)),
-        44_400,
-        _to_int16(status.snapshot.current * 100),
+        min(round(status.volts * 1e3), _NOT_MEASURED_MV - 1) if has_battery else _NOT_MEASURED_MV,
+        _to_int16(status.snapshot.current * 100) if has_battery else _NOT_MEASURED_CA,
         round(remaining_fraction * 100),
         0,
         0,

@@ -262,6 +262,7 @@ class Vehicle:
         parameters: Parameters,
         standby: Standby,
         battery: float,
+        volts: float,
         show: ShowText,
     ) -> None:
         """Start the flight process.
@@ -271,12 +272,13 @@ class Vehicle:
         parameters: parameters that stations may read, and partly set.
         standby: aircraft before it has a mission.
         battery: energy of the full battery, Wh.
+        volts: battery voltage, V; 0 without a battery.
         show: function that shows a text at the terminal.
         """
         self.link = link
         self.arming = ArmingState()
         self.server = MissionServer(go_to=self._go_to)
-        self.status = Status(standby.snapshot, standby.home, battery=battery)
+        self.status = Status(standby.snapshot, standby.home, battery=battery, volts=volts)
         self.downlink = Downlink(link, self.status, parameters, show, _MAX_WAIT_S)
         self.requests = Requests(self.arming, parameters, self.status, self._set_start_item)
         self._standby = standby
@@ -305,10 +307,12 @@ class Vehicle:
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
-    def load_fence(self, fences: Sequence[MissionItem]) -> None:
-        """Load a fence from a file, as if a station had uploaded it; later missions are judged with it."""
-        self.server.lists[MissionType.FENCE] = tuple(fences)
-        self.server.changed.add(MissionType.FENCE)
+    def load_fence(self, fences: Sequence[MissionItem], rally: Sequence[MissionItem] = ()) -> None:
+        """Load fence and rally points from files, as if a station had uploaded them; they apply to later missions."""
+        for kind, items in ((MissionType.FENCE, fences), (MissionType.RALLY, rally)):
+            if items:
+                self.server.lists[kind] = tuple(items)
+                self.server.changed.add(kind)
 
     def run(self, stop: Callable[[], bool]) -> None:
         """Serve until ``stop`` returns True, then end the flight and its process."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from flight.mission.items import MAX_BYTES, Mission, MissionItem
 from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
@@ -99,24 +99,37 @@ def parse_mission(text: str, source: str) -> Mission:
     return parse_waypoints(text, source)
 
 
-def read_fence(path: Path) -> tuple[MissionItem, ...]:
-    r"""Read the fence of a mission file in any form, or of a list of points from older tools.
+class FenceContents(NamedTuple):
+    """Fence of a file, or the rally points of a file without a fence."""
 
-    Other contents of the file are ignored. Raises MissionError as `read_mission` does, and if the file has no fence.
+    fences: tuple[MissionItem, ...]
+    rally: tuple[MissionItem, ...] = ()
+
+
+def read_fence(path: Path) -> FenceContents:
+    r"""Read the fence of a mission file in any form or of a list of points from older tools, or a file of rally points.
+
+    Other contents of the file are ignored, such as rally points beside a fence. Raises MissionError as `read_mission`
+    does, and if the file has neither a fence nor rally points.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "keep-out.fence"
     ...     _ = path.write_text("QGC WPL 110\n0 0 0 5004 200 0 0 0 36.51 -84.2 0 1\n", encoding="ascii")
-    ...     [(item.command, item.params[0]) for item in read_fence(path)]
+    ...     [(item.command, item.params[0]) for item in read_fence(path).fences]
     [(5004, 200.0)]
     """
     mission_kind(path)
     text = _read_text(path)
-    fences = parse_fence_points(text, str(path)) if is_point_list(text) else parse_mission(text, str(path)).fences
-    if not fences:
-        raise MissionError(f"{path}: contains no fence; expected items of commands 5001 to 5004", file=path)
-    return fences
+    if is_point_list(text):
+        contents = FenceContents(parse_fence_points(text, str(path)))
+    else:
+        mission = parse_mission(text, str(path))
+        contents = FenceContents(mission.fences, () if mission.fences else mission.rally)
+    if not any(contents):
+        expected = "expected items of commands 5001 to 5004 (a fence) or 5100 (rally points)"
+        raise MissionError(f"{path}: contains no fence and no rally points; {expected}", file=path)
+    return contents
 
 
 def mission_text(mission: Mission, kind: FileKind) -> str:

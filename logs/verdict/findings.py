@@ -8,6 +8,9 @@ from logs.verdict.places import Place, Suggestion
 from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text, within_tolerance_text
 from world.json_schema import DocumentConfig
 
+# Fact of a slope finding: the largest error of the height above ground that its leg follows.
+GROUND_FOLLOWING_ERROR = "error of the height above ground"
+
 # Values of `Finding.check` for unjudged findings that leave the verdict undecided.
 # The aircraft is not known well enough.
 UNKNOWN_AIRCRAFT = "unknown aircraft"

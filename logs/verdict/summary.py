@@ -11,6 +11,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
 from logs.verdict.findings import (
     APART_FROM_FLIGHT,
+    GROUND_FOLLOWING_ERROR,
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
     UNKNOWN_PATH,
@@ -18,7 +19,7 @@ from logs.verdict.findings import (
     undecided_findings,
 )
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
-from logs.verdict.places import DecidingParameter, LevelAnswer
+from logs.verdict.places import DecidingParameter, LevelAnswer, Place
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
@@ -48,7 +49,8 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
         return "; ".join(["flyable", *notes, *source_notes])
     failed_findings = _failed_by_urgency(findings)
     if not failed_findings and (open_text := undecided_text(findings)):
-        return "; ".join([f"not judged in full: {open_text}", *source_notes])
+        notes = [*_near_miss_notes(findings), *_altitude_notes(findings)]
+        return "; ".join([f"not judged in full: {open_text}", *notes, *source_notes])
     named_findings = _headline_findings(failed_findings)
     unnamed_count = len(failed_findings) - len(named_findings)
     text = (
@@ -171,19 +173,35 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return a note on the waypoint with the largest altitude error, if the error is notable; otherwise []."""
-    errors = [
+    """Return notes on notable altitude errors: of the worst waypoint, and of the worst leg that follows the ground."""
+    waypoint_errors = _passing_errors(findings, "waypoint", "height error")
+    leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)
+    return [
+        *_worst_error_notes(waypoint_errors, "passed", "its altitude"),
+        *_worst_error_notes(leg_errors, "flown up to", "its height over the ground"),
+    ]
+
+
+def _passing_errors(findings: Sequence[Finding], rule: str, what: str) -> list[tuple[float, Place]]:
+    """Return the values of a fact of a rule's findings that did not fail, with their places."""
+    return [
         (fact.value, finding.place)
         for finding in findings
         for fact in finding.facts
-        if finding.rule == "waypoint" and finding.ok and fact.what == "height error"
+        if finding.rule == rule and finding.ok is not False and fact.what == what
     ]
+
+
+def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, reference: str) -> list[str]:
+    """Return a note on the largest altitude error (m), if it is notable; otherwise []."""
     notable = [(error, place) for error, place in errors if abs(error) > NOTABLE_HEIGHT_ERROR_M]
     if not notable:
         return []
     error, place = max(notable, key=lambda pair: abs(pair[0]))
     others = f", and {len(notable) - 1} more by over {NOTABLE_HEIGHT_ERROR_M:.0f} m" if len(notable) > 1 else ""
-    return [f"{place_text(place)} passed {abs(error):.0f} m {'above' if error > 0.0 else 'below'} its altitude{others}"]
+    comma = "," if place.to_item is not None else ""
+    side = "above" if error > 0.0 else "below"
+    return [f"{place_text(place)}{comma} {verb} {abs(error):.0f} m {side} {reference}{others}"]
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:

@@ -410,7 +410,7 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     setup = flight.setup
     if terrain is not None:
         setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
-    if fences.items or fences.zones:
+    if fences.items or fences.zones or fences.rally:
         setup = replace(
             setup.in_scenario(fences.add_to_scenario(setup.scenario)), mission=fences.add_to_mission(setup.mission)
         )

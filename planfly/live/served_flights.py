@@ -88,7 +88,7 @@ class ServedScenario:
 
     seed: seed of the turbulence.
     mission: initial mission, or None to wait for an upload.
-    fence: items of the named fences, if there is no initial mission.
+    fence, rally: items of the named fences and rally points, if there is no initial mission.
     """
 
     scenario: Scenario
@@ -96,6 +96,7 @@ class ServedScenario:
     seed: int
     mission: Mission | None
     fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
 
 
 def load_served_scenario(options: ServeOptions) -> ServedScenario:
@@ -113,7 +114,8 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
     fences = read_named_fences(options.flight_options.get("fence") or ())
     scenario = load_scenario_with_options(scenario_name, options.flight_options)
     scenario, seed = fences.add_to_scenario(scenario), options.flight_options.get("seed")
-    return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, seed), None, fences.items)
+    chosen_seed = choose_seed(scenario, seed)
+    return ServedScenario(scenario, load_airframe(scenario), chosen_seed, None, fences.items, fences.rally)
 
 
 def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:

@@ -44,8 +44,8 @@ def serve_vehicle(
         on_message(f"flight logs go to {options.logs}/; Ctrl-C ends")
         if served_scenario.mission is not None:
             vehicle.load(served_scenario.mission)
-        elif served_scenario.fence:
-            vehicle.load_fence(served_scenario.fence)
+        elif served_scenario.fence or served_scenario.rally:
+            vehicle.load_fence(served_scenario.fence, served_scenario.rally)
         exit_stack.callback(vehicle.close)
         vehicle.run(stop)
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)
@@ -76,6 +76,7 @@ def _make_vehicle(
         parameters,
         standby,
         airframe.battery,
+        airframe.aircraft.battery_voltage,
         lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
     )
 

@@ -22,6 +22,7 @@ from flight.mission.items import Home
 from flight.simulation.local_map import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
+from logs.views.exports.log_files import battery_voltage
 from planfly.flight_logs import CUT_SHORT
 from world.errors import FlightError
 
@@ -44,6 +45,7 @@ def play_to_stations(
     start = snapshots.start_snapshot(log.setup)
     home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
+    status.volts = battery_voltage(log)
     items = log.setup.route.items
     status.total = int(max(items.max(), 0))
     player = _Player(link, status, on_message)

@@ -118,7 +118,8 @@ def add_fence_option(group: OptionGroup) -> None:
         action="append",
         default=[],
         help="also respect this fence (.fence, .waypoints, .txt, .plan) or these airspace zones (.geojson, .json "
-        "including ED-269 and ED-318, .kml, .openair, .gpkg); repeatable",
+        "including ED-269 and ED-318, .kml, .openair, .gpkg), or use these rally points (.rally, or a .waypoints "
+        "that contains only rally points); repeatable",
     )
     with_completer(option, file_completer("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 

@@ -32,6 +32,7 @@ from aircraft.propulsion import ElectricMotor
 from aircraft.uncertainty import (
     DRAW_COUNT,
     DRAWS_FILE,
+    SHEET_SOURCE,
     Draws,
     UncertainQuantity,
     Uncertainty,
@@ -341,7 +342,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
     uncertainty = Uncertainty(
-        "a data sheet",
+        SHEET_SOURCE,
         climb_sd=total_climb_sd,
         descent_sd=descent_sd,
         quantities=quantities,

@@ -11,7 +11,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding
+from logs.verdict.findings import GROUND_FOLLOWING_ERROR, Finding
 from logs.verdict.judge_flight import judge_flight, with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
@@ -110,7 +110,8 @@ def _deviation_at_failure(failed_finding: Finding, findings: tuple[Finding, ...]
     slope_findings = [
         finding for finding in findings if finding.rule == "slope" and finding.place == failed_finding.place
     ]
-    errors = [fact.value for finding in slope_findings for fact in finding.facts if fact.what == "height error"]
+    names = ("height error", GROUND_FOLLOWING_ERROR)
+    errors = [fact.value for finding in slope_findings for fact in finding.facts if fact.what in names]
     return errors[0] if errors else None
 
 

@@ -40,6 +40,7 @@ from flight.autopilots.parts import (
     LandingGlide,
     MissionChecks,
     MissionParts,
+    RateLimit,
     ReturnBehaviour,
     ReturnMission,
     ReturnTrials,
@@ -248,7 +249,7 @@ class ArduPlane(Autopilot):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds from AIRSPEED_MIN, AIRSPEED_MAX, AIRSPEED_CRUISE, MIN_GROUNDSPEED and THR_MAX.
+        """Rules of airspeeds, throttle and climb rates from AIRSPEED_*, MIN_GROUNDSPEED, THR_MAX and TECS_*_MAX.
 
         A commanded speed outside the limits changes nothing: commanded to fly at 17 m/s with AIRSPEED_MIN 18, ArduPlane
         4.6 flew on at its 25 m/s.
@@ -262,6 +263,8 @@ class ArduPlane(Autopilot):
             cruise_parameter="AIRSPEED_CRUISE",
             max_throttle=parameters.throttle_max,
             max_throttle_name=f"THR_MAX {100.0 * parameters.throttle_max:g} %" if parameters.throttle_max < 1.0 else "",
+            climb_limit=RateLimit.of_parameters(TECS_CLMB_MAX=parameters.tecs_climb_max),
+            sink_limit=RateLimit.of_parameters(TECS_SINK_MAX=parameters.tecs_sink_max),
         )
 
     @property
@@ -426,8 +429,8 @@ class ArduPlane(Autopilot):
             radius_scale=_radius_growth,
             steers_to_center=True,
             exits_on_heading=True,
-            max_climb_rate=parameters.tecs_climb_max,
-            max_sink_rate=parameters.tecs_sink_max or math.inf,
+            max_climb_rate=self.speeds.climb_limit.rate,
+            max_sink_rate=self.speeds.sink_limit.rate,
             altitude_tolerance=LOITER_ALTITUDE_TOLERANCE_M,
             unflown_note=_bank_limit_note(parameters.navl1_lim_bank),
             rtl_exit_note=_EXIT_BEFORE_RTL_TEXT,

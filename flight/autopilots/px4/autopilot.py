@@ -21,6 +21,7 @@ from flight.autopilots.parts import (
     FeasibilityLimits,
     MissionChecks,
     MissionParts,
+    RateLimit,
     ReturnBehaviour,
     ReturnMission,
     ReturnTrials,
@@ -377,7 +378,7 @@ class Px4(Autopilot):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds and of the throttle limit FW_THR_MAX.
+        """Rules of airspeeds, of the throttle limit FW_THR_MAX, and of the limits of climb and sink rates.
 
         A speed outside FW_AIRSPD_MIN and FW_AIRSPD_MAX is replaced by the nearest limit.
         """
@@ -390,7 +391,12 @@ class Px4(Autopilot):
             cruise_parameter="FW_AIRSPD_TRIM",
             max_throttle=max_throttle,
             max_throttle_name=f"FW_THR_MAX {max_throttle:g}" if max_throttle < 1.0 else "",
+            climb_limit=self._rate_limit("FW_T_CLMB_R_SP", "FW_T_CLMB_MAX"),
+            sink_limit=self._rate_limit("FW_T_SINK_R_SP", "FW_T_SINK_MAX"),
         )
+
+    def _rate_limit(self, *names: str) -> RateLimit:
+        return RateLimit.of_parameters(**{name: self.parameters[name] for name in names})
 
     @property
     def returns(self) -> ReturnBehaviour:
@@ -516,8 +522,8 @@ class Px4(Autopilot):
             radius_name="NAV_LOITER_RAD",
             steers_to_center=True,
             holds_height=True,
-            max_climb_rate=min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
-            max_sink_rate=min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
+            max_climb_rate=self.speeds.climb_limit.rate,
+            max_sink_rate=self.speeds.sink_limit.rate,
             altitude_tolerance=parameters["NAV_FW_ALT_RAD"],
             ends_in_circle=True,
         )

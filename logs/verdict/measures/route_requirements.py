@@ -666,24 +666,20 @@ def tighter_turn_limit(requirements: RouteRequirements, i: int, aircraft_limit: 
     return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
 
 
-def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Return the tighter limit on a leg's climb or dive, rad, positive, and its source.
-
-    The dive limit applies to a descending leg, the climb limit to every other leg.
-    """
-    return _tighter_slope_limit(requirements, leg, is_climb=bool(requirements.slopes[leg] >= 0.0))
-
-
 def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
     """Return the tighter limits on climb and dive along a leg's course, rad, positive."""
     return (
-        _tighter_slope_limit(requirements, leg, is_climb=True)[0],
-        _tighter_slope_limit(requirements, leg, is_climb=False)[0],
+        slope_limit(requirements, leg, is_climb=True)[0],
+        slope_limit(requirements, leg, is_climb=False)[0],
     )
 
 
-def _tighter_slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the tighter limit of scenario and aircraft on a climb or a dive, rad, positive, and its source."""
+def slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool | None = None) -> tuple[float, str]:
+    """Return the tighter limit of scenario and aircraft on a climb or a dive, rad, positive, and its source.
+
+    is_climb: None for the leg's own direction: a dive on a descending leg, a climb on every other leg.
+    """
+    is_climb = bool(requirements.slopes[leg] >= 0.0) if is_climb is None else is_climb
     scenario_limit = requirements.limits.max_climb if is_climb else requirements.limits.max_dive
     aircraft_limit = float((requirements.climb if is_climb else requirements.dive)[leg])
     if scenario_limit is not None and scenario_limit <= aircraft_limit:

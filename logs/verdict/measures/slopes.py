@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_slope
 from flight.simulation.track import THROTTLE
+from logs.verdict.measures.ground_following import demanded_altitudes, follows_ground
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, project_onto_leg
 from logs.verdict.tolerances import (
@@ -189,7 +190,8 @@ class SlopeMeasure:
     """Measured climb or descent of one leg; a field is None if it could not be measured.
 
     slope: measured slope over the ground.
-    height_error: largest distance above the leg's line, m; negative below the line.
+    height_error: largest distance above the leg's line, or above the height over the ground that the leg follows, m;
+        negative below.
     is_short: True if no part of the leg is clear of the blends.
     full_throttle_time, idle_throttle_time: time with the throttle at its limits, s.
     speed_loss, speed_gain: largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
@@ -233,8 +235,10 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
     """Return the largest signed altitude error from the leg's line, m, and True for a leg of only blends.
 
     On a leg without any part clear of the slope blends, the error is taken between the turns; it is None if no row lies
-    between the turns.
+    between the turns.  On a leg that follows the ground, the error is from the altitude above the ground there.
     """
+    if follows_ground(requirements, leg):
+        return _ground_following_error(requirements, leg, position), False
     distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
     is_inside = (distance_along >= span_start) & (distance_along <= span_end)
@@ -247,6 +251,16 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
     line_altitudes = requirements.points[leg, 2] + distance_along[is_inside] * math.tan(requirements.slopes[leg])
     height_errors = position[is_inside, 2] - line_altitudes
     return float(height_errors[np.argmax(np.abs(height_errors))]), is_short
+
+
+def _ground_following_error(requirements: RouteRequirements, leg: int, position: Floats) -> float | None:
+    """Return the largest signed error between a leg's turns from the height above ground that it demands, m."""
+    distance_along, _ = project_onto_leg(requirements, leg, position)
+    span_start, span_end = straight_span(requirements, leg, 0.0)
+    inside = position[(distance_along >= span_start) & (distance_along <= span_end)]
+    errors = inside[:, 2] - demanded_altitudes(requirements, leg, inside)
+    errors = errors[np.isfinite(errors)]
+    return float(errors[np.argmax(np.abs(errors))]) if errors.size else None
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:

@@ -7,6 +7,7 @@ import numpy as np
 
 from flight.mission.items import Command
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
+from logs.verdict.measures.ground_paths import has_ground_paths, landing_item, takeoff_item
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -22,7 +23,7 @@ from logs.verdict.tolerances import (
 )
 from logs.verdict.wording import place_text_within
 from world.arrays import Floats
-from world.frames import to_geo
+from world.frames import to_geo, to_map
 from world.terrain import Terrain
 
 # Greatest depth below ground of the last row of a flight that hits the ground, m: a tick of 1/60 s at 50 m/s is 0.8 m.
@@ -48,11 +49,14 @@ def clearance_findings(
             at_least=True,
         )
         return [unknown, *_below_home_findings(requirements)]
-    fields_by_leg = _fields_by_leg(requirements)
+    landing = _find_landing(requirements)
+    fields_by_leg = _fields_by_leg(requirements, landing)
     legs, points = requirements.path.legs, requirements.path.points
     heights, off_terrain = _known_heights(terrain, points)
     findings = []
     for leg in range(requirements.legs):
+        if landing is not None and leg == landing.leg and not landing.is_judged_here:
+            continue
         requirement = _Requirement(limit, fields_by_leg.get(leg, ()))
         segments = np.flatnonzero(legs == leg)
         planned_height, required_height = requirement.worst_height(heights[segments], points[segments])
@@ -192,12 +196,49 @@ class _Requirement(NamedTuple):
         return k, float(requirement[k])
 
 
-def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
+class _Landing(NamedTuple):
+    """Landing of a mission.
+
+    leg: number of the final approach.
+    item: number of the mission item.
+    point: landing point (east, north), m.
+    is_judged_here: True if the final approach is judged by this rule, because the landing is flown and judged as such.
+    """
+
+    leg: int
+    item: int
+    point: tuple[float, float]
+    is_judged_here: bool
+
+
+def _find_landing(requirements: RouteRequirements) -> _Landing | None:
+    """Return the landing of a mission; None without a landing, and for a plan without planned ground phases.
+
+    Without a `[landing]` a flight ends in the air, over the landing point at the height of the waypoint before it: this
+    says nothing about the descent, which the rules `landing` and `approach` judge.  In an imported log the descent ends
+    on the ground.
+    """
+    setup, ground = requirements.setup, requirements.ground_phases
+    approach = (setup.ground_phases if ground is None else ground.procedures).approach
+    if approach is not None:
+        return _Landing(approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), True)
+    landing = landing_item(requirements)
+    if landing is None or (setup.source is None and not has_ground_paths(requirements)):
+        return None
+    waypoint, item = landing
+    position = setup.route.positions[waypoint]
+    return _Landing(waypoint - 1, item.seq, (float(position[0]), float(position[1])), False)
+
+
+def _fields_by_leg(
+    requirements: RouteRequirements, landing: _Landing | None
+) -> dict[int, tuple[tuple[float, float], ...]]:
     """Return, by leg number, positions (east, north, m) near which the leg needs less height above ground.
 
-    The leg after a flown take-off has the position of home, and the legs before a flown landing have the landing point.
-    The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no such item.  Only
-    the final approach is included, and the legs after the last waypoint that keeps the required height above ground.
+    The leg after a take-off that was flown or logged has the position of home, and the legs before a landing have the
+    landing point.  The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no
+    such item.  Only the final approach is included, and the legs after the last waypoint that keeps the required height
+    above ground.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     procedures = setup.ground_phases if ground is None else ground.procedures
@@ -206,19 +247,44 @@ def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[flo
         fields_of_leg[procedures.take_off.waypoint] = (
             (float(procedures.take_off.home[0]), float(procedures.take_off.home[1])),
         )
-    if procedures.approach is not None:
+    elif (home := _logged_takeoff_home(requirements)) is not None:
+        fields_of_leg = dict.fromkeys(range(takeoff_item(requirements)[0] + 1), (home,))
+    if landing is not None:
         landing_starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
-        sequence_start = max((seq for seq in landing_starts if seq < procedures.approach.item), default=None)
-        first_leg = max(0, procedures.approach.leg - 1)
+        sequence_start = max((seq for seq in landing_starts if seq < landing.item), default=None)
+        first_leg = max(0, landing.leg - 1)
         if sequence_start is not None:
             later_waypoints = np.flatnonzero(setup.route.items > sequence_start)
             first_leg = max(0, int(later_waypoints[0]) - 1) if later_waypoints.size else first_leg
-        point = (float(procedures.approach.point[0]), float(procedures.approach.point[1]))
-        for leg in range(
-            max(first_leg, _last_clear_waypoint(requirements, procedures.approach.leg)), procedures.approach.leg + 1
-        ):
-            fields_of_leg[leg] = (*fields_of_leg.get(leg, ()), point)
+        for leg in range(max(first_leg, _last_clear_waypoint(requirements, landing.leg)), landing.leg + 1):
+            fields_of_leg[leg] = (*fields_of_leg.get(leg, ()), landing.point)
     return fields_of_leg
+
+
+def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float] | None:
+    """Return the position of home (east, north), m, if an imported log flies a mission with a take-off, else None."""
+    setup, home = requirements.setup, requirements.setup.mission.home
+    if setup.source is None or home is None or takeoff_item(requirements)[1] is None:
+        return None
+    east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
+    return float(east), float(north)
+
+
+def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> int:
+    """Return the segment of the track from which the clearance of a leg is judged.
+
+    It is the leg's first segment, or in an imported log with a take-off the segment at which the climb-out from near
+    home reaches `GROUND_LEG_CLEARANCE_M`.
+    """
+    first, last = aligned.leg_segments(leg)
+    home = _logged_takeoff_home(requirements)
+    if home is None or leg > takeoff_item(requirements)[0]:
+        return first
+    is_airborne = aligned.clearance[first:last] >= GROUND_LEG_CLEARANCE_M
+    climbing = int(np.argmax(is_airborne)) if is_airborne.any() else 0
+    places = aligned.track.position[first : first + climbing, :2]
+    is_near_home = np.hypot(places[:, 0] - home[0], places[:, 1] - home[1]) <= FIELD_RADIUS_M
+    return first + climbing if is_near_home.all() else first
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int:
@@ -303,6 +369,7 @@ def _flown_finding(
     terrain, off_text = requirements.setup.scenario.terrain, ""
     first, last = (0, 0) if aligned is None else aligned.leg_segments(leg)
     if aligned is not None and last > first:
+        first = _first_airborne_segment(requirements, aligned, leg)
         clearances = aligned.clearance[first:last]
         is_known = np.isfinite(clearances)
         if is_known.any():

@@ -72,7 +72,10 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkIfBelowHomeAltitude", _check_home_altitude(mission)),
         ("checkGeofence", _check_fence(setup)),
     )
-    findings = [_check_finding(name, list(remarks), refuses) for name, remarks in checks]
+    if setup.autopilot.checks.dialect == "ardupilot":
+        findings = _universal_findings([list(remarks) for _, remarks in checks])
+    else:
+        findings = [_check_finding(name, list(remarks), refuses) for name, remarks in checks]
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
         *findings,
@@ -87,6 +90,28 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
 # if PX4 is to fly.
 REFUSED: Literal["refused"] = "refused"
 _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
+
+
+def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
+    """Return a finding for each of PX4's checks that fails for every autopilot, without PX4's name for it.
+
+    What only PX4 refuses says nothing about a mission that ArduPlane flies.
+    """
+    failures = [[remark for remark in remarks if remark[0] is False] for remarks in remarks_by_check]
+    return [
+        make_finding(
+            "mission",
+            Place("mission", item=item),
+            ok=False,
+            reason=f"{fault.text}{f' (+{len(remarks) - 1} more)' if len(remarks) > 1 else ''}",
+            faults=[fault],
+            source="mission",
+            method="mission items",
+        )
+        for remarks in failures
+        for _, item, reason in remarks[:1]
+        for fault in [reason if isinstance(reason, Message) else message(reason)]
+    ]
 
 
 def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:

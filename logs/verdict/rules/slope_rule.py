@@ -2,11 +2,23 @@
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, finding_reason, make_finding, message
+from aircraft.envelope import ground_slope
+from logs.verdict.findings import (
+    GROUND_FOLLOWING_ERROR,
+    UNKNOWN_AIRCRAFT,
+    Fact,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+)
 from logs.verdict.measures.acceptance import step_height
+from logs.verdict.measures.ground_following import follows_ground, steepest_ground
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -20,11 +32,13 @@ from logs.verdict.tolerances import (
     HEIGHT_ERROR_LIMIT_M,
     LEVEL_SLOPE_RAD,
     MIN_LEG_LENGTH_M,
+    NEGLIGIBLE_STEP_M,
     PLAN_TOLERANCE_RAD,
     SATURATED_TIME_S,
     SHORT_LEG_HEIGHT_ERROR_LIMIT_M,
     SLOPE_TOLERANCE_RAD,
     SPEED_TOLERANCE_MPS,
+    UNDECIDED_FRACTION,
 )
 from logs.verdict.wording import place_text
 from world.wind import W20
@@ -61,26 +75,26 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
+    ground = None if faults else _steep_ground(requirements, leg, measure)
+    if ground is not None:
+        planned_slope, limit, source = ground.slope, ground.limit, ground.source
+        sign = math.copysign(1.0, planned_slope)
+        faults = [_steep_ground_message(requirements, leg, ground)]
     # A fault of the plan states the planned slope itself.
     facts = facts if faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
-        performance_faults = _performance_faults(requirements, leg, measure)
-        flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
-        facts += [text for name, text in _flown_facts(requirements, measure) if name not in flown_faults]
-        # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
-        # on the leg is only reported.
-        facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
-        faults += performance_faults if requirements.envelope else [*flown_faults.values(), *performance_faults]
-        fit = measure.slope
-        method = "not flown"
+        flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
+        faults, facts = faults + flown_faults, facts + flown_facts
+        fit = measure.slope if ground is None else None
+        method = "not flown" if ground is None else "route"
         if fit is not None:
             method_text = "least squares" if fit.is_fitted else "least squares, short leg,"
             method = f"{method_text} over {fit.length:.0f} m"
     ok: bool | None = not faults
     check = ""
-    uncertainty = _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
+    uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
     if not faults and uncertainty:
         ok, check = None, UNKNOWN_AIRCRAFT
     facts = [uncertainty, *facts] if uncertainty else facts
@@ -108,6 +122,24 @@ def _leg_finding(
     )
 
 
+def _flown_messages(
+    requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
+) -> tuple[list[Message], list[str]]:
+    """Return the faults of a leg as flown, and facts.
+
+    If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error on
+    the leg is only reported.
+    """
+    performance_faults = _performance_faults(requirements, leg, measure) + _rate_limit_faults(
+        requirements, leg, measure
+    )
+    flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
+    facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
+    if requirements.envelope:
+        return performance_faults, facts + [fault.brief for fault in flown_faults.values()]
+    return [*flown_faults.values(), *performance_faults], facts
+
+
 def _planned_slope_messages(
     requirements: RouteRequirements, leg: int, limit: float, source: str
 ) -> tuple[list[Message], list[str]]:
@@ -126,27 +158,89 @@ def _planned_slope_messages(
     return faults + _steep_arc_faults(requirements, leg), facts
 
 
+class _SteepGround(NamedTuple):
+    """Ground that a leg follows and that is steeper than the aircraft or its autopilot can fly.
+
+    slope, length, excess: as in `GroundSlope`.
+    limit: rad, positive.
+    source: source of the limit: "scenario", "aircraft" or "autopilot".
+    name: parameter of the autopilot with its value; "" for the other sources.
+    """
+
+    slope: float
+    length: float
+    excess: float
+    limit: float
+    source: str
+    name: str
+
+
+def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
+    """Return the ground that a leg cannot follow; None if the height that is missed is negligible.
+
+    A flight decides by the height above ground that it missed, and is limited by the autopilot's rates, too.  Where the
+    ground falls away faster than the aircraft can descend, the aircraft is only higher than the leg demands: the
+    verdict states that height, and it is no fault.
+    """
+    if not follows_ground(requirements, leg):
+        return None
+    if measure is not None and (measure.height_error is None or measure.height_error >= -_height_error_limit(measure)):
+        return None
+    (limit, source), name = slope_limit(requirements, leg, is_climb=True), ""
+    if measure is not None:
+        rate_slope, rate_name = _rate_limit_slope(requirements, leg, is_climb=True)
+        limit, source, name = (rate_slope, "autopilot", rate_name) if rate_slope < limit else (limit, source, name)
+    ground = steepest_ground(requirements, leg, limit)
+    if ground is None or ground.excess <= NEGLIGIBLE_STEP_M:
+        return None
+    return _SteepGround(*ground, limit, source, name)
+
+
+def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _SteepGround) -> Message:
+    """Return a message on ground that a leg cannot follow, and on the limit."""
+    limit_text = f"{ground.name} permits a climb of {math.degrees(ground.limit):.1f}°"
+    if not ground.name:
+        limit_text = _limit_text(requirements, leg, ground.limit, ground.source, is_climb=True)
+    brief = (
+        f"leg {requirements.leg(leg).number} follows the ground up {math.degrees(ground.slope):.1f}°"
+        f" for {_distance_text(ground.length)}"
+    )
+    rest = f"; {limit_text}, so that it misses the height over the ground by up to {ground.excess:.0f} m"
+    return message(brief, rest, placed=True)
+
+
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     """Explain why an uncertain aircraft model leaves a slope undecided; return "" if it is decided.
 
     Only the aircraft's own limits are considered: a tighter limit of the scenario says nothing about its ability.
     """
     planned_slope, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
-    limits, certain_limits, verb, deviation = (
-        (requirements.climb, requirements.certain_climb, "climbs", envelope.climb_sd)
+    limits, certain_limits, verb = (
+        (requirements.climb, requirements.certain_climb, "climbs")
         if planned_slope >= 0.0
-        else (requirements.dive, requirements.certain_dive, "descends", envelope.descent_sd)
+        else (requirements.dive, requirements.certain_dive, "descends")
     )
     limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
     # Without the aircraft's limits there is no uncertain limit.
     if abs(planned_slope) <= max(LEVEL_SLOPE_RAD, certain_limit) or not certain_limit < limit < math.inf:
         return ""
-    angles = abs(planned_slope), limit, deviation, certain_limit
+    angles = abs(planned_slope), limit, _limit_deviation(requirements, leg, limit, certain_limit), certain_limit
     slope, limit_deg, deviation_deg, certain_deg = (math.degrees(angle) for angle in angles)
     return (
         f"{verb} {slope:.1f}°; the limit according to {envelope.source} is {limit_deg:.1f}° ± {deviation_deg:.1f}°, so"
         f" only {certain_deg:.1f}° is certain"
     )
+
+
+def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
+    """Return the standard deviation of an uncertain aircraft's limit (rad), over the ground like the limit itself.
+
+    It is the deviation in still air if the certain part of the limit (rad) ends at 0.
+    """
+    envelope = requirements.setup.envelope
+    if certain_limit <= 0.0:
+        return envelope.climb_sd if float(requirements.slopes[leg]) >= 0.0 else envelope.descent_sd
+    return (limit - certain_limit) / UNDECIDED_FRACTION
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
@@ -169,7 +263,7 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
     certain_limit = float((requirements.certain_climb if is_climb else requirements.certain_dive)[leg])
     if source != "aircraft" or not certain_limit < limit:
         return ""
-    deviation = math.degrees(envelope.climb_sd if is_climb else envelope.descent_sd)
+    deviation = math.degrees(_limit_deviation(requirements, leg, limit, certain_limit))
     return (
         f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) {math.degrees(certain_limit):.1f}° is certain"
     )
@@ -223,7 +317,10 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
     airspeed = float(requirements.route.leg_airspeeds[leg])
     if source == "aircraft" and (no_progress_text := _no_progress_text(requirements, leg)):
         return message(no_progress_text, f"; leg {number} {verb} {slope_text} at {airspeed:.0f} m/s")
-    limit_texts = [_limit_text(requirements, leg, limit, source), _certain_limit_text(requirements, leg, limit, source)]
+    limit_texts = [
+        _limit_text(requirements, leg, limit, source, is_climb=planned_slope >= 0.0),
+        _certain_limit_text(requirements, leg, limit, source),
+    ]
     return message(f"leg {number} {verb} {slope_text}", f"; {'; '.join(filter(None, limit_texts))}", placed=True)
 
 
@@ -247,7 +344,7 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
     return ""
 
 
-def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
+def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, is_climb: bool) -> str:
     """Describe the limit on a leg's slope (rad) and, for the aircraft's own limit, the influence of the wind."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
@@ -260,7 +357,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
-    calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if requirements.slopes[leg] >= 0.0 else 1]
+    calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if is_climb else 1]
     wind_text = f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
     if abs(crosswind) > abs(tailwind):
         wind_text = f"{abs(crosswind):.0f} m/s crosswind"
@@ -289,13 +386,14 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
     )
 
 
-def _flown_facts(requirements: RouteRequirements, measure: SlopeMeasure) -> list[tuple[str, str]]:
+def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[tuple[str, str]]:
     """Return texts on how a leg was flown, each with the name of its quantity: (name, text)."""
     facts = []
     if measure.slope is not None:
         facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of the leg"))
+        line = "the leg's height over the ground" if follows_ground(requirements, leg) else "the leg"
+        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of {line}"))
     facts += [
         (name, f"{_throttle_text(requirements, name)} for {duration:.0f} s")
         for name, duration, _, _ in _throttle_times(measure)
@@ -308,7 +406,8 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
     """Return the measurements of a flown leg as facts."""
     if measure is None:
         return []
-    facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
+    error_name = GROUND_FOLLOWING_ERROR if follows_ground(requirements, leg) else "height error"
+    facts = [] if measure.height_error is None else [Fact(error_name, measure.height_error, "m")]
     if measure.slope is not None:
         error = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
         facts.append(Fact("slope error", error, "deg"))
@@ -341,12 +440,11 @@ def _flown_faults(
             )
         elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
-    if measure.height_error is not None:
-        error = abs(measure.height_error)
-        max_height_error = SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
-        if error > max_height_error:
-            side = "above" if measure.height_error > 0.0 else "below"
-            faults["height"] = message(f"{error:.0f} m {side} the leg", f" (at most {max_height_error:.0f} m)")
+    if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
+        side = "above" if measure.height_error > 0.0 else "below"
+        line = "its height over the ground" if follows_ground(requirements, leg) else "the leg"
+        limit_text = f" (at most {_height_error_limit(measure):.0f} m)"
+        faults["height"] = message(f"{abs(measure.height_error):.0f} m {side} {line}", limit_text)
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
@@ -383,6 +481,48 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
             f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
             f" it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
+            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
+        )
+    ]
+
+
+def _height_error_limit(measure: SlopeMeasure) -> float:
+    """Return the largest height error of a leg that is no fault, m."""
+    return SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
+
+
+def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
+    """Return the slope over the ground at the autopilot's climb or sink limit on a leg, rad, and the limit's name.
+
+    The slope is infinite without a limit, and in an imported flight whose log does not state the parameter.
+    """
+    setup = requirements.setup
+    rate_limit = setup.autopilot.speeds.climb_limit if is_climb else setup.autopilot.speeds.sink_limit
+    parameters = setup.autopilot.parameters
+    stated_names = {} if parameters is None else parameters.by_origin("file")
+    if not rate_limit.name or (setup.source is not None and rate_limit.name.split(" ")[0] not in stated_names):
+        return math.inf, ""
+    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
+    slope = ground_slope(math.asin(min(1.0, rate_limit.rate / speed)), speed, *wind)
+    return (math.inf if math.isnan(slope) else slope), rate_limit.name
+
+
+def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
+    """Return a fault if the autopilot's climb or sink limit is below a leg's slope, and the flight shows the miss."""
+    planned_slope = float(requirements.slopes[leg])
+    sign = 1.0 if planned_slope >= 0.0 else -1.0
+    slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)
+    if (
+        slope >= abs(planned_slope) - ABILITY_TOLERANCE_RAD
+        or measure.height_error is None
+        or -sign * measure.height_error <= _height_error_limit(measure)
+    ):
+        return []
+    speed = float(requirements.route.leg_airspeeds[leg])
+    return [
+        message(
+            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s",
             f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]

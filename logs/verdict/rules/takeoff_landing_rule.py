@@ -15,7 +15,7 @@ from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.rule import Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
@@ -54,6 +54,9 @@ def takeoff_findings(
     if waypoint == 0 or not has_own_position:
         reason = f"to {altitude:.0f} m AMSL over home, on a course that the autopilot chooses"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
+    source = requirements.setup.source
+    if source is not None and not source.aircraft_known:
+        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), "the aircraft is not named (--aircraft)")]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
 
@@ -212,4 +215,5 @@ LANDING = Rule(
     name="landing",
     tolerances=("PLAN_TOLERANCE_RAD",),
     judge=landing_findings,
+    log=LogNeeds(needs_aircraft=True),
 )

@@ -87,6 +87,22 @@ def parquet_bytes(log: FlightLog) -> bytes:
     return buffer.getvalue()
 
 
+def battery_voltage(log: FlightLog) -> float:
+    """Return the constant voltage of the battery, V: the aircraft's, or the mean of the logged energy and current.
+
+    Returns NaN for an aircraft without a battery.
+
+    >>> from logs.recording.example_log import example_log
+    >>> round(battery_voltage(example_log()), 3)  # 5 A and 180 W
+    36.0
+    """
+    if log.setup.envelope.volts > 0.0:
+        return log.setup.envelope.volts
+    track = log.track
+    charge = float(np.sum(np.diff(track.time) * track.current[1:].astype(np.float64)))  # As
+    return float(track.energy[-1] - track.energy[0]) * 3600.0 / charge if charge > 0.0 else np.nan
+
+
 # ----------------------------------------------------------------------
 # A flight as a PX4 log (`.ulg`): topics and fields as in PX4's "ULog File Format", which pyulog cannot write from
 # scratch.
@@ -299,17 +315,12 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
 
 
 def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
-    """Return the values of battery_status by field.
-
-    The voltage is constant: the mean that follows from logged energy and current.
-    """
+    """Return the values of battery_status by field."""
     time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
     energy = log.track.energy[rows].astype(np.float64)
     charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As
-    total_charge = float(charge[-1]) if len(rows) else 0.0
-    volts = float(energy[-1] - energy[0]) * 3600.0 / total_charge if total_charge > 0.0 else np.nan
     return {
-        "voltage_v": np.full(len(rows), volts),
+        "voltage_v": np.full(len(rows), battery_voltage(log)),
         "current_a": current,
         "discharged_mah": charge / 3.6,
         "remaining": np.clip(1.0 - energy / log.setup.battery, 0.0, 1.0),

@@ -31,6 +31,7 @@ from flight.simulation.local_map import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import EPOCH_NS
+from logs.views.exports.log_files import battery_voltage
 
 # Time before each frame.
 _STAMP = struct.Struct(">Q")
@@ -85,6 +86,7 @@ def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
     start = snapshots.start_snapshot(setup)
     home = setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
+    status.volts = battery_voltage(log)
     status.total, items = len(setup.mission.items), setup.route.items
     number_by_seq = {item.seq: k for k, item in enumerate(setup.mission.items, 1)}
     due_times = {"HEARTBEAT": 0.0, **dict.fromkeys(PERIODS, 0.0)}

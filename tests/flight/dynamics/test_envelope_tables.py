@@ -4,7 +4,7 @@ import json
 import math
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import pytest
 import flight.dynamics.envelope_tables
 from aircraft.catalog import load_aircraft, model_hash, read_aircraft
 from aircraft.envelope import Envelope
+from aircraft.uncertainty import Uncertainty
 from flight.dynamics.envelope_tables import _level_speed_range, cache_file, compute_tables, load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import Trim
@@ -245,3 +246,17 @@ def test_a_command_that_moves_nothing_is_the_stated_reason(name: str, tmp_path: 
     with pytest.raises(FlightError, match=f"{command}, the {name}'s command, has no effect: no force") as caught:
         compute_tables(aircraft, False)
     assert str(caught.value).startswith(f"{aircraft.model_file}: ")
+
+
+@pytest.mark.parametrize(
+    ("source", "stated", "expected"), [("a data sheet", 16.0, 16.0), ("flight logs", 16.0, 15.904)]
+)
+def test_the_stated_stall_speed_of_a_data_sheet_is_the_slowest_level_flight(
+    source: str, expected: float, computed: dict[bool, Envelope], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """16 m/s EAS at 2000 m, where the standard atmosphere has 0.8217 of the density at sea level, are 17.65 m/s."""
+    monkeypatch.setattr(flight.dynamics.envelope_tables, "read_uncertainty", lambda _: Uncertainty(source, 0.05, 0.05))
+    found = load_envelope(replace(AEROSONDE, stall_speed=16.0))
+    assert found.level_speeds(0.0)[0] == pytest.approx(expected, abs=1e-3)
+    assert found.level_speeds(2000.0)[0] == pytest.approx(expected / math.sqrt(0.8217), rel=2e-3)
+    assert found.level_speeds(0.0)[1] == computed[False].level_speeds(0.0)[1]

@@ -44,7 +44,7 @@ class FakeVehicle:
         )
         self.shown: list[str] = []
         self.flyable = True
-        self.vehicle = Vehicle(self.link, lambda: ours, parameters, Standby(snapshot, home), 200.0, self.show)
+        self.vehicle = Vehicle(self.link, lambda: ours, parameters, Standby(snapshot, home), 200.0, 14.8, self.show)
         self.orders: list[object] = []
 
     def show(self, text: str) -> None:

@@ -114,7 +114,7 @@ FLYING = Snapshot(
     energy=50.0,
     leg=1.0,
 )
-STATUS = Status(FLYING, Home(46.5, -8.25, 500.0), battery=200.0, mode=AUTO, flying=True)
+STATUS = Status(FLYING, Home(46.5, -8.25, 500.0), battery=200.0, volts=14.8, mode=AUTO, flying=True)
 
 
 def test_positions_and_speeds_have_the_messages_units() -> None:
@@ -125,9 +125,16 @@ def test_positions_and_speeds_have_the_messages_units() -> None:
     hud = telemetry_message("VFR_HUD", STATUS)
     assert (hud.groundspeed, hud.throttle, hud.climb) == (5.0, 62, 0.5)
     battery = telemetry_message("SYS_STATUS", STATUS)
-    assert (battery.battery_remaining, battery.current_battery) == (75, 1200)
+    assert (battery.battery_remaining, battery.voltage_battery, battery.current_battery) == (75, 14_800, 1200)
     wind = telemetry_message("WIND", STATUS)
     assert (abs(wind.direction), wind.speed) == (180.0, 1.0)  # it blows north, from the south
+
+
+@pytest.mark.parametrize("volts", [0.0, float("nan")])
+def test_without_a_battery_neither_voltage_nor_current_is_measured(volts: float) -> None:
+    """MAVLink's SYS_STATUS: voltage UINT16_MAX and current -1 are "not sent by autopilot"."""
+    battery = telemetry_message("SYS_STATUS", replace(STATUS, volts=volts))
+    assert (battery.voltage_battery, battery.current_battery) == (65535, -1)
 
 
 @pytest.mark.parametrize("name", ["HEARTBEAT", *PERIODS])

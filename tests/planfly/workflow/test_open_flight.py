@@ -120,7 +120,7 @@ def test_export_writes_the_fence_that_is_named(mission: Path) -> None:
     Path("mill.geojson").write_text(feature(650.0), encoding="ascii")
     options = ["--fence", "a.fence", "--fence", "mill.geojson"]
     assert main(["export", str(mission), "out.plan", "out.fence", *options]) == 0
-    items = read_fence(Path("out.fence"))
+    items = read_fence(Path("out.fence")).fences
     assert [item.command for item in items] == [5004, 5002, 5002, 5002, 5002]
     # A .plan has its polygons before its circles.
     assert [replace(item, seq=0) for item in read_mission(Path("out.plan")).fences] == [
@@ -138,7 +138,7 @@ def test_export_of_a_plan_adds_the_fence_to_area_and_threats(mission: Path) -> N
     Path("a.fence").write_text(circle(0.0), encoding="ascii")
     assert main(["export", str(plan), "without.fence"]) == 0
     assert main(["export", str(plan), "with.fence", "with.kml", "--fence", "a.fence"]) == 0
-    without, with_it = read_fence(Path("without.fence")), read_fence(Path("with.fence"))
+    without, with_it = read_fence(Path("without.fence")).fences, read_fence(Path("with.fence")).fences
     assert with_it[: len(without)] == without
     assert [(item.command, item.params[0]) for item in with_it[len(without) :]] == [(5004, RADIUS)]
 
@@ -191,6 +191,22 @@ def test_the_time_of_a_log_is_its_own(mission: Path, capsys: pytest.CaptureFixtu
 def test_a_file_that_holds_no_fence_is_named(mission: Path) -> None:
     with pytest.raises(MissionError, match=r"leg\.waypoints: contains no fence"):
         read_named_fences([str(mission)])
+
+
+RALLY = "QGC WPL 110\n0 1 0 16 0 0 0 0 {home} 300 1\n1 0 3 5100 0 0 0 0 36.51 -84.2 80 1\n"
+
+
+def test_a_file_of_rally_points_is_accepted_beside_a_fence(mission: Path) -> None:
+    """As Mission Planner writes it, with a home line, and as planfly exports it, without."""
+    Path("rally.waypoints").write_text(RALLY.format(home="36.5 -84.2"), encoding="ascii")
+    Path("a.fence").write_text(circle(0.0), encoding="ascii")
+    options = {"fence": ["rally.waypoints", "a.fence"]}
+    opened = open_flight(str(mission), options).mission
+    assert [(point.command, point.lat_deg, point.alt) for point in opened.rally] == [(5100, 36.51, 80.0)]
+    assert [item.command for item in opened.fences] == [5004]
+    assert main(["export", str(mission), "out.rally", "--fence", "rally.waypoints"]) == 0
+    again = open_flight(str(mission), {"fence": ["out.rally", "rally.waypoints"]}).mission
+    assert [(point.seq, point.lat_deg, point.alt) for point in again.rally] == [(0, 36.51, 80.0), (1, 36.51, 80.0)]
 
 
 # ----------------------------------------------------------------------

@@ -83,6 +83,15 @@ def test_an_aircraft_that_is_not_named_has_no_limits(tmp_path: Path) -> None:
     assert outcome(flight, "corridor") == [True, True]
 
 
+def test_a_landing_of_an_aircraft_that_is_not_named_has_no_limit(tmp_path: Path) -> None:
+    raw = example_raw_log()
+    found = raw.missions[-1]
+    *items, last = found.mission.items
+    landing = replace(found.mission, items=(*items, replace(last, command=21, alt=last.alt - 20.0)))
+    landing_log = replace(raw, missions=(*raw.missions[:-1], replace(found, mission=landing)))
+    assert reasons(judged(tmp_path, landing_log), "landing") == {"the aircraft is not named (--aircraft)"}
+
+
 @pytest.mark.parametrize(("datum", "judged_by"), [("unstated", False), ("ellipsoid", False), ("amsl", True)])
 def test_heights_of_another_datum_are_not_held_against_the_plans(tmp_path: Path, datum: str, judged_by: bool) -> None:
     flight = judged(tmp_path, replace(example_raw_log(), datum=datum), AEROSONDE)  # type: ignore[arg-type]

@@ -2,19 +2,23 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import FlightSetup, Heights, ImportedLog
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import FLIGHT
+from logs.verdict.rules.clearance_rule import clearance_findings
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
 from tests.logs.verdict.rules.test_climbout_approach_rule import with_arduplane
 from tests.mission_lines import setup_of, wp
@@ -26,6 +30,7 @@ from tests.synthetic import (
     make_setup,
 )
 from world.airfield import LandingStrip
+from world.arrays import Floats
 from world.errors import ScenarioError
 from world.scenario_file import parse_scenario
 from world.terrain import make_gridded_terrain
@@ -226,3 +231,45 @@ def test_less_height_is_asked_for_near_a_field_only_after_the_last_high_waypoint
     assert (low[2].limit_source, low[3].limit_source) == ("default", "near the field")
     high = judged(100.0, 60.0, 30.0)
     assert [high[k].limit for k in sorted(high)] == [100.0, 20.0, 20.0, 20.0]
+
+
+@pytest.mark.parametrize(("last", "low_legs"), [(22.0, []), (18.0, [1])])
+def test_the_leg_to_a_landing_that_is_not_flown_needs_no_height(last: float, low_legs: list[int]) -> None:
+    """Without a [landing] 30 m are required, 20 m near the field, and nothing of the descent to NAV_LAND."""
+    lines = (wp(0, 3000, 60), wp(0, 1500, 60), wp(0, 800, last), wp(0, 300, 0, command=21))
+    verdict = judge_geometry(with_arduplane(setup_of(*lines, home="36.5 -84.2 100")))
+    found = {one.place.index: one for one in verdict.findings if one.rule == "clearance"}
+    assert sorted(found) == [0, 1]
+    assert [k for k, one in found.items() if not one.ok] == low_legs
+    assert {one.ok for one in verdict.findings if one.rule in ("landing", "approach")} == {True}
+
+
+def logged(setup: FlightSetup) -> FlightSetup:
+    """The same mission, flown in an imported log by a named aircraft."""
+    source = ImportedLog("a.tlog", "", "telemetry log", heights=Heights("GPS", "amsl"), aircraft_known=True)
+    return replace(setup, source=source)
+
+
+def test_the_take_off_and_the_landing_of_a_log_need_no_height() -> None:
+    """It climbs from the ground within 400 m of home, and touches down at the landing point."""
+    take_off = "3 22 15 0 0 0 0 0 50"
+    lines = (take_off, wp(0, 3000, 60), wp(0, 5000, 60), wp(3000, 5000, 60), wp(4000, 5000, 0, command=21))
+    setup = logged(setup_of(*lines, home="36.5 -84.2 100"))
+    legs = setup.route.positions
+    runs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(legs[:, :2], axis=0).T))])
+
+    def judged(up: Callable[[Floats], Floats]) -> dict[int, Finding]:
+        track = fly_path(setup, up=up)
+        aligned = align_track(route_requirements(setup), track)
+        findings = clearance_findings(route_requirements(setup), aligned)
+        return {one.place.index or 0: one for one in findings}
+
+    def grounded(s: Floats) -> Floats:
+        return -50.0 * np.clip(1.0 - s / 400.0, 0.0, 1.0) - 60.0 * np.clip((s - runs[-2]) / 900.0, 0.0, 1.0)
+
+    assert [one.ok for _, one in sorted(judged(grounded).items())] == [True, True, True]
+    # 25 m above ground pass near home, where 20 m are enough, and not 2.5 km from it.
+    assert judged(lambda s: grounded(s) + bump(1200.0, -28.0, 50.0)(s))[0].ok
+    assert judged(lambda s: grounded(s) + bump(2500.0, -32.0, 50.0)(s))[0].ok is False
+    # Once it has climbed, it may not come back to the ground.
+    assert judged(lambda s: grounded(s) + bump(1200.0, -45.0, 50.0)(s))[0].ok is False

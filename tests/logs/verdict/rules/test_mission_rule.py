@@ -576,3 +576,15 @@ def test_items_behind_the_missions_end_are_never_reached(
     """`verify_command` of an RTL and of a loiter without end never returns true; marks are reached by other ways."""
     found = [one for one in mission_findings(setup_of(*lines)) if "is never reached" in one.reason]
     assert [(one.place.item, one.ok) for one in found] == ([] if item is None else [(item, ok)])
+
+
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_px4s_rules_are_not_cited_where_arduplane_flies(case: str) -> None:
+    """What no autopilot accepts fails all the same."""
+    _, lines, item, words = REFUSED[case]
+    verdict = judge_geometry(replace(setup_of(*lines), autopilot=ArduPlane(ArduPilotParameters.defaults())))
+    found = [one for one in verdict.findings if one.rule == "mission" and words in one.reason and one.ok is not None]
+    assert [(one.ok, one.place.item) for one in found] == ([(False, item)] if case in NOBODY else [])
+    # An item that only ArduPlane refuses is said to be accepted by PX4.
+    lines = [*verdict.lines, *(one.reason + one.limit_source for one in verdict.findings)]
+    assert not [line for line in lines if "PX4" in line.replace("PX4 accepts it", "")]

@@ -340,6 +340,23 @@ def test_a_scenarios_tighter_limit_does_not_make_the_aircraft_known() -> None:
             assert "the limit according to a data sheet is 13.7° ± 3.0°" in item.reason
 
 
+@pytest.mark.parametrize("from_deg", [0.0, 180.0])
+def test_the_deviation_that_is_told_is_over_the_ground_as_the_limit_is(from_deg: float) -> None:
+    """From tan g = V sin a / (V cos a + w), w = 10 m/s: the limit less 1.645 deviations is what is certain."""
+    wind = {"speed_mps": 10.0, "from_deg": from_deg}
+    tail = -10.0 * math.cos(math.radians(from_deg))
+
+    def over_ground(air_deg: float) -> float:
+        angle = math.radians(air_deg)
+        return math.degrees(math.atan2(25.0 * math.sin(angle), 25.0 * math.cos(angle) + tail))
+
+    limit, certain = over_ground(13.7), over_ground(13.7 - 1.645 * 3.0)
+    slope = 0.5 * (limit + certain)
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(slope)], table=unsure(), wind=wind)
+    reason = of(judge_geometry(setup), "slope", leg(1)).reason
+    assert f"is {limit:.1f}° ± {(limit - certain) / 1.645:.1f}°, so only {certain:.1f}° is certain" in reason
+
+
 def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
     # 13.7 less 1.645 x 9 is below 0, where what is sure stops; the deviation does not.
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(climb_sd=9.0))

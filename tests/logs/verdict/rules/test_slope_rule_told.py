@@ -212,3 +212,34 @@ def test_a_climb_into_a_wind_as_strong_as_the_airspeed_makes_no_progress(monkeyp
     diagonal = {"speed_mps": 24.9, "from_deg": 10.0}
     slanting = of(judge_geometry(make_setup(hill(3.0), wind=diagonal)), "slope", leg(1))
     assert "no progress over the ground: 0.1 m/s in 24.5 m/s of headwind and 4.3 m/s of crosswind" in slanting.reason
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("law", "name"),
+    [
+        (ArduPlane(ArduPilotParameters.defaults()), "TECS_{}_MAX"),
+        (Px4(Px4Parameters.defaults("1.17")), "FW_T_{}_R_SP"),
+    ],
+)
+def test_the_autopilots_rate_limit_fails_a_leg_that_it_misses(law: Autopilot, name: str, sign: float) -> None:
+    """Of 25 m/s EAS, 26.2 m/s true at 987 m AMSL and 26.0 at 813 m, 2 m/s are 4.4 degrees and 3 m/s are 6.6.
+
+    The standard atmosphere's density there is 0.909 and 0.924 of that at sea level.
+    """
+    name, speed = name.format("CLMB" if sign > 0.0 else "SINK"), "26.2" if sign > 0.0 else "26.0"
+
+    def judged_with(rate: float, lost: float) -> Finding:
+        """The leg of 5 degrees, flown for 1500 m so that it ends this much (m) short."""
+        autopilot = law.with_parameters(**{name: rate, "FW_AIRSPD_MAX" if "FW" in name else "AIRSPEED_MAX": 30.0})
+        setup = replace(make_setup(hill(sign * 5.0)), autopilot=autopilot)
+        track = fly_path(setup, up=lambda s: -sign * lost * np.clip((s - 1200.0) / 1500.0, 0.0, 1.0))
+        requirements = route_requirements(setup, envelope=True)
+        return slope_findings(requirements, align_track(requirements, track))[1]
+
+    short = judged_with(2.0, 20.0)
+    assert short.ok is False
+    assert f"{name} 2 m/s permits a {'climb' if sign > 0.0 else 'descent'} of 4.4° at {speed} m/s" in short.reason
+    assert judged_with(2.0, 8.0).ok  # within 10 m of the leg
+    assert judged_with(2.0, -20.0).ok  # it does not fall short of the leg
+    assert judged_with(3.0, 20.0).ok  # the limit does not explain it

@@ -12,10 +12,12 @@ from flight.autopilots.px4 import parameters as px4_parameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict import summary
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.waypoint_rule import waypoint_findings
-from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint
+from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of, waypoint
 from tests.synthetic import bank_radius, bump, fly_path, make_setup, waypoint_stations
 
 STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
@@ -165,6 +167,15 @@ def test_the_headline_names_a_waypoint_passed_far_from_its_altitude(errors: tupl
     assert "altitude" in headline or not note
     assert headline.removeprefix("flyable").split("; an aircraft")[0].endswith(note)
     assert ("altitude" in headline) is bool(note)
+
+
+def test_an_undecided_headline_names_that_waypoint_too() -> None:
+    setup = make_setup([[0, 0, 300], [0, 3000, 300], [0, 6000, 300], [0, 9000, 300]])
+    findings = judge(setup, fly_path(setup, up=bump(3000.0, -40.0, 800.0))).findings
+    undecided = make_finding("speed", leg(1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
+    headline = summary.headline([*findings, undecided], flyable=False)
+    assert headline.startswith("not judged in full: airspeed on 1 leg is too close")
+    assert headline.endswith("; waypoint 1 (item 1) passed 40 m below its altitude")
 
 
 @pytest.mark.parametrize(("aside", "ok", "margin"), [(15.0, True, 5.0), (30.0, False, -10.0)])

@@ -92,8 +92,7 @@ def tlog(log: FlightLog, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-@pytest.fixture(scope="module")
-def messages(tlog: Path) -> list[Any]:
+def read_messages(tlog: Path) -> list[Any]:
     """Every message, as MAVExplorer and MAVProxy read them."""
     from pymavlink import mavutil
 
@@ -103,6 +102,11 @@ def messages(tlog: Path) -> list[Any]:
         found.append(message)
     reader.close()
     return found
+
+
+@pytest.fixture(scope="module")
+def messages(tlog: Path) -> list[Any]:
+    return read_messages(tlog)
 
 
 def of(messages: list[Any], kind: str) -> list[Any]:
@@ -154,6 +158,23 @@ def test_our_own_reader_opens_the_tlog(tlog: Path, log: FlightLog) -> None:
     assert raw.vehicle == "plane"
     assert len(raw.missions[-1].mission.items) == len(log.setup.mission.items)
     assert raw.series["position"].time[-1] - raw.series["position"].time[0] == pytest.approx(log.end_time, abs=0.2)
+
+
+@pytest.mark.parametrize("stated", [14.8, 0.0])
+def test_every_log_states_the_voltage_with_which_the_current_is_the_power(
+    log: FlightLog, stated: float, tmp_path: Path
+) -> None:
+    """A stated voltage of 14.8 V is written; without one it follows from 74 W and 5 A."""
+    time = np.asarray(log.track.time)
+    values = {"current": np.full(len(time), 5.0), "energy": 74.0 * time / 3600.0}
+    columns = {name: getattr(log.track, name) for name in Track.__dataclass_fields__} | values
+    limits = replace(log.setup.limits, envelope=replace(log.setup.envelope, volts=stated))
+    powered = replace(log, track=Track(**columns), setup=replace(log.setup, limits=limits))
+    (tmp_path / "flight.tlog").write_bytes(telemetry_bytes(powered))
+    written = of(read_messages(tmp_path / "flight.tlog"), "SYS_STATUS")
+    assert {(message.voltage_battery, message.current_battery) for message in written} == {(14_800, 500)}
+    found = ULog(io.BytesIO(px4_log_bytes(powered))).get_dataset("battery_status").data
+    assert found["voltage_v"] * found["current_a"] == pytest.approx(74.0, rel=1e-5)
 
 
 # ----------------------------------------------------------------------

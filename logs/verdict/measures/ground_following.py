@@ -1,0 +1,75 @@
+"""Measure legs that follow the ground: the altitude that they demand, and the slopes of this demand."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flight.guidance.path import GROUND_STEP_M
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.track_alignment import project_onto_leg
+from world.arrays import Floats
+
+
+class GroundSlope(NamedTuple):
+    """Part of a leg on which the ground that it follows rises more steeply than a limit.
+
+    slope: mean slope of the part, rad.
+    length: m.
+    excess: height by which an aircraft that climbs at the limit is below the demand at the end of the part, m.
+    """
+
+    slope: float
+    length: float
+    excess: float
+
+
+def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
+    """Return True if a leg demands a height above ground, and the ground is known."""
+    return requirements.setup.scenario.terrain is not None and math.isfinite(
+        float(requirements.setup.route.points["above_ground"][leg + 1])
+    )
+
+
+def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Floats) -> Floats:
+    """Return the altitude that a leg which follows the ground demands at positions, m AMSL, (n,).
+
+    The height above ground changes linearly along the leg, as in `flight.guidance.path.fly_by_path`.  The altitude is
+    NaN where the ground is unknown.
+
+    positions: (n, 2) or more columns, m.
+    """
+    terrain = requirements.setup.scenario.terrain
+    if terrain is None:
+        return np.full(len(positions), math.nan)
+    start, end_height = requirements.points[leg], float(requirements.setup.route.points["above_ground"][leg + 1])
+    start_height = float(start[2]) - float(terrain.height(start[0], start[1]))
+    start_height = start_height if math.isfinite(start_height) else end_height
+    distance, _ = project_onto_leg(requirements, leg, positions)
+    fraction = np.clip(distance / max(float(requirements.runs[leg]), 1.0), 0.0, 1.0)
+    ground = np.asarray(terrain.height(positions[:, 0], positions[:, 1]), dtype=np.float64)
+    return ground + start_height + fraction * (end_height - start_height)
+
+
+def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
+    """Return the part of a leg on whose demand an aircraft falls furthest below that climbs at most at a slope, rad.
+
+    The ground is sampled at steps of `GROUND_STEP_M`, as ArduPlane's terrain data.  Return None if every part of the
+    leg is within the limit.
+    """
+    start, unit, run = requirements.points[leg, :2], requirements.leg_unit(leg), float(requirements.runs[leg])
+    distance = np.append(np.arange(0.0, run, GROUND_STEP_M), run)
+    altitude = demanded_altitudes(requirements, leg, start + distance[:, None] * unit)
+    is_known = np.isfinite(altitude)
+    distance, altitude = distance[is_known], altitude[is_known]
+    if len(distance) < 2 or not math.isfinite(limit):
+        return None
+    # Height above a path at the limit: its largest rise is the excess.
+    height = altitude - distance * math.tan(limit)
+    rise = height - np.minimum.accumulate(height)
+    end = int(np.argmax(rise))
+    if rise[end] <= 0.0:
+        return None
+    begin = int(np.argmin(height[: end + 1]))
+    length = float(distance[end] - distance[begin])
+    return GroundSlope(math.atan2(float(altitude[end] - altitude[begin]), length), length, float(rise[end]))
