@@ -1,14 +1,21 @@
 """Forecast of the wind, as its file states it, and the wind of a mission made from it."""
 
+import math
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
+import numpy as np
+
 from world.arrays import Floats
 from world.forecast.wind_field import WindField
 
+# Length of a degree of a great circle, km.
+_KM_PER_DEGREE = 111.2
 # Age at the departure after which a forecast is called old.
 OLD_AGE = timedelta(hours=12)
+# Longest step between two times between which the wind is interpolated.  Models state every hour to every 6 hours.
+LONGEST_STEP = timedelta(hours=6)
 # Longest time after the departure for which the wind is kept, s.
 LONGEST_FLIGHT_S = 24 * 3600.0
 
@@ -32,7 +39,6 @@ class Forecast:
     latitudes, longitudes: (y,), (x,) deg, ascending.
     altitudes: (t, y, x, k) m AMSL, ascending along the last axis.
     velocities: (m, t, y, x, k, 2) m/s, east and north, of each member of an ensemble; m is 1 for a single forecast.
-    grid_km: distance between nodes; 0 for a single place.
     ground: source of the ground above which heights are stated; "" if the levels state altitudes.
     """
 
@@ -43,7 +49,6 @@ class Forecast:
     longitudes: Floats
     altitudes: Floats
     velocities: Floats
-    grid_km: float
     ground: str = ""
 
     @property
@@ -66,6 +71,27 @@ class Forecast:
         """Return True if the forecast is for one place."""
         return len(self.latitudes) == len(self.longitudes) == 1
 
+    @property
+    def grid_km(self) -> float:
+        """Largest distance between neighbouring nodes; 0 for a single place."""
+        north = np.diff(self.latitudes).max(initial=0.0)
+        east = np.diff(self.longitudes).max(initial=0.0) * math.cos(math.radians(float(np.abs(self.latitudes).min())))
+        return float(max(north, east)) * _KM_PER_DEGREE
+
+    def step_at(self, departure: datetime) -> tuple[datetime, datetime]:
+        """Return the times of the forecast before and after a departure within its times."""
+        after = int(np.clip(np.searchsorted(self.times, departure.timestamp(), side="right"), 1, len(self.times) - 1))
+        return (
+            datetime.fromtimestamp(float(self.times[max(0, after - 1)]), UTC),
+            datetime.fromtimestamp(float(self.times[after]), UTC),
+        )
+
+    def end_of_steps(self, departure: datetime) -> datetime:
+        """Return the last time after a departure before a step longer than `LONGEST_STEP`."""
+        times = self.times[self.times >= departure.timestamp()]
+        long_steps = np.flatnonzero(np.diff(times) > LONGEST_STEP.total_seconds())
+        return self.last_time if not len(long_steps) else datetime.fromtimestamp(float(times[long_steps[0]]), UTC)
+
     def field_from(self, departure: datetime, member: int = 0) -> WindField:
         """Return the wind of one member with times in seconds after the departure."""
         field = WindField(
@@ -83,7 +109,7 @@ class Forecast:
             source=self.source,
             issued=self.issued,
             departure=departure,
-            last_time=self.last_time,
+            last_time=self.end_of_steps(departure),
             grid_km=self.grid_km,
             levels=self.altitudes.shape[-1],
             lowest_amsl=float(self.altitudes[..., 0].max()),
@@ -105,7 +131,7 @@ class ForecastFacts:
 
     source, issued, grid_km, ground, members: see `Forecast`.
     departure: time of take-off.
-    last_time: last time of the forecast.
+    last_time: last time of the forecast before a step longer than `LONGEST_STEP`.
     levels: number of levels.
     lowest_amsl, highest_amsl: altitudes between which the forecast has levels everywhere, m.
     box: south, west, north, east, deg, of the nodes around the mission.
@@ -143,9 +169,10 @@ class ForecastFacts:
         issue = "time of issue not stated"
         if self.issued is not None and self.age is not None:
             hours = self.age.total_seconds() / 3600.0
-            issue = f"issued {self.issued:%Y-%m-%d %H:%M} UTC ({hours:.3g} h before take-off"
+            order = "before" if hours >= 0.0 else "after"
+            issue = f"issued {self.issued:%Y-%m-%d %H:%M} UTC ({abs(hours):.3g} h {order} take-off"
             issue += ": old)" if self.is_old else ")"
-        grid = f"grid {self.grid_km:.2g} km" if self.grid_km else "for one place"
+        grid = f"grid {self.grid_km:.{0 if self.grid_km >= 10.0 else 1}f} km" if self.grid_km else "for one place"
         levels = f"{self.levels} level{'s' * (self.levels != 1)} to {self.highest_amsl:.0f} m AMSL"
-        member_text = f", {self.members} members" if self.members > 1 else ""
+        member_text = f", {self.members} members (one flight takes the first)" if self.members > 1 else ""
         return f"forecast {self.source}, {issue}, {grid}, {levels}{member_text}"

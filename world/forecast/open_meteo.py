@@ -50,6 +50,9 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
     except (ValueError, RecursionError) as error:
         raise ForecastError(f"{path}: damaged or incomplete: not JSON: {str(error)[:100]}", file=str(path)) from error
     entries = content if isinstance(content, list) else [content]
+    for entry in entries:
+        if isinstance(entry, dict) and entry.get("error") and "hourly" in entry:
+            raise _fault(path, "error", f"the service answered with an error: {str(entry.get('reason', ''))[:100]}")
     if not entries or not all(isinstance(entry, dict) for entry in entries):
         raise _fault(path, "hourly", "expected the answer of Open-Meteo's API, one object or a list of objects")
     places = [_read_place(path, entry, ground_amsl) for entry in entries]
@@ -73,7 +76,6 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
         len(first.times), *shape, first.altitudes.shape[-1]
     )
     velocities = np.stack([places[k].velocities for k in order], axis=1).reshape(*altitudes.shape, 2)
-    steps = np.diff(latitudes) if len(latitudes) > 1 else np.diff(longitudes)
     if len(places) > 1 and min(shape) < 2:
         raise _fault(
             path, "latitude, longitude", "several places must form a grid of at least two rows and two columns"
@@ -87,7 +89,6 @@ def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
         longitudes=longitudes,
         altitudes=altitudes,
         velocities=velocities[np.newaxis],
-        grid_km=float(steps.mean()) * 111.2 if len(places) > 1 else 0.0,
         ground="of the forecast's model" if has_elevation else "at the mission's start",
     )
 

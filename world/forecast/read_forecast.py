@@ -36,6 +36,10 @@ from world.forecast.units import (
     unit_factor,
 )
 
+# Numbers that mark missing values in files that do not declare them; larger ones are no winds.
+FILL_VALUES = (-99.0, -99.9, 99.9)
+# Largest distance between two nodes between which the wind is interpolated, deg.  Global reanalyses have 2.5.
+MAX_SPACING_DEG = 3.0
 # Largest number of nodes around a mission, over all times, levels and members.
 MAX_NODES = 20_000_000
 
@@ -156,7 +160,6 @@ class _ForecastReader:
         if any(group.kind == "height" for group in groups):
             ground_source = "of the forecast's model" if self.ground is not None else "at the mission's start"
         altitudes, velocities = merge_levels(groups, self.ground, self.ground_amsl)
-        degrees = np.diff(self.latitudes)
         return Forecast(
             source=self.path.name,
             issued=self._find_issue(decoded),
@@ -165,7 +168,6 @@ class _ForecastReader:
             longitudes=self.longitudes,
             altitudes=altitudes,
             velocities=velocities,
-            grid_km=float(degrees.mean()) * 111.2,
             ground=ground_source,
         )
 
@@ -276,7 +278,12 @@ class _ForecastReader:
             first = max(0, int(np.searchsorted(ordered, low, side="right")) - 1)
             last = min(len(ordered), int(np.searchsorted(ordered, high, side="left")) + 1)
             first, last = min(first, len(ordered) - 2), max(last, 2)
-            indices.append(order[first : max(last, first + 2)])
+            around = slice(first, max(last, first + 2))
+            # Nodes at both ends of a file that does not close round the globe are no neighbours.
+            gap = float(np.diff(ordered[around]).max())
+            if gap > MAX_SPACING_DEG:
+                raise self.fail(name, f"nodes {gap:.3g}° apart around the mission: allowed up to {MAX_SPACING_DEG:g}°")
+            indices.append(order[around])
         return indices[0], indices[1]
 
     # ------------------------------------------------------------------
@@ -286,7 +293,9 @@ class _ForecastReader:
         """Return the ground of the forecast's model, (y, x) m AMSL; None if the file does not state it."""
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
-                if not _names_of(name, array) & _GROUND_NAMES or self._level_of(array, name) is not None:
+                is_surface = array.attrs.get("GRIB_typeOfLevel") == "surface" and _is_height(name, array)
+                is_named = bool(_names_of(name, array) & _GROUND_NAMES)
+                if not (is_surface or is_named) or self._level_of(array, name) is not None:
                     continue
                 times = [coordinate.dims for coordinate in _time_coordinates(array).values()]
                 dims = {*(dim for names in times for dim in names), *(dim for dim in array.dims if dim in _MEMBER_DIMS)}
@@ -396,6 +405,10 @@ class _ForecastReader:
                 f"{east.name}, {north.name}",
                 f"values are missing around the mission, the first at {values[k]:g} {unit}, {time:%Y-%m-%d %H:%M} UTC",
             )
+        for fill in FILL_VALUES:
+            if (velocities[..., is_used, :] == fill).any():
+                stated = f"values of {fill:g} around the mission: a fill value that the file does not declare"
+                raise self.fail(f"{east.name}, {north.name}", stated)
         if np.abs(velocities[..., is_used, :]).max() > MAX_WIND_MPS:
             largest = float(np.abs(velocities[..., is_used, :]).max())
             raise self.fail(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {MAX_WIND_MPS:g} m/s")
@@ -412,14 +425,18 @@ class _ForecastReader:
         level_kind = self._level_of(wind, wind.name)
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
-                if not any(text in _HEIGHT_NAMES or text.startswith("geopotential") for text in _names_of(name, array)):
+                if not _is_height(name, array):
                     continue
                 level = self._level_of(array, name)
                 if level is None or level_kind is None or level[0] != "pressure":
                     continue
                 if not np.array_equal(level[2], level_kind[2]):
                     raise self.fail(str(name), f"its pressure levels differ from those of {wind.name}")
-                return self._values(array, level[1]).mean(axis=0) * self._height_factor(array)
+                heights: Floats = self._values(array, level[1]).mean(axis=0) * self._height_factor(array)
+                rises = np.diff(heights[..., np.argsort(-level[2])], axis=-1)
+                if (rises <= 0.0).any():
+                    raise self.fail(str(name), "the height of a pressure level is not above that of a higher pressure")
+                return heights
         raise self.fail(
             str(wind.name), "the geopotential height of its pressure levels is missing (gh, HGT, z): add it to the file"
         )
@@ -487,8 +504,15 @@ def _time_coordinates(array: Any) -> dict[str, Any]:
 
 
 def _is_component(name: Any, array: Any, pattern: re.Pattern[str], standard_names: tuple[str, ...]) -> bool:
-    """Return True if a variable is a component of the wind."""
-    return array.attrs.get("standard_name") in standard_names or pattern.match(str(name)) is not None
+    """Return True if a variable is a component of the wind, by its standard name or, without one, by its name."""
+    standard_name = str(array.attrs.get("standard_name", ""))
+    is_other_quantity = standard_name not in ("", "unknown") and "wind" not in standard_name
+    return standard_name in standard_names or (pattern.match(str(name)) is not None and not is_other_quantity)
+
+
+def _is_height(name: Any, array: Any) -> bool:
+    """Return True if a variable is a geopotential or a geopotential height."""
+    return any(text in _HEIGHT_NAMES or text.startswith("geopotential") for text in _names_of(name, array))
 
 
 def _partner_key(name: str, letter: str) -> str:

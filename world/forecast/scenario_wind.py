@@ -11,7 +11,7 @@ import numpy as np
 from world.airspace.zone_times import parse_span
 from world.arrays import Floats
 from world.errors import ForecastError
-from world.forecast.forecast import Box, Forecast, ForecastFacts
+from world.forecast.forecast import LONGEST_STEP, Box, Forecast, ForecastFacts
 from world.forecast.read_forecast import read_forecast
 from world.forecast.wind_field import (
     MAX_FIELD_NUMBERS,
@@ -98,6 +98,15 @@ def forecast_wind(
             "time",
             f"take-off {departure:%Y-%m-%d %H:%M} UTC",
             f"the forecast covers {forecast.first_time:%Y-%m-%d %H:%M} to {forecast.last_time:%Y-%m-%d %H:%M} UTC",
+        )
+    before, after = forecast.step_at(departure)
+    if departure < after and after - before > LONGEST_STEP:
+        raise ForecastError.at(
+            file,
+            "time",
+            f"take-off {departure:%Y-%m-%d %H:%M} UTC",
+            f"the forecast has no time between {before:%Y-%m-%d %H:%M} and {after:%Y-%m-%d %H:%M} UTC:"
+            f" allowed steps up to {LONGEST_STEP.total_seconds() / 3600.0:.0f} h",
         )
     latitudes, longitudes = to_geo(site.origin, [point[0] for point in site.ends], [point[1] for point in site.ends])
     altitudes = np.array([float(point[2]) for point in site.ends])

@@ -227,7 +227,7 @@ def test_the_default_end_is_the_last_time_that_the_forecast_covers(tmp_path: Pat
     # Two legs of 700 m at 25 m/s.
     base = open_in(tmp_path, hourly_winds(4.0, 4.0, 4.0))
     assert (at_hour(2) - last_departure(base, FIRST)).total_seconds() == pytest.approx(56.0, abs=1.0)
-    base = open_in(tmp_path, wind_dataset(4.0, 0.0, hours=(0.0, 48.0)))
+    base = open_in(tmp_path, wind_dataset(4.0, 0.0, hours=np.arange(0.0, 49.0, 6.0)))
     assert last_departure(base, at_hour(3)) == at_hour(27)
     assert last_departure(base, at_hour(100)) == at_hour(100)
 

@@ -166,6 +166,30 @@ NETCDF: dict[str, tuple[Writer, tuple[str, ...]]] = {
         nc(lambda: winds(latitudes=LATITUDES + 10.0)),
         ("latitude, longitude: the mission is at 46.000, 8.000: the forecast's box is 55.800 to 55.900",),
     ),
+    "a file that does not close round the globe": (
+        nc(lambda: winds(longitudes=np.linspace(60.0, 300.0, 7))),
+        ("longitude: nodes 120° apart around the mission: allowed up to 3°",),
+    ),
+    "nodes far apart": (
+        nc(lambda: winds(latitudes=LATITUDES[2] + 4.0 * np.arange(-2.0, 3.0))),
+        ("latitude: nodes 4° apart around the mission: allowed up to 3°",),
+    ),
+    "no time around the take-off": (
+        nc(lambda: winds(hours=(-4.0, -3.0, 4.0, 5.0))),
+        ("time: take-off 2026-05-01 06:00 UTC: the forecast has no time between 2026-05-01 03:00 and", "up to 6 h"),
+    ),
+    "currents of the sea": (
+        nc(lambda: winds().assign(u=winds().u.assign_attrs(standard_name="eastward_sea_water_velocity"))),
+        ("v: its eastward wind is missing",),
+    ),
+    "missing values of -99": (
+        nc(lambda: with_value(winds(), -99.0)),
+        ("u, v: values of -99 around the mission: a fill value that the file does not declare",),
+    ),
+    "geopotential heights that fall": (
+        nc(lambda: aloft(heights=np.array([1500.0, 780.0, 100.0])[:, np.newaxis, np.newaxis])),
+        ("gh: the height of a pressure level is not above that of a higher pressure",),
+    ),
     "other times": (
         nc(lambda: winds(hours=(24.0, 25.0, 26.0, 27.0))),
         ("time: take-off 2026-05-01 06:00 UTC: the forecast covers 2026-05-02 06:00 to 2026-05-02 09:00 UTC",),
@@ -250,6 +274,10 @@ OPEN_METEO: dict[str, tuple[Writer, tuple[str, ...]]] = {
     "an error of the API": (
         json_file({"error": True, "reason": "Parameter 'latitude' must be numeric"}),
         ("hourly winds and hourly_units are missing: Parameter 'latitude' must be numeric",),
+    ),
+    "an error beside values": (
+        json_file(answer(error=True, reason="too many calls")),
+        ("error: the service answered with an error: too many calls",),
     ),
     "hourly a list": (json_file(answer(hourly=[])), ("hourly: hourly winds and hourly_units are missing",)),
     "a latitude as text": (json_file(answer(latitude="46")), ("latitude: 46: allowed -90..90",)),

@@ -91,6 +91,17 @@ def test_gfs(tmp_path: Path) -> None:
     assert wind_at(forecast, 1140.0) == pytest.approx([7.5, -3.0], abs=1e-4)
 
 
+def test_the_geopotential_of_a_surface_is_the_models_ground(tmp_path: Path) -> None:
+    """650 gpm: 70 m above the model's ground is 720 m AMSL, whatever the ground at the start."""
+    winds = wind_dataset(np.array([4.0, 8.0])[:, None, None], 0.0, levels=(20.0, 120.0), hours=(0.0, 3.0))
+    ground = np.full((len(winds.latitude), len(winds.longitude)), 650.0 * 9.80665)
+    grid = regular_grid(winds.latitude.values, winds.longitude.values)
+    surface = grib_message("z", ground, kind="surface", level=0.0, hour=0.0, grid=grid)
+    forecast = read_forecast(write_grib(tmp_path / "z.grib2", grib_messages(winds), [surface]), BOX, 500.0)
+    assert forecast.ground == "of the forecast's model"
+    assert wind_at(forecast, 720.0) == pytest.approx([6.0, 0.0], abs=1e-3)
+
+
 def test_levels_inside_the_ground_have_the_wind_at_10_m(tmp_path: Path) -> None:
     upper = pressure_dataset(hours=(0.0, 3.0))
     surface = wind_dataset(1.5, -0.5, levels=(10.0,), hours=(0.0, 3.0))

@@ -31,7 +31,6 @@ def made_forecast(*, single: bool = False) -> Forecast:
         longitudes=longitudes,
         altitudes=np.broadcast_to([100.0, 900.0], shape).copy(),
         velocities=np.broadcast_to([[8.0, 0.0], [12.0, 0.0]], (1, *shape, 2)).copy(),
-        grid_km=0.0 if single else 22.2,
     )
 
 
@@ -51,6 +50,28 @@ def test_the_box_around_a_map() -> None:
     across = map_box(GeoOrigin(0.0, 180.0), np.array([[-7000.0, 7000.0], [-500.0, 500.0]]))
     assert across.west < 180.0 < across.east
     assert across.east - across.west < 0.2
+
+
+def test_the_forecast_ends_before_a_step_of_more_than_six_hours() -> None:
+    forecast = made_forecast()
+    longer = replace(forecast, times=NOON.timestamp() + 3600.0 * np.array([0.0, 6.0, 13.0, 14.0]))
+    assert [(longer.end_of_steps(NOON + timedelta(hours=h)) - NOON).total_seconds() / 3600 for h in (0, 1, 6, 13)] == [
+        6.0,
+        6.0,
+        6.0,
+        14.0,
+    ]
+    # 0.2 degrees of latitude, and of longitude by cos 45.9 degrees.
+    assert forecast.grid_km == pytest.approx(0.2 * 111.2)
+    wide = replace(forecast, longitudes=8.0 + np.array([-0.5, 0.5]))
+    assert wide.grid_km == pytest.approx(111.2 * math.cos(math.radians(45.9)))
+
+
+def test_the_words_of_a_forecast_name_a_later_issue_and_the_member() -> None:
+    facts = made_forecast().facts(NOON)
+    later = replace(facts, issued=NOON + timedelta(hours=42), members=2).describe()
+    assert "(42 h after take-off)" in later
+    assert "2 members (one flight takes the first)" in later
 
 
 @pytest.mark.parametrize("minutes", [0, 120])

@@ -99,6 +99,7 @@ _PARAMETERS = {
     "v": (0, 2, 3),
     "gh": (0, 3, 5),
     "orog": (0, 3, 5),
+    "z": (0, 3, 4),
 }
 _SURFACES = {"height": 103, "altitude": 102, "pressure": 100, "surface": 1}
 
@@ -116,7 +117,7 @@ def grib_message(
 ) -> bytes:
     """Return a GRIB 2 message of one variable on one level.
 
-    name: "u", "v", "gh" or "orog".
+    name: "u", "v", "gh", "orog" or "z".
     values: (y, x) in the order of the grid's scanning.
     kind: "height", "altitude", "pressure" or "surface".
     level: m or hPa.
