@@ -86,6 +86,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "paper": (*_PROBLEM_KERNELS, "planner.evaluation.paper_scores._score_paths"),
     "flight": (
         *_WORLD_KERNELS,
+        "aircraft.envelope.ground_slope",
         "aircraft.envelope.ground_speed",
         "aircraft.path_limits.aircraft_slopes",
         "aircraft.path_limits.arc_slope",
