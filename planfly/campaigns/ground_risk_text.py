@@ -140,7 +140,7 @@ def table_text(result: GroundRiskResult) -> str:
 
 def _table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     """Return the rows of the table: quantity, value and source."""
-    flown, formula, goal = result.flown, result.formula, result.goal
+    flown, goal = result.flown, result.goal
     span = result.aircraft.wing_span
     flown_by = _share_text(result)
     return [
@@ -152,30 +152,7 @@ def _table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         ("**flight geography**", "", ""),
         ("half width", f"{result.half_width:.1f} m", f"{flown_by}: {flown.deviation:.1f} m; at least 1.5 CD"),
         ("height H_FG above ground", f"{flown.height:.1f} m", flown_by),
-        ("**contingency volume**", "", ""),
-        (
-            "flown width",
-            f"{flown.contingency_width:.1f} m",
-            "all flights and the turns of their returns, beyond flight geography",
-        ),
-        (
-            "width S_CV by formula",
-            f"{formula.width:.1f} m",
-            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
-        ),
-        ("**width along the whole flight geography**", f"**{result.contingency_width:.1f} m**", "the larger one"),
-        (
-            "for comparison: reach of returns",
-            f"{flown.return_distance:.1f} m",
-            "beyond flight geography; the operational volume also holds the areas below all returns",
-        ),
-        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
-        (
-            "height H_CV by formula",
-            f"{formula.height:.1f} m",
-            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
-        ),
-        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
+        *_contingency_rows(result),
         ("**ground risk buffer**", "", ""),
         (
             "flown width",
@@ -204,6 +181,37 @@ def _table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
             ", ".join(result.entered_zones) or "none of those given",
             f"{count_text(len(result.base.scenario.zones), 'zone')} given, whatever their heights",
         ),
+    ]
+
+
+def _contingency_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
+    """Return the rows of the contingency volume."""
+    flown, formula = result.flown, result.formula
+    return [
+        ("**contingency volume**", "", ""),
+        (
+            "flown width",
+            f"{flown.contingency_width:.1f} m",
+            "all flights and the turns of their returns, beyond flight geography",
+        ),
+        (
+            "width S_CV by formula",
+            f"{formula.width:.1f} m",
+            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
+        ),
+        ("**width along the whole flight geography**", f"**{result.contingency_width:.1f} m**", "the larger one"),
+        (
+            "for comparison: reach of returns",
+            f"{flown.return_distance:.1f} m",
+            "beyond flight geography; the operational volume also holds the areas below all returns",
+        ),
+        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
+        (
+            "height H_CV by formula",
+            f"{formula.height:.1f} m",
+            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
+        ),
+        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
     ]
 
 
