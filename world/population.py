@@ -71,6 +71,15 @@ def density_band(density: float) -> int:
     return int(np.searchsorted(DENSITY_LIMITS_PER_KM2, density, side="right"))
 
 
+def format_density(density: float) -> str:
+    """Return a population density as text.
+
+    >>> format_density(30_000.0), format_density(299.94), format_density(3.0)
+    ('30,000 people/km²', '299.9 people/km²', '3 people/km²')
+    """
+    return f"{density:,.0f} people/km²" if density >= 1000.0 else f"{density:,.4g} people/km²"
+
+
 def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: BaseGeometry) -> Population:
     """Read the population in an area from a GeoTIFF.
 

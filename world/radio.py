@@ -61,6 +61,13 @@ class RadioLink:
         return LIGHT_SPEED_MPS / self.frequency
 
 
+def station_position(table: LinkTable | None, origin: GeoOrigin) -> tuple[float, float] | None:
+    """Return the position of the ground station's antenna that a scenario's [link] table states, m, or None."""
+    if table is None or (table.east_m is None and table.lat_deg is None):
+        return None
+    return map_coordinates(table, origin)
+
+
 def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: Terrain | None) -> RadioLink | None:
     """Convert a scenario's [link] table to a radio link; return None if there is no table.
 
@@ -68,13 +75,11 @@ def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: T
     """
     if table is None:
         return None
-    station = None
-    if table.east_m is not None or table.lat_deg is not None:
-        station = map_coordinates(table, origin)
-        if ground is not None and math.isnan(float(ground.height(*station))):
-            position = f"east {station[0]:.0f} m, north {station[1]:.0f} m"
-            message = f"{source}: link: {position}: the elevation file has no data there"
-            raise ScenarioError(message, file=source, field="link")
+    station = station_position(table, origin)
+    if station is not None and ground is not None and math.isnan(float(ground.height(*station))):
+        position = f"east {station[0]:.0f} m, north {station[1]:.0f} m"
+        message = f"{source}: link: {position}: the elevation file has no data there"
+        raise ScenarioError(message, file=source, field="link")
     gains = table.station_gain_dbi + table.aircraft_gain_dbi - table.cable_loss_db
     allowed_loss = table.power_dbm + gains - table.sensitivity_dbm - table.fade_margin_db
     return RadioLink(table.use, station, table.antenna_m, 1e6 * table.frequency_mhz, allowed_loss, table.max_outage_s)

@@ -33,7 +33,7 @@ from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
 from world.frames import GeoOrigin, to_geo
 from world.html_table import html_table
 from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
-from world.radio import RadioLink, make_link
+from world.radio import RadioLink, make_link, station_position
 from world.raster import open_tiles, read_terrain, require_covered, tile_bounds
 from world.raster_file import RasterFile
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
@@ -385,10 +385,10 @@ def scenario_from_spec(
         bounds = tile_bounds(raster, origin)
     else:
         raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from", file=source, field="area")
-    if ground is None:
-        ground = (
-            _make_terrain(spec.terrain, bounds) if raster is None else _read_terrain_of_area(raster, origin, bounds)
-        )
+    if raster is not None:
+        ground = _read_terrain_of_area(raster, origin, bounds, station_position(spec.link, origin))
+    elif ground is None:
+        ground = _make_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
     spec = _with_absolute_paths(spec, base)
@@ -545,10 +545,46 @@ def _assemble_scenario(
     )
 
 
-def _read_terrain_of_area(raster: RasterFile, origin: GeoOrigin, bounds: Floats) -> Terrain:
-    """Read the terrain of a scenario's area. Raises TerrainError if the area extends beyond the elevation file."""
+def _read_terrain_of_area(
+    raster: RasterFile, origin: GeoOrigin, bounds: Floats, station: tuple[float, float] | None
+) -> Terrain:
+    """Read the terrain of a scenario's area, and on to the ground station of its link if it stands elsewhere.
+
+    station: position of the link's antenna, m; None for a link without one.
+    Raises TerrainError if the area extends beyond the elevation file.
+    """
     require_covered(raster, origin, bounds)
-    return read_terrain(raster, origin, bounds, GROUND_BUFFER)
+    return read_terrain(raster, origin, _box_with(raster, origin, bounds, station), GROUND_BUFFER)
+
+
+def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
+    """Return an area that also holds a position, m, (2, 2); the same area if the position is beyond the file."""
+    if position is None:
+        return bounds
+    point = np.array(position)
+    lat, lon = to_geo(origin, point[:1], point[1:])
+    (col, row), (rows, cols) = raster.to_pixels(lon, lat), raster.shape
+    # False for a position that the file's coordinate system cannot express (NaN or inf).
+    if not ((col >= 0.0) & (col <= cols - 1.0) & (row >= 0.0) & (row <= rows - 1.0)).all():
+        return bounds
+    return np.stack([np.minimum(bounds[:, 0], point), np.maximum(bounds[:, 1], point)], axis=1)
+
+
+def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenario:
+    """Return a scenario whose terrain reaches to a position, m, if its elevation file has data there.
+
+    The scenario itself is returned if its ground there is known, or if its terrain is not from an elevation file.
+    Raises TerrainError or ScenarioError for a file that cannot be read or that has changed.
+    """
+    terrain, table = scenario.terrain, scenario.spec.terrain
+    if terrain is None or table.kind != "dem" or math.isfinite(float(terrain.height(*position))):
+        return scenario
+    raster, _ = _open_terrain(table, scenario.name, None)
+    box = _box_with(raster, scenario.origin, scenario.bounds, position)
+    if box is scenario.bounds:
+        return scenario
+    wide = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
+    return replace(scenario, terrain=replace(wide, vertical_error=terrain.vertical_error))
 
 
 def _check_ends_in_area(spec: ScenarioFile, source: str, origin: GeoOrigin, bounds: Floats) -> None:
@@ -704,8 +740,9 @@ def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> S
 def with_link(scenario: Scenario, **entries: Any) -> Scenario:
     """Return a scenario with changed entries of [link]; None keeps the present value.
 
-    A position in degrees replaces a position in metres.  Raises ScenarioError for an entry that is not allowed in a
-    scenario file, and for a link without frequency, power or sensitivity.
+    A position in degrees replaces a position in metres.  The terrain of an elevation file is read up to the station.
+    Raises ScenarioError for an entry that is not allowed in a scenario file, and for a link without frequency, power or
+    sensitivity, and TerrainError for an elevation file that cannot be read.
 
     >>> linked = with_link(load_scenario("tight"), frequency_mhz=1000.0, power_dbm=20.0, sensitivity_dbm=-90.0)
     >>> linked.link.allowed_loss
@@ -717,6 +754,8 @@ def with_link(scenario: Scenario, **entries: Any) -> Scenario:
     if "lat_deg" in changes:
         stated = {name: value for name, value in stated.items() if name not in ("east_m", "north_m")}
     new_table = checked_table(lambda: LinkTable(**(stated | changes)), f"{scenario.name}: link")
+    station = station_position(new_table, scenario.origin)
+    scenario = scenario if station is None else with_ground_at(scenario, station)
     link = make_link(new_table, scenario.name, scenario.origin, scenario.terrain)
     return replace(scenario, spec=scenario.spec.model_copy(update={"link": new_table}), link=link)
 

@@ -12,7 +12,7 @@ from logs.verdict.returns.glide_footprint import outline_parts
 from logs.views.charts import Label, Layer
 from logs.views.glides import area_layer
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
-from world.population import DENSITY_LIMITS_PER_KM2, Population
+from world.population import DENSITY_LIMITS_PER_KM2, Population, format_density
 
 # Names of the bands of density, from the lowest.
 _BAND_NAMES = (
@@ -53,7 +53,7 @@ def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], populatio
     if population is not None:
         east, north = population.max_place
         layers.append(Layer("dots", "highest density", "comes-down", np.array([east]), np.array([north])))
-        labels.append(Label(f"{population.max_density:,.4g} people/km²", east, north, "end", "ink", (1, 1)))
+        labels.append(Label(format_density(population.max_density), east, north, "end", "ink", (1, 1)))
     return scenario_map(
         scenario,
         "ground risk",

@@ -25,6 +25,7 @@ from planfly.kernel_units.unit_kernels import FLYING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
+from planfly.workflow.open_flight import with_ground_at_station
 from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
 from world.arrays import Floats
@@ -161,7 +162,8 @@ def link(
         if missing is not None:
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
     entries = {_ENTRIES[name]: value for name, value in given.items()}
-    setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon))
+    scenario = with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon)
+    setup = judged.setup.in_scenario(with_ground_at_station(scenario, judged.setup.mission))
     result = _judge_link(setup, judged.track)
     return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
 

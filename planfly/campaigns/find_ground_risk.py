@@ -3,7 +3,8 @@
 Each flight of a campaign gives the area over which it flies, with its returns to launch, and the area on which the
 aircraft can fall from there. The flight geography is a corridor about the planned path, and about the path of the
 flight without variations, that holds a fraction of the flights; contingency volume and ground risk buffer hold all
-flights, returns and falls, and the volumes by the formulas of SORA's annex A.
+flights, returns and falls, and the volumes by the formulas of SORA's annex A. Their widths are the same all along the
+path: the largest anywhere.
 """
 
 import itertools
@@ -20,6 +21,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT
+from flight.mission.itinerary import Position
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
@@ -53,6 +55,8 @@ from world.wind import Wind
 _SAMPLE_INTERVAL_S = 1.0
 # Number of seconds between the positions of a return from which falls begin.
 _RETURN_SAMPLE_ROWS = 5
+# Angle between the course and the bearing of the target at which the turn of a return ends, rad.
+_TURN_END_ANGLE_RAD = math.radians(5.0)
 # Deviation of a simplified outline, m.
 _OUTLINE_TOLERANCE_M = 0.5
 # End reason of a flight that flew its mission to the end.
@@ -88,6 +92,7 @@ class ExcursionRow(FlightRow):
     """Row of a flight with the areas that it needs.
 
     deviation: largest horizontal distance from the planned path and the path of the flight without variations, m.
+    turn_deviation: the same in flight or in the turn at the beginning of a return, m.
     height: largest height above ground in flight, m.
     return_height: largest height above ground in flight or in a return, m.
     ground_speed: highest speed over the ground, m/s.
@@ -95,6 +100,7 @@ class ExcursionRow(FlightRow):
     """
 
     deviation: float = math.nan
+    turn_deviation: float = math.nan
     height: float = math.nan
     return_height: float = math.nan
     ground_speed: float = math.nan
@@ -126,13 +132,15 @@ def fly_for_excursions(
     terrain = setup.scenario.terrain
     if len(flown.track) < 2 or terrain is None:
         return row
-    positions, velocities = _sampled_flight(flown.track)
+    times, positions, velocities = _sampled_flight(flown.track)
     paths = _return_paths(setup, flown.track, interval, glide=glide)
     airframe = varied.airframe.aircraft
     sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
     half_span = 0.5 * airframe.wing_span
     lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
-    flown_area = shapely.union_all([*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns)])
+    turns = turn_areas(times, positions, paths.times, paths.turns, interval)
+    areas = [*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns), *turns]
+    flown_area = shapely.union_all(areas)
     # In a forecast, the wind at the middle of the flight.
     middle = 0.5 * float(flown.track.time[-1])
 
@@ -143,11 +151,12 @@ def fly_for_excursions(
     glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
-    distances = shapely.distance(shapely.points(positions[:, :2]), path)
+    deviation = float(shapely.distance(shapely.points(positions[:, :2]), path).max())
     return replace(
         row,
         duration=float(flown.track.time[-1]),
-        deviation=float(distances.max()),
+        deviation=deviation,
+        turn_deviation=max([deviation, *(_reach(area, path) for area in turns)]),
         height=height,
         return_height=max([height, *(_largest_height(each, terrain) for each in paths.returns)]),
         ground_speed=float(np.hypot(velocities[:, 0], velocities[:, 1]).max()),
@@ -156,15 +165,18 @@ def fly_for_excursions(
     )
 
 
-def _sampled_flight(track: Track) -> tuple[Floats, Floats]:
-    """Return positions and ground velocities of a track at intervals, and at its end, m and m/s, (n, 3) each."""
+def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
+    """Sample a track at intervals, and at its end.
+
+    Return times, s, (n,), and positions and ground velocities, m and m/s, (n, 3) each.
+    """
     is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.velocity).all(axis=1)
     rows = np.flatnonzero(is_usable)
     steps = np.floor(track.time[rows] / _SAMPLE_INTERVAL_S + 1e-9)
     is_kept = np.concatenate([[True], np.diff(steps) > 0.0])
     is_kept[-1] = True
     kept = rows[is_kept]
-    return track.position[kept], track.velocity[kept].astype(np.float64)
+    return track.time[kept], track.position[kept], track.velocity[kept].astype(np.float64)
 
 
 def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
@@ -176,12 +188,16 @@ def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
 class _ReturnPaths(NamedTuple):
     """Paths of the returns from a flight, in order of their starts.
 
+    times: times of their starts, s, (n,).
     returns: positions, m, (n, 3) each.
+    turns: beginnings of the returns, up to where they head for their targets, m, (n, 3) each.
     loiters: areas of their loiters, m.
     glides: paths of glides to the ground, m, (n, 3) each.
     """
 
+    times: Floats
     returns: list[Floats]
+    turns: list[Floats]
     loiters: list[BaseGeometry]
     glides: list[Floats]
 
@@ -192,7 +208,7 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     interval: time between two returns, s.
     glide: True to simulate the returns without an engine, too.
     """
-    none = _ReturnPaths([], [], [])
+    none = _ReturnPaths(np.zeros(0), [], [], [], [])
     if setup.mission.home is None:
         return none
     world, starts = make_return_world(setup), flown_starts(setup, track, interval)
@@ -213,7 +229,47 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
             if len(one) > 1 and result["outcome"] == RETURN_GROUND_IMPACT
         ]
     loiters = [shapely.Point(position).buffer(radius) for position in positions]
-    return _ReturnPaths([path for path in paths if len(path) > 1], loiters, glides)
+    flown = [k for k, path in enumerate(paths) if len(path) > 1]
+    returns = [paths[k] for k in flown]
+    radii = [0.0 if target.straight else radius for target in targets]
+    turns = [turn_of_return(paths[k], targets[k].position, radii[k]) for k in flown]
+    return _ReturnPaths(starts.time[flown], returns, turns, loiters, glides)
+
+
+def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
+    """Return the beginning of a return, m, (n, 3), up to where it heads for its target.
+
+    path: positions, m, (n, 3).
+    radius: radius of the loiter about the target, m: a course that meets it heads for the target, too.
+    """
+    steps, ways = np.diff(path[:, :2], axis=0), np.array(target[:2]) - path[:-1, :2]
+    along = np.sum(steps * ways, axis=1)
+    across = np.abs(steps[:, 0] * ways[:, 1] - steps[:, 1] * ways[:, 0])
+    allowed = np.maximum(math.sin(_TURN_END_ANGLE_RAD) * np.linalg.norm(ways, axis=1), radius)
+    is_headed = (along > 0.0) & (across <= allowed * np.linalg.norm(steps, axis=1))
+    return path[: int(np.argmax(is_headed)) + 1] if is_headed.any() else path
+
+
+def turn_areas(
+    times: Floats, positions: Floats, start_times: Floats, turns: list[Floats], interval: float
+) -> list[BaseGeometry]:
+    """Return the areas of turns that begin at any time from each start of a return to the next.
+
+    Each is the flight between both starts, widened on both sides by the larger of their two turns.
+
+    times, positions: of the flight, s, (n,), and m, (n, 3).
+    start_times: times of the returns' starts, s, (m,).
+    turns: turn of each return, m, (n, 3) each.
+    interval: time after the last start, s.
+    """
+    areas = []
+    for k, (start, end) in enumerate(itertools.pairwise([*start_times, *(start_times[-1:] + interval)])):
+        first = max(0, int(np.searchsorted(times, start, side="right")) - 1)
+        part = positions[first : int(np.searchsorted(times, end)) + 1, :2]
+        line = shapely.LineString(part) if len(part) > 1 else shapely.Point(part[0])
+        width = shapely.distance(shapely.points(np.concatenate(turns[k : k + 2])[:, :2]), line).max()
+        areas.append(line.simplify(_OUTLINE_TOLERANCE_M).buffer(float(width)))
+    return areas
 
 
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
@@ -254,7 +310,8 @@ class FlownVolumes(NamedTuple):
 
     deviation: distance from the path that holds the goal's fraction of the flights.
     height: height above ground that holds the same fraction.
-    contingency_width: largest distance of a flight or a return beyond the flight geography.
+    contingency_width: largest distance of a flight, or of the turn of a return, beyond the flight geography.
+    return_distance: largest distance of a flight or a return beyond the flight geography.
     contingency_height: largest height above ground of a flight or a return.
     buffer_width: largest distance of an impact beyond flights, returns and flight geography.
     """
@@ -262,6 +319,7 @@ class FlownVolumes(NamedTuple):
     deviation: float
     height: float
     contingency_width: float
+    return_distance: float
     contingency_height: float
     buffer_width: float
 
@@ -319,6 +377,11 @@ class GroundRiskResult:
         return max(self.flown.contingency_height, self.formula.height)
 
     @property
+    def contingency_width(self) -> float:
+        """Width of the contingency volume, m: the larger of the flown one and the formula's."""
+        return max(self.flown.contingency_width, self.formula.width)
+
+    @property
     def one_to_one_buffer(self) -> float:
         """Width of the ground risk buffer by the 1:1 rule, m."""
         return one_to_one_buffer(self.volume_height, self.aircraft.wing_span)
@@ -334,9 +397,9 @@ class GroundRiskResult:
         return None if self.glide_ratio is None else glide_buffer(self.volume_height, self.glide_ratio)
 
     @property
-    def formula_buffer(self) -> float:
-        """Width of the ground risk buffer by formula, m."""
-        return max(self.one_to_one_buffer, self.glide_buffer or 0.0)
+    def buffer_width(self) -> float:
+        """Width of the ground risk buffer, m: the larger of the flown one and the formulas'."""
+        return max(self.flown.buffer_width, self.one_to_one_buffer, self.glide_buffer or 0.0)
 
     @property
     def is_judged(self) -> bool:
@@ -399,7 +462,7 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
     track = fly_to_end(Flight(setup, base.airframe.aircraft)).track
     if len(track) < 2:
         raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
-    positions, _ = _sampled_flight(track)
+    _, positions, _ = _sampled_flight(track)
     return shapely.MultiLineString([positions[:, :2], setup.route.positions[:, :2]]).simplify(0.1)
 
 
@@ -462,21 +525,25 @@ def make_volumes(
         float(np.quantile(values, goal.probability, method="median_unbiased"))
         for values in ([row.deviation for row in rows], [row.height for row in rows])
     )
-    geography = path.buffer(max(deviation, min_geography_half_width(aircraft.wing_span)))
+    half_width = max(deviation, min_geography_half_width(aircraft.wing_span))
+    geography = path.buffer(half_width)
     flown_area = shapely.union_all([geography, *shapely.from_wkb([row.flown for row in rows])])
     fallen_area = shapely.union_all(shapely.from_wkb([row.fallen for row in rows]))
     flown = FlownVolumes(
         deviation=deviation,
         height=height,
-        contingency_width=_reach(flown_area, geography),
+        contingency_width=max(0.0, max(row.turn_deviation for row in rows) - half_width),
+        return_distance=_reach(flown_area, geography),
         contingency_height=max(row.return_height for row in rows),
         buffer_width=_reach(fallen_area, flown_area),
     )
     speed = goal.speed or aircraft.airspeed_max
     formula = ContingencyFormula(speed, height)
-    volume = shapely.union_all([flown_area, geography.buffer(formula.width)])
-    result = GroundRiskResult(goal, base, rows, flown, formula, glide_ratio, speed, geography, volume, footprint=volume)
-    footprint = shapely.union_all([volume.buffer(result.formula_buffer), fallen_area])
+    result = GroundRiskResult(
+        goal, base, rows, flown, formula, glide_ratio, speed, geography, volume=geography, footprint=geography
+    )
+    volume = shapely.union_all([flown_area, geography.buffer(result.contingency_width)])
+    footprint = shapely.union_all([volume.buffer(result.buffer_width), fallen_area])
     return replace(result, volume=_without_filled_holes(volume, footprint), footprint=footprint)
 
 

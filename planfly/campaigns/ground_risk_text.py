@@ -5,7 +5,7 @@ from logs.verdict.returns.judge_returns import make_return_world, returning_titl
 from planfly.campaigns.find_ground_risk import GroundRiskResult
 from planfly.campaigns.sora import IGRC_COLUMNS
 from planfly.rtl.return_summary import return_law_lines
-from world.population import DENSITY_LIMITS_PER_KM2, Population, density_band
+from world.population import DENSITY_LIMITS_PER_KM2, Population, density_band, format_density
 from world.wording import count_text
 
 # Explanation of the table for an application.
@@ -35,7 +35,7 @@ def answer_line(result: GroundRiskResult) -> str:
 
 def density_text(population: Population | None) -> str:
     """Return the highest density as text."""
-    return "population unknown" if population is None else f"at most {population.max_density:,.4g} people/km²"
+    return "population unknown" if population is None else f"at most {format_density(population.max_density)}"
 
 
 def _unknown_reason(result: GroundRiskResult) -> str:
@@ -56,8 +56,9 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
     lines = [
         f"flight geography: {result.half_width:.0f} m to either side of the path, {flown.height:.0f} m above ground"
         f" ({_share_text(result)} stay within)",
-        f"contingency volume: {flown.contingency_width:.0f} m beyond it, {flown.contingency_height:.0f} m above ground"
-        f" in flights and returns; {formula.width:.0f} m, {formula.height:.0f} m by Annex A",
+        f"contingency volume: {flown.contingency_width:.0f} m beyond it in flights and turns of returns,"
+        f" {flown.contingency_height:.0f} m above ground in flights and returns; {formula.width:.0f} m,"
+        f" {formula.height:.0f} m by Annex A; the returns reach {flown.return_distance:.0f} m beyond it on their way",
         f"ground risk buffer: {flown.buffer_width:.0f} m beyond flights and returns by falls"
         f"{' and glides' if result.goal.glide else ''};"
         f" {result.one_to_one_buffer:.0f} m by the 1:1 rule{_glide_text(result)}",
@@ -89,7 +90,7 @@ def _population_line(population: Population) -> str:
     lat, lon = population.max_position
     return (
         f"population: {density_text(population)}, at {lat:.5f}, {lon:.5f};"
-        f" mean {population.mean_density:,.4g} people/km²"
+        f" mean {format_density(population.mean_density)}"
         f" (cells of {population.cell_size:.0f} m of {population.source})"
     )
 
@@ -143,7 +144,7 @@ def table_text(result: GroundRiskResult) -> str:
 
 def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     """Return the rows of the table for an application: quantity, value and source; cells in bold begin with "**"."""
-    flown, formula, goal = result.flown, result.formula, result.goal
+    flown, goal = result.flown, result.goal
     span = result.aircraft.wing_span
     flown_by = _share_text(result)
     return [
@@ -155,20 +156,7 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         ("**flight geography**", "", ""),
         ("half width", f"{result.half_width:.1f} m", f"{flown_by}: {flown.deviation:.1f} m; at least 1.5 CD"),
         ("height H_FG above ground", f"{flown.height:.1f} m", flown_by),
-        ("**contingency volume**", "", ""),
-        ("flown width", f"{flown.contingency_width:.1f} m", "all flights and their returns, beyond flight geography"),
-        (
-            "width S_CV by formula",
-            f"{formula.width:.1f} m",
-            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
-        ),
-        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
-        (
-            "height H_CV by formula",
-            f"{formula.height:.1f} m",
-            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
-        ),
-        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
+        *_contingency_rows(result),
         ("**ground risk buffer**", "", ""),
         (
             "flown width",
@@ -186,6 +174,7 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
             f"{result.ballistic_buffer:.1f} m",
             "v √(2 H/g) + CD/2, accepted for rotorcraft only",
         ),
+        ("**width around the operational volume**", f"**{result.buffer_width:.1f} m**", "the largest one"),
         ("**areas**", "", ""),
         ("operational volume", f"{result.volume.area / 1e6:.3f} km²", ""),
         ("with ground risk buffer (footprint)", f"{result.footprint.area / 1e6:.3f} km²", ""),
@@ -199,6 +188,37 @@ def table_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     ]
 
 
+def _contingency_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
+    """Return the rows of the contingency volume."""
+    flown, formula = result.flown, result.formula
+    return [
+        ("**contingency volume**", "", ""),
+        (
+            "flown width",
+            f"{flown.contingency_width:.1f} m",
+            "all flights and the turns of their returns, beyond flight geography",
+        ),
+        (
+            "width S_CV by formula",
+            f"{formula.width:.1f} m",
+            f"S_GPS + S_Pos + S_K + S_RZ + S_CM = {formula.width_terms} m; S_CM = v²/(g tan 30°), a turn by 180°",
+        ),
+        ("**width along the whole flight geography**", f"**{result.contingency_width:.1f} m**", "the larger one"),
+        (
+            "for comparison: reach of returns",
+            f"{flown.return_distance:.1f} m",
+            "beyond flight geography; the operational volume also holds the areas below all returns",
+        ),
+        ("flown height above ground", f"{flown.contingency_height:.1f} m", "all flights and their returns"),
+        (
+            "height H_CV by formula",
+            f"{formula.height:.1f} m",
+            f"H_FG + H_baro + H_RZ + H_CM = {formula.height_terms} m; H_CM = 0.3 v²/g",
+        ),
+        ("**height of the operational volume**", f"**{result.volume_height:.1f} m**", "the larger one"),
+    ]
+
+
 def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
     """Return the rows of population and class."""
     rows = [("**intrinsic ground risk class**", "", "")]
@@ -208,10 +228,10 @@ def _class_rows(result: GroundRiskResult) -> list[tuple[str, str, str]]:
         rows += [
             (
                 "highest population density",
-                f"{population.max_density:,.4g} people/km²",
+                format_density(population.max_density),
                 f"cell at {lat:.5f}, {lon:.5f}, of all cells that the footprint touches",
             ),
-            ("mean population density", f"{population.mean_density:,.4g} people/km²", "mean of these cells"),
+            ("mean population density", format_density(population.mean_density), "mean of these cells"),
             (
                 "population raster",
                 population.source,

@@ -13,7 +13,7 @@ from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import OTHER_VEHICLES, Command, Mission, command_name
 from flight.mission.itinerary import stated_loiter
-from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.placing import PlacedMission, home_point, place_stops
 from flight.mission.preflight_notes import preflight_notes
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.mission_files.formats import read_mission
@@ -23,11 +23,11 @@ from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.file_autopilots import with_file_autopilot
 from planner.plan import Plan, parse_plan, plan_json, read_plan
-from world.errors import ForecastError, MissionError
+from world.errors import ForecastError, MissionError, ScenarioError, TerrainError
 from world.files import did_you_mean, missing_text
 from world.forecast.scenario_wind import check_coverage
 from world.frames import to_geo
-from world.scenario import Scenario
+from world.scenario import Scenario, with_ground_at
 
 # Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
@@ -63,6 +63,8 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
         scenario = load_scenario_with_options(named_world, options, program)
+        if scenario.link is not None:
+            scenario = with_ground_at_station(scenario, mission)
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
         implied_world = implied_scenario(mission, terrain, vertical_legs=True)
@@ -70,6 +72,21 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     scenario = with_file_autopilot(fences.add_to_scenario(scenario), mission)
     seed = choose_seed(scenario, options.get("seed"))
     return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed)
+
+
+def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
+    """Return a scenario whose terrain reaches to the mission's home if the ground station of its link stands there.
+
+    The terrain is unchanged if its elevation file cannot be read, or has no data there.
+    """
+    home = home_point(mission, scenario.origin, scenario.terrain)
+    if home is None or scenario.link is None or scenario.link.station is not None:
+        return scenario
+    try:
+        return with_ground_at(scenario, (home.east, home.north))
+    except (TerrainError, ScenarioError):
+        # Such as a log whose elevation file is on another machine.
+        return scenario
 
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:

@@ -21,10 +21,13 @@ from planfly.campaigns.find_ground_risk import (
     fly_for_excursions,
     make_volumes,
     nominal_path,
+    turn_areas,
+    turn_of_return,
     with_ground_class,
 )
 from planfly.campaigns.ground_risk_text import DISCLAIMER, answer_line, risk_lines, table_text
 from tests.world.made.elevation_files import from_origin, write_raster
+from world.arrays import Floats
 from world.errors import PlanflyError
 
 # Wing span (m) and highest airspeed (m/s) of the aerosonde, as in its data.
@@ -39,15 +42,21 @@ def base() -> CampaignBase:
 
 
 def row(
-    deviation: float, north: float, impact_north: float, height: float = 80.0, ended: str = "completed"
+    deviation: float,
+    north: float,
+    impact_north: float,
+    height: float = 80.0,
+    ended: str = "completed",
+    turn: float = 0.0,
 ) -> ExcursionRow:
-    """Make the row of a flight that reaches so far north, and whose falls reach so far."""
+    """Make the row of a flight that reaches so far north with its returns, in their turns, and with its falls."""
     flown, fallen = shapely.box(0.0, 0.0, 1000.0, north), shapely.box(0.0, 0.0, 1000.0, impact_north)
     return ExcursionRow(
         draw=draw_flight(default_dispersions(), 1, 0),
         outcome="flyable",
         ended=ended,
         deviation=deviation,
+        turn_deviation=max(deviation, turn),
         height=height,
         return_height=height + 20.0,
         ground_speed=28.0,
@@ -79,8 +88,9 @@ def test_a_narrow_flight_geography_is_three_spans_wide(base: CampaignBase) -> No
 
 
 def test_flown_widths_are_measured_beyond_the_volume_inside(base: CampaignBase) -> None:
-    result = volumes(base, [row(50.0, 400.0, 600.0), *[row(50.0, 40.0, 60.0)] * 19])
-    assert result.flown.contingency_width == pytest.approx(350.0)
+    result = volumes(base, [row(50.0, 400.0, 600.0, turn=300.0), *[row(50.0, 40.0, 60.0)] * 19])
+    assert result.flown.contingency_width == pytest.approx(250.0)
+    assert result.flown.return_distance == pytest.approx(350.0)
     assert result.flown.contingency_height == pytest.approx(100.0)
     assert result.flown.buffer_width == pytest.approx(200.0)
 
@@ -95,12 +105,24 @@ def test_the_larger_of_flights_and_formula_counts(base: CampaignBase) -> None:
     assert far.volume_height == 200.0
     assert far.volume.bounds[3] == pytest.approx(400.0)
     assert far.one_to_one_buffer == pytest.approx(200.0 + 0.5 * SPAN_M)
+    # The falls reach 500 m beyond the returns, and so far around the whole volume.
     assert far.footprint.bounds[3] == pytest.approx(900.0)
+    assert far.footprint.bounds[1] == pytest.approx(-50.0 - 207.7 - 500.0, abs=0.05)
+
+
+def test_the_largest_turn_counts_along_the_whole_path(base: CampaignBase) -> None:
+    """Returns turn 300 m to the north of the path; the volume is as wide to the south and beyond both ends."""
+    result = volumes(base, [row(50.0, 40.0, 60.0, turn=300.0)] * 20)
+    assert result.contingency_width == pytest.approx(250.0)
+    assert result.volume.bounds == pytest.approx((-300.0, -300.0, 1300.0, 300.0), abs=0.5)
+    table = table_text(result)
+    assert "| **width along the whole flight geography** | **250.0 m** |" in table
+    assert f"| **width around the operational volume** | **{result.one_to_one_buffer:.1f} m** |" in table
 
 
 def test_a_glide_widens_the_buffer(base: CampaignBase) -> None:
     result = volumes(base, [row(50.0, 40.0, 60.0)] * 20, glide_ratio=10.0)
-    assert result.formula_buffer == pytest.approx(10.0 * result.volume_height)
+    assert result.buffer_width == pytest.approx(10.0 * result.volume_height)
     assert "m by a glide of 10.0 : 1" in "\n".join(risk_lines(result))
 
 
@@ -136,6 +158,13 @@ def test_a_partial_cover_is_not_judged(base: CampaignBase, tmp_path: Path) -> No
     assert not result.is_judged
     assert result.ground_class is None
     assert answer_line(result).startswith(f"class not judged: {raster} has data for ")
+
+
+def test_a_dense_population_is_written_in_full(base: CampaignBase, tmp_path: Path) -> None:
+    raster = write_density(tmp_path / "density.tif", 30_000.0)
+    result = with_ground_class(volumes(base, [row(50.0, 40.0, 60.0)] * 20, population=raster, unit="per-km2"))
+    assert answer_line(result).endswith(", at most 30,000 people/km²")
+    assert "| highest population density | 30,000 people/km² |" in table_text(result)
 
 
 def test_without_a_population_the_class_is_open(base: CampaignBase) -> None:
@@ -211,17 +240,19 @@ def test_the_areas_of_a_flight_hold_it_its_returns_and_its_falls(base: CampaignB
 
 
 def test_a_wind_carries_falls_away(base: CampaignBase, path: BaseGeometry) -> None:
+    homeless = replace(base, mission=replace(base.mission, home=None))
+
     def beyond_to_south(from_deg: float) -> float:
         """Area of falls to the south of the flight minus that to its north, m2, in a wind of 10 m/s."""
-        flown_row = fly_for_excursions(base, 3, GivenWind(10.0, from_deg), path=path, interval=1000.0, glide=False)
+        flown_row = fly_for_excursions(homeless, 3, GivenWind(10.0, from_deg), path=path, interval=1000.0, glide=False)
         flown, fallen = shapely.from_wkb(flown_row.flown), shapely.from_wkb(flown_row.fallen)
         aside = shapely.difference(fallen, flown)
         south = shapely.box(-5000.0, -5000.0, 5000.0, float(flown.centroid.y))
         return float(2.0 * aside.intersection(south).area - aside.area)
 
     # From some 80 m a wing across the air sinks for 5 s and drifts, along 2,600 m of path.
-    assert beyond_to_south(0.0) > 10_000.0
-    assert beyond_to_south(180.0) < -10_000.0
+    assert beyond_to_south(0.0) > 5_000.0
+    assert beyond_to_south(180.0) < -5_000.0
 
 
 def test_glides_reach_the_ground_beyond_the_flight(base: CampaignBase, path: BaseGeometry) -> None:
@@ -242,3 +273,72 @@ def test_the_area_between_two_returns_counts() -> None:
     assert crossed.is_valid
     assert crossed.contains(shapely.Point(10.0, 50.0))
     assert crossed.contains(shapely.Point(500.0, 75.0))
+
+
+# ----------------------------------------------------------------------
+# Returns from a straight flight to the north at 25 m/s, that turn by a circle and head for its start.
+
+TURN_RADIUS_M = 100.0
+TIMES = np.arange(0.0, 121.0)
+NORTHBOUND = np.column_stack([np.zeros(121), 25.0 * TIMES, np.full(121, 90.0)])
+
+
+def straight_return(start: float, side: float = 1.0) -> Floats:
+    """Return at 25 m/s: half a circle to the east (side 1) or west (-1), and straight on to the south."""
+    angle = np.arange(0.0, math.pi, 25.0 / TURN_RADIUS_M)
+    turn = TURN_RADIUS_M * np.column_stack([side * (1.0 - np.cos(angle)), np.sin(angle)])
+    south = np.column_stack([np.full(201, side * 2.0 * TURN_RADIUS_M), -25.0 * np.arange(201.0)])
+    path = np.concatenate([turn, south])
+    path[:, 1] += 25.0 * start
+    return np.column_stack([path, np.full(len(path), 90.0)])
+
+
+def areas_of_turns(interval: float, sides: tuple[float, ...] = (1.0,)) -> BaseGeometry:
+    starts = np.arange(0.0, 120.1, interval)
+    returns = [straight_return(start, sides[k % len(sides)]) for k, start in enumerate(starts)]
+    turns = [turn_of_return(path, (0.0, -5000.0, 90.0), 0.0) for path in returns]
+    return shapely.union_all(turn_areas(TIMES, NORTHBOUND, starts, turns, interval))
+
+
+def test_the_turn_of_a_return_ends_where_it_heads_for_its_target() -> None:
+    path = straight_return(60.0)
+    turn = turn_of_return(path, (0.0, -5000.0, 90.0), 0.0)
+    # The half circle takes 12.6 s; after it the course is south, and the target 1.8 degrees to its right.
+    assert 12 <= len(turn) <= 14
+    assert np.array_equal(turn_of_return(NORTHBOUND, (0.0, 50_000.0, 90.0), 0.0), NORTHBOUND[:1])
+    # Due south it passes a target at east 90 m at 110 m, which a loiter of 111 m meets, and one of 109 m does not.
+    near = (90.0, 1300.0, 90.0)
+    assert len(turn_of_return(path, near, 111.0)) <= 14
+    assert np.array_equal(turn_of_return(path, near, 109.0), path)
+    loiter = 100.0 * np.column_stack([np.cos(0.2 * TIMES), np.sin(0.2 * TIMES), TIMES])
+    assert np.array_equal(turn_of_return(loiter, (0.0, 0.0, 90.0), 90.0), loiter)
+
+
+@pytest.mark.parametrize("interval", [5.0, 30.0, 60.0, 120.0])
+def test_turns_between_the_starts_of_returns_count(interval: float) -> None:
+    """A place 190 m beside the path lies in the turn of a return that begins some 5 s earlier, at any interval."""
+    area = areas_of_turns(interval)
+    beside = [shapely.Point(side * 190.0, north) for side in (1.0, -1.0) for north in (40.0, 700.0, 1300.0, 2900.0)]
+    assert all(area.contains(place) for place in beside)
+    assert area.bounds[0] == pytest.approx(-200.0, abs=2.0)
+    assert area.bounds[2] == pytest.approx(200.0, abs=2.0)
+
+
+def test_a_longer_interval_does_not_shrink_the_areas() -> None:
+    fine = areas_of_turns(10.0)
+    for interval in (30.0, 60.0):
+        assert areas_of_turns(interval).buffer(1.0).covers(fine)
+        assert areas_of_turns(interval, sides=(1.0, -1.0)).buffer(1.0).covers(fine)
+
+
+def test_the_larger_of_two_neighbouring_turns_counts() -> None:
+    starts = np.array([0.0, 60.0])
+    turns = [NORTHBOUND[:2], np.array([[0.0, 1500.0, 90.0], [80.0, 1500.0, 90.0]])]
+    first, last = turn_areas(TIMES, NORTHBOUND, starts, turns, 20.0)
+    assert first.bounds == pytest.approx((-80.0, -80.0, 80.0, 1580.0))
+    # The last one ends 20 s after its start.
+    assert last.bounds == pytest.approx((-80.0, 1420.0, 80.0, 2080.0))
+
+
+def test_without_returns_there_are_no_turns() -> None:
+    assert not turn_areas(TIMES, NORTHBOUND, np.zeros(0), [], 10.0)

@@ -72,4 +72,4 @@ def test_a_mission_without_terrain_ends_with_2(folder: Path, capsys: pytest.Capt
     assert main(["ground-risk", "short.waypoints", *_FLIGHTS, "--quiet"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "heights above ground need an elevation file" in error
+    assert "heights above ground need terrain: name an elevation file" in error

@@ -18,6 +18,7 @@ from logs.recording.example_log import example_log, write_example_log
 from logs.verdict.judge_flight import judge_flight
 from planfly.cli import main
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
+from tests.world.made.elevation_files import from_origin, write_raster
 from world.errors import PlanflyError
 from world.frames import to_map
 from world.scenario import with_link
@@ -204,3 +205,81 @@ def test_a_link_by_options_is_judged_as_the_verdict_judges_a_mission_from_the_gr
     assert found.finding in verdict.findings
     assert found.along is not None
     assert (found.along.time[0], found.along.time[-1]) == (flown.track.time[0], flown.track.time[-1])
+
+
+# ----------------------------------------------------------------------
+# A station far from the mission: the elevation file knows the ground there, 100 m, and 4.4 km further north, 200 m.
+
+FAR_MISSION = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t100.0\t1
+1\t0\t3\t16\t0\t0\t0\t0\t47.04\t8.005\t400.0\t1
+2\t0\t3\t16\t0\t0\t0\t0\t47.04\t7.995\t400.0\t1
+"""
+LINKED_SCENARIO = """name = "linked"
+origin = {lat_deg = 47.0, lon_deg = 8.0}
+terrain = {kind = "dem", path = "ground.tif"}
+area = {east_m = [-1000, 1000], north_m = [4000, 5000]}
+start = {east_m = 380, north_m = 4447, amsl_m = 400}
+destination = {east_m = -380, north_m = 4447, amsl_m = 400}
+link = {frequency_mhz = 1000, power_dbm = 20, sensitivity_dbm = -100}
+"""
+
+
+@pytest.fixture
+def far(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the mission, an elevation file of 46.98 to 47.07 degrees, and a scenario with a link."""
+    monkeypatch.chdir(tmp_path)
+    heights = np.full((108, 96), 100.0, dtype=np.float32)
+    heights[:54] = 200.0
+    write_raster(tmp_path / "ground.tif", heights, "EPSG:4326", from_origin(7.96, 47.07, 1 / 1200.0, 1 / 1200.0))
+    (tmp_path / "far.waypoints").write_text(FAR_MISSION)
+    (tmp_path / "linked.toml").write_text(LINKED_SCENARIO)
+    return tmp_path
+
+
+@pytest.mark.parametrize("station", [None, (47.0, 8.0), (46.99, 8.01)])
+def test_the_ground_at_a_station_far_from_the_mission_is_read(station: tuple[float, float] | None, far: Path) -> None:
+    """The station stands at home, or where an option states it, on 100 m with an antenna of 3 m."""
+    found = planfly.link("far.waypoints", terrain="ground.tif", **RADIO, station=station)
+    assert found.antenna is not None
+    origin = found.setup.scenario.origin
+    expected = to_map(origin, *(station or (47.0, 8.0)))
+    assert found.antenna == pytest.approx([float(expected[0]), float(expected[1]), 103.0], abs=0.01)
+    assert found.along is not None
+    # Free space and the step of the ground: the margin is known along the whole path.
+    assert np.isfinite(found.along.points.margin).all()
+    assert found.along.points.distance.min() > 4000.0
+
+
+def test_the_command_reads_the_ground_at_the_station(far: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    radio = ["--frequency", "1000", "--power", "20", "--sensitivity", "-100"]
+    assert main(["link", "far.waypoints", "--terrain", "ground.tif", *radio, "--quiet", "--json", "answer.json"]) != 3
+    assert json.loads(Path("answer.json").read_text(encoding="utf-8"))["ok"] is not None
+    assert "unknown" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("place", ["", ", lat_deg = 47.0, lon_deg = 8.0", ", east_m = 0, north_m = 0"])
+def test_the_ground_at_a_scenarios_station_is_read(place: str, far: Path) -> None:
+    """The scenario's area begins 4 km north of the station, which stands at the mission's home or where it states."""
+    (far / "linked.toml").write_text(LINKED_SCENARIO.replace("-100}", f"-100{place}}}"))
+    judged = planfly.judge("far.waypoints", scenario="linked.toml", geometry=True)
+    (finding,) = (finding for finding in judged.verdict.findings if finding.rule == "link")
+    assert finding.ok is not None
+    assert planfly.link("far.waypoints", scenario="linked.toml").finding.ok is not None
+
+
+@pytest.mark.parametrize("station", [(46.5, 8.0), (0.0, 0.0), (-47.0, -172.0)])
+def test_a_station_beyond_the_elevation_file_is_refused(station: tuple[float, float], far: Path) -> None:
+    with pytest.raises(PlanflyError, match="the elevation file has no data there"):
+        planfly.link("far.waypoints", terrain="ground.tif", **RADIO, station=station)
+
+
+def test_a_flight_without_its_elevation_file_keeps_its_terrain(far: Path) -> None:
+    """Then the ground at home is unknown, and a stated station is refused with the file's name."""
+    flown = planfly.fly("far.waypoints", terrain="ground.tif")
+    (far / "ground.tif").unlink()
+    found = planfly.link(flown, **RADIO)
+    assert found.finding.ok is None
+    assert "the ground at the station is unknown" in found.finding.reason
+    with pytest.raises(PlanflyError, match=r"ground\.tif"):
+        planfly.link(flown, **RADIO, station=(47.0, 8.0))
