@@ -73,7 +73,7 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
     'lower both ends of leg 3, to item 5, by 12 m'
     >>> change_text(Change("radius", Place("waypoint", 4, item=5), 80.0, 94.0, "m"))
-    'give item 5 a radius of 94 m instead of 80 m'
+    'set the radius of item 5 to 94 m instead of 80 m'
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
     'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """

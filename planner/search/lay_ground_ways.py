@@ -643,7 +643,7 @@ def _find_finals(
             )
         else:
             finals.append(final)
-    return finals, f"on {round(math.degrees(course)) % 360}° {best_rejected[1]}"
+    return finals, f"on a course of {round(math.degrees(course)) % 360}°, {best_rejected[1]}"
 
 
 def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:

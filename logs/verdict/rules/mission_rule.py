@@ -378,10 +378,11 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
     for item in mission.items:
         name, support = command_name(item.command), command_support(item.command)
         if support.px4 == Treatment.REFUSED:
-            arduplane_accepts = support.arduplane != Treatment.REFUSED
-            autopilot = "ArduPlane accepts it" if arduplane_accepts else "ArduPlane rejects it, too"
-            autopilot = "ArduPlane skips it" if support.reason == SKIPPED_REASON else autopilot
-            yield REFUSED if arduplane_accepts else False, item.seq, f"PX4 does not support {name}; {autopilot}"
+            if support.arduplane == Treatment.REFUSED:
+                yield False, item.seq, f"no autopilot supports {name}"
+                continue
+            verb = "skips" if support.reason == SKIPPED_REASON else "accepts"
+            yield REFUSED, item.seq, f"PX4 does not support {name}; ArduPlane {verb} it"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
                 REFUSED,

@@ -290,7 +290,7 @@ def test_a_plan_of_a_fence_alone_is_a_fence(tmp_path: Path) -> None:
     data["geoFence"] = {"circles": [], "polygons": polygons, "version": 2}
     file = tmp_path / "a.plan"
     file.write_text(json.dumps(data), encoding="utf-8")
-    assert [item.command for item in read_fence(file)] == [5001] * 3 + [5002] * 3
+    assert [item.command for item in read_fence(file).fences] == [5001] * 3 + [5002] * 3
     # Without one it is no plan of anything.
     data["geoFence"] = {"circles": [], "polygons": [], "version": 2}
     with pytest.raises(MissionError, match=r"^a\.plan: mission\.items: no items$"):

@@ -37,7 +37,7 @@ def test_a_fence_that_pymavlink_saved_is_its_polygon_without_the_return_point(tm
     for lat, lon in [RETURN, *CORNERS, CORNERS[0]]:
         loader.add_latlon(lat, lon)
     loader.save(str(tmp_path / "saved.fence"))
-    items = read_fence(tmp_path / "saved.fence")
+    items = read_fence(tmp_path / "saved.fence").fences
     assert [(item.lat_deg, item.lon_deg) for item in items] == CORNERS
     assert {(item.command, item.params[0]) for item in items} == {(5001, 4.0)}
 

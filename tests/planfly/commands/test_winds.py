@@ -39,7 +39,7 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the charts' pictures empty: tests/planfly/campaigns/test_report.py has them drawn."""
     monkeypatch.setattr(report, "png_bytes", lambda _: b"")
-    monkeypatch.setattr(report, "page_svg", lambda *_: "")
+    monkeypatch.setattr("planfly.campaigns.page.page_svg", lambda *_: "")
 
 
 @pytest.fixture

@@ -167,7 +167,8 @@ FENCES = {
     "far.fence": "136.5 -84.2\n" * 5,
     "zone.plan": ZONE_FILES["bow.geojson"],
     "fence.kmz": "PK",
-    "fence.rally": "QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t36.5\t-84.1\t50\t1\n",
+    "none.rally": "QGC WPL 110\n",
+    "far.rally": "QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t136.5\t-84.1\t50\t1\n",
     **ZONE_FILES,
 }
 

@@ -463,7 +463,7 @@ def test_a_mission_comes_back_from_its_data() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rule", "by", "seed", "items"), [("clearance", -90.0, 5, 12), ("threat", 120.0, 4, 14), ("threat", 200.0, 4, 14)]
+    ("rule", "by", "seed", "items"), [("clearance", -90.0, 5, 12), ("threat", 120.0, 7, 12), ("threat", 120.0, 1, 20)]
 )
 def test_a_suggestion_applied_mends_its_finding(rule: str, by: float, seed: int, items: int) -> None:
     """At once, though a path that goes round a corner moves by less than its waypoint."""

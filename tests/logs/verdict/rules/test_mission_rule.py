@@ -46,7 +46,7 @@ REFUSED = {
         "checkMissionItemValidity",
         (*GOOD, "2 5000 0 0 0 0 0 0 0"),
         4,
-        "PX4 does not support NAV_FENCE_RETURN_POINT",
+        "no autopilot supports NAV_FENCE_RETURN_POINT",
     ),
     "spline": ("checkMissionItemValidity", (*GOOD, wp(1500, 0, command=82)), 4, "NAV_SPLINE_WAYPOINT"),
     "servo": (
