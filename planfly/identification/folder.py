@@ -168,7 +168,9 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
             "gains.toml": gains_text(gains_from_model(aircraft)),
         }
         if home is not None:
-            mission = identification_mission(aircraft, envelope, *home)
+            parameters = flown_parameters(identified.logs[-1])
+            rates = parameters.get("TECS_CLMB_MAX", math.inf), parameters.get("TECS_SINK_MAX", math.inf)
+            mission = identification_mission(aircraft, envelope, *home, max_rates=rates)
             files["identify.waypoints"] = waypoints_text(mission)
     return files | {
         **_parameter_file_text_by_name(identified),

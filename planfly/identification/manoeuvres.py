@@ -16,6 +16,8 @@ from world.frames import GeoOrigin, to_geo
 # Slopes of the mission as a fraction of the steepest climb and descent, which need slightly less than full throttle, so
 # that the mission can be flown in wind.
 _SLOPE_FRACTION = 0.85
+# Vertical rates of the mission as a fraction of the autopilot's largest rates.
+_RATE_FRACTION = 0.9
 # Duration of a level run, s.
 _LEVEL_RUN_TIME_S = 25.0
 # Duration of a climb or a glide, s.
@@ -25,16 +27,24 @@ _START_HEIGHT_M = 150.0
 
 
 def identification_mission(
-    aircraft: Aircraft, envelope: Envelope, lat_deg: float, lon_deg: float, ground: float, repeats: int = 1
+    aircraft: Aircraft,
+    envelope: Envelope,
+    lat_deg: float,
+    lon_deg: float,
+    ground: float,
+    repeats: int = 1,
+    *,
+    max_rates: tuple[float, float] = (math.inf, math.inf),
 ) -> Mission:
     """Return the mission of manoeuvres for an identification, around a home position.
 
     lat_deg, lon_deg, ground: home position, degrees and m AMSL.
     repeats: number of times that the sequence is flown.
+    max_rates: largest climb and sink rate of the autopilot that flies it, m/s.
 
     The legs form squares, so that every manoeuvre is flown with the wind and against it.
     """
-    waypoints = list(_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats))
+    waypoints = list(_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats, max_rates))
     east, north = np.array([waypoint[:2] for waypoint in waypoints]).T
     lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
     items: list[MissionItem] = []
@@ -61,12 +71,12 @@ def identification_mission(
 
 
 def _waypoints(
-    aircraft: Aircraft, envelope: Envelope, base: float, repeats: int
+    aircraft: Aircraft, envelope: Envelope, base: float, repeats: int, max_rates: tuple[float, float]
 ) -> Iterator[tuple[float, float, float, float]]:
     """Yield east, north and altitude (m) of each waypoint, and the airspeed on the leg to it (m/s).
 
     base: altitude of the first waypoint, m AMSL.
-    repeats: number of times that the sequence is flown.
+    repeats, max_rates: see `identification_mission`.
     """
     cruise = aircraft.airspeed
     slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
@@ -95,7 +105,9 @@ def _waypoints(
             # Add length for the turns at both ends of the leg.
             length = speed * seconds + 2.0 * speed * speed / 9.81
             climb, descent = envelope.air_angles(speed, altitude)
-            angle = (climb if vertical_direction > 0 else descent) * _SLOPE_FRACTION if vertical_direction else 0.0
+            steepest, max_rate = (climb, max_rates[0]) if vertical_direction > 0 else (descent, max_rates[1])
+            rate_angle = math.asin(min(1.0, _RATE_FRACTION * max_rate / speed))
+            angle = min(steepest * _SLOPE_FRACTION, rate_angle) if vertical_direction else 0.0
             altitude = max(
                 base - 60.0,
                 altitude + vertical_direction * length * math.tan(max(0.0, angle) if math.isfinite(angle) else 0.0),

@@ -373,9 +373,8 @@ def _flown_finding(
         clearances = aligned.clearance[first:last]
         is_known = np.isfinite(clearances)
         if is_known.any():
-            row, limit = requirement.smallest_margin(
-                clearances, np.asarray(aligned.track.position[first:last], dtype=np.float64)
-            )
+            positions = np.asarray(aligned.track.position[first:last], dtype=np.float64)
+            row, limit = requirement.smallest_margin(clearances, positions)
             k = first + row
             min_clearance = float(aligned.clearance[k])
             ok = min_clearance >= limit - CLEARANCE_TOLERANCE_M

@@ -38,6 +38,11 @@ _MAH_PER_AH = 1000.0
 _VOLTAGE_ROUNDING_V = 0.005
 
 
+GUESSED_BATTERY_TEXT = (
+    "the battery's capacity is a guess: give --battery when the aircraft is made, or battery_wh in the scenario"
+)
+
+
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
@@ -62,9 +67,9 @@ def energy_findings(
     # Power is log-normal; this is the upper end of 95 %.
     max_energy = needed_energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
-    if energy == 0.0 and planned_energy == 0.0:
-        # A model without power data gives 0 W.
-        energy, planned_energy = math.nan, math.nan
+    # A model without power data gives 0 W.
+    if energy == planned_energy == 0.0:
+        energy = planned_energy = math.nan
         reason = "the aircraft's model states no power, so the energy is unknown"
     elif math.isnan(energy):
         reason = "the aircraft's power is unknown at these speeds" if geometric else "nothing was flown"
@@ -73,8 +78,7 @@ def energy_findings(
         if geometric or math.isfinite(planned_energy):
             reason += " by prediction" if geometric else f"; {planned_energy:.1f} Wh by prediction"
         if is_guessed:
-            remedy = "give --battery when the aircraft is made, or battery_wh in the scenario"
-            reason = f"the battery's capacity is a guess: {remedy}; {reason}"
+            reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
         reason += "" if is_guessed or max_energy <= needed_energy else _max_energy_text(max_energy, envelope.source)

@@ -59,7 +59,7 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
     assert not {"wind_speed", "wind_from"} & {one.quantity.name for one in base.dispersions.varying}
     names = ["plan.json", "winds.html", "winds.json", "winds.png", "winds.sqlite"]
     assert sorted(file.name for file in out.iterdir()) == names
-    assert repr(found).startswith("<WindsResult 4 directions, ")
+    assert repr(found).startswith("<WindsResult 4 directions")
     assert repr(found).endswith(" 24 flights>")
     # It goes on with the plan and the flights that are there; another question is refused.
     plan = (out / "plan.json").read_bytes()

@@ -134,6 +134,8 @@ def test_check_of_the_log_repeats_the_verdict(demo: Path, tmp_path: Path) -> Non
     assert main(["check", str(demo / "flight.mcap"), "--json", str(tmp_path / "v.json")]) == 0
     answer = json.loads((tmp_path / "v.json").read_bytes())
     assert answer.pop("exit_code") == 0
+    returns = answer.pop("returns")
+    assert returns["returns"] == sum(returns["outcomes"].values()) > 0
     assert answer == json.loads((demo / "verdict.json").read_bytes())
 
 

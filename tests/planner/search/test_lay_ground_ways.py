@@ -307,7 +307,7 @@ def test_a_ridge_under_the_final_makes_it_steeper_or_is_named() -> None:
     # 375 m before the point the glide is 10 m over a ridge of 10 m, at 3.1 degrees or more.
     assert low.ways.descent.slope * 375.0 > 20.0
     assert not high.feasible
-    assert high.certificate.problems[0].startswith("landing: on 0° a final approach of")
+    assert high.certificate.problems[0].startswith("landing: on a course of 0°, a final approach of")
     assert "too low above the ground" in high.certificate.problems[0]
 
 
