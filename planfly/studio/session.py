@@ -375,8 +375,9 @@ class Session:
         source: where the suggestion comes from.
         """
         moves = item_moves(self.context, self.mission, mission)
-        text = f"apply a suggestion of {source}" + (f": move {moves_text(moves)}" if moves else "")
-        return replace(mission, autopilot=self.mission.autopilot), text
+        changed = [str(new.seq) for old, new in zip(self.mission.items, mission.items, strict=False) if new != old]
+        edit_text = f": move {moves_text(moves)}" if moves else f": change item {', '.join(changed)}" if changed else ""
+        return replace(mission, autopilot=self.mission.autopilot), f"apply a suggestion of {source}{edit_text}"
 
     def _mission_with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission as flown in the trial of a suggestion, and a description of the edit.

@@ -552,7 +552,7 @@ def test_a_suggestion_of_the_flight_is_offered_once_it_was_flown_and_applied(pag
     apply = f"{own}?.nextElementSibling.querySelector('.apply')"
     page.wait_for(f"{apply} && document.getElementById('stop').hidden", 150.0)
     page.value(f"{apply}.click()")
-    page.wait_for("document.getElementById('undo').title.includes('a suggestion of the flight: move item')")
+    page.wait_for("document.getElementById('undo').title.includes('a suggestion of the flight: ')")
     undo_all(page)
 
 
