@@ -183,7 +183,7 @@ def test_all_rules_that_fail_most_flights_are_named(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("made_flights")
 @pytest.mark.parametrize(("outcome", "words"), [("flyable", "10 of 10"), ("not flyable", "0 of 10")])
 def test_what_is_not_judged_is_named_and_decides_nothing(outcome: str, words: str, tmp_path: Path) -> None:
-    """Whether the flights are flyable but for the take-off, or not judged in full."""
+    """All flights are flyable, or fail, but for a take-off that is not judged."""
     unjudged = (("takeoff", "take-off (PX4's take-off is not simulated)"),)
     result = found(open_in(tmp_path, hourly_winds(4.0, 4.0)), 0.0, 0.0)
     result = changed(result, outcome=outcome, undecided=True, unjudged=unjudged)

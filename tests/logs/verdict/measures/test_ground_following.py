@@ -19,12 +19,14 @@ from tests.synthetic import CALM_CLIMB, fly_path, make_setup
 from world.arrays import Floats
 from world.terrain import make_gridded_terrain
 
-# North of the lower and the upper edge of the step, m: 16.7 degrees for a step of 150 m.
-LOWER, UPPER = 1500.0, 2000.0
+# North of the lower edge of the step, m.
+LOWER_EDGE_NORTH_M = 1500.0
+# North of its upper edge, m: 16.7 degrees for a step of 150 m.
+UPPER_EDGE_NORTH_M = 2000.0
 
 
 def ground(north: Floats, step: float) -> Floats:
-    return np.interp(north, [LOWER, UPPER], [400.0, 400.0 + step])
+    return np.interp(north, [LOWER_EDGE_NORTH_M, UPPER_EDGE_NORTH_M], [400.0, 400.0 + step])
 
 
 def over_step(step: float = 150.0) -> FlightSetup:

@@ -580,7 +580,7 @@ def test_items_behind_the_missions_end_are_never_reached(
 
 @pytest.mark.parametrize("case", sorted(REFUSED))
 def test_px4s_rules_are_not_cited_where_arduplane_flies(case: str) -> None:
-    """What no autopilot accepts fails all the same."""
+    """An item that no autopilot accepts fails with either autopilot."""
     _, lines, item, words = REFUSED[case]
     verdict = judge_geometry(replace(setup_of(*lines), autopilot=ArduPlane(ArduPilotParameters.defaults())))
     found = [one for one in verdict.findings if one.rule == "mission" and words in one.reason and one.ok is not None]
