@@ -78,7 +78,7 @@ def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: T
     station = station_position(table, origin)
     if station is not None and ground is not None and math.isnan(float(ground.height(*station))):
         position = f"east {station[0]:.0f} m, north {station[1]:.0f} m"
-        message = f"{source}: link: {position}: the elevation file has no data there"
+        message = f"{source}: link: the elevation file has no data at the ground station, {position}"
         raise ScenarioError(message, file=source, field="link")
     gains = table.station_gain_dbi + table.aircraft_gain_dbi - table.cable_loss_db
     allowed_loss = table.power_dbm + gains - table.sensitivity_dbm - table.fade_margin_db

@@ -205,7 +205,7 @@ class Autopilot(ABC):
         invalid.
         """
         if table.params is not None:
-            allowed = f'not a key of autopilot = "{cls.name}", which has no parameters'
+            allowed = f'not allowed with autopilot = "{cls.name}", which has no parameters'
             raise ScenarioError.at(scenario, "flight.params", table.params, allowed)
         return cls()
 

@@ -293,7 +293,10 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
             break
     if steps.endless is not None:
         name = command_name(mission.items[steps.index[steps.endless]].command)
-        builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
+        builder.notes.add(
+            f"{name} repeats without end: its items are flown once more, and the simulated flight ends there",
+            steps.endless,
+        )
     _add_command_limits(mission, steps, builder)
     for gate in builder.gates:
         builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)

@@ -276,7 +276,7 @@ def _signed_radius(
     if radius == 0.0 and rules.radius != 0.0:
         is_left = rules.radius < 0.0 or loiter.radius < 0.0
         direction_text = " to the left" if is_left else ""
-        reason = f"its radius of {stated_radius:g} m is not read" if stated_radius > 0.0 else "loiter without a radius"
+        reason = f"its radius of {stated_radius:g} m is ignored" if stated_radius > 0.0 else "loiter without a radius"
         notes.add(f"{reason}: flown with {rules.radius_name}, {abs(rules.radius):g} m{direction_text}", stop.item)
         return math.copysign(max(MIN_LOITER_RADIUS_M, abs(rules.radius) * radius_scale), -1.0 if is_left else 1.0)
     if radius == 0.0:
@@ -289,7 +289,9 @@ def _signed_radius(
         radius = MIN_LOITER_RADIUS_M
     elif round(radius * radius_scale) != round(stated_radius):
         notes.add(
-            f"loiter radius {stated_radius:g} m: flown with {radius * radius_scale:.0f} m at this height", stop.item
+            f"loiter radius {stated_radius:g} m: flown with {radius * radius_scale:.0f} m,"
+            " because the radius grows with altitude",
+            stop.item,
         )
     return math.copysign(radius * radius_scale, loiter.radius)
 

@@ -213,4 +213,4 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
         if max(abs(slope) for slope in slopes) > STEEPEST_STRIP_SLOPE:
             ground += f" ({STEEPEST_STRIP_SLOPE:.0%} is the limit for a plan's landing)"
     strip_text = "the scenario has no [landing], so touch-down and roll-out are not judged"
-    yield f"item {last_item}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"
+    yield f"item {last_item}: lands on course {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"

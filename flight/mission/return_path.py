@@ -329,17 +329,17 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     continuation: name of the sequence after the loiter; "" if the RTL stays in the loiter.
 
     >>> rtl_note(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
-    'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, sinking 655 m on a straight slope to 435 m AMSL; circles for 60 s; ...'
+    'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, descending 655 m on a straight slope to 435 m AMSL; ...'
     """
     altitude_gain = target.position[2] - start_altitude
     reason = f" ({target.reason})" if target.reason else ""
     altitude_text = (
-        f"sinking {-altitude_gain:.0f} m on a straight slope to"
+        f"descending {-altitude_gain:.0f} m on a straight slope to"
         if altitude_gain <= -1.0
         else f"climbing {altitude_gain:.0f} m at once to"
     )
     if -altitude_gain >= 1.0 and abs(target.slope_base - altitude_gain) < rules.min_slope_height:
-        altitude_text = f"sinking {-altitude_gain:.0f} m at once to"
+        altitude_text = f"descending {-altitude_gain:.0f} m at once to"
     if rules.holds_height:
         altitude_text = _held_altitude_text(target, start_altitude)
     elif abs(altitude_gain) < 1.0:
@@ -356,7 +356,7 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     end_text = (
         f"then from the loiter to {continuation}"
         if continuation
-        else f"circles for {ENDLESS_LOITER_TIME_S:.0f} s; the mission ends there"
+        else f"the simulated flight ends after {ENDLESS_LOITER_TIME_S:.0f} s of the loiter there"
     )
     return (
         f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_distance_text(target.distance)} away{reason}, {altitude_text}"
@@ -367,7 +367,7 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
 def _held_altitude_text(target: ReturnTarget, start_altitude: float) -> str:
     """Describe the altitudes of an RTL that holds its altitude, up to the word before the altitude of its end."""
     first_climb, sink = target.transit_altitude - start_altitude, target.transit_altitude - target.position[2]
-    sink_text = f"sinking {sink:.0f} m in circles there, to"
+    sink_text = f"descending {sink:.0f} m in a loiter there, to"
     if first_climb < 1.0:
         return f"level, and {sink_text}" if sink >= 1.0 else "at"
     climb_text = f"climbing {first_climb:.0f} m first, to"

@@ -465,7 +465,7 @@ def make_route(
     >>> route.positions.round().tolist()
     [[0.0, 0.0, 700.0], [0.0, 1110.0, 700.0], [0.0, 2219.0, 700.0]]
     >>> route.started
-    'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
+    'no TAKEOFF: the flight starts in the air, trimmed, at the first position, item 1: 36.5... course 0 degrees'
     """
     return route_through_stops(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
 
@@ -849,9 +849,10 @@ def _start_text(itinerary: Itinerary, first_stop: RoutePoint, origin: GeoOrigin,
     start_place = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
     item = itinerary.takeoff
     name = "no TAKEOFF" if item is None else f"{command_name(item.command)} (item {item.seq})"
+    start_text = f"{name}: the flight starts in the air, trimmed,"
     if first_stop.loiter is not None:
-        return f"{name}: starts trimmed in the air on the circle of item {first_stop.item}: {start_place}"
+        return f"{start_text} on the loiter of item {first_stop.item}: {start_place}"
     if item is not None:
         place_name = "home" if itinerary.has_home else "the first position, as there is no home,"
-        return f"{name}: starts trimmed in the air over {place_name} at that item's height: {start_place}"
-    return f"{name}: starts trimmed at the first position, item {first_stop.item}: {start_place}"
+        return f"{start_text} over {place_name} at this item's altitude: {start_place}"
+    return f"{start_text} at the first position, item {first_stop.item}: {start_place}"

@@ -246,11 +246,13 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     gaps, falling = [row for row, step in seq_steps if step > 1], [row for row, step in seq_steps if step < 1]
     if gaps:
         warnings.append(
-            f"{gaps[0].location}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): {numbering_text}"
+            f"{gaps[0].location}: a gap in the sequence numbers before {gaps[0].item.seq} ({len(gaps)} in all):"
+            f" {numbering_text}"
         )
     if falling:
         warnings.append(
-            f"{falling[0].location}: seq {falling[0].item.seq} does not rise ({len(falling)} in all): {numbering_text}"
+            f"{falling[0].location}: sequence number {falling[0].item.seq} is not higher than the one before"
+            f" ({len(falling)} in all): {numbering_text}"
         )
     unplaced = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if unplaced:

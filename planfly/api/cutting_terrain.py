@@ -54,7 +54,7 @@ def terrain(
     """
     check_arguments(margin=margin)
     if (around is None) == (box is None):
-        raise PlanflyError("`around`, `box`: expected one of them", field="around, box")
+        raise PlanflyError("expected either `around` or `box`", field="around, box")
     target = Path(out)
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: expected a name that ends with .tif", file=target)

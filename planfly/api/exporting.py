@@ -397,9 +397,9 @@ def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
     if (stated := stated_cruise_speed(source.mission)) is not None:
         return stated, "the mission's"
     if source.airspeed is not None:
-        return source.airspeed, f"that of {source.aircraft}"
+        return source.airspeed, f"from {source.aircraft}"
     aircraft = load_aircraft(FlightTable().aircraft)
-    return aircraft.airspeed, f"that of the default aircraft {aircraft.name}; --aircraft names yours"
+    return aircraft.airspeed, f"from the default aircraft {aircraft.name}; --aircraft names yours"
 
 
 def judging_parameters_text(
@@ -421,7 +421,7 @@ def judging_parameters_text(
     omitted = ""
     if values.get("RTL_AUTOLAND") == 0.0 and any(item.command == Command.DO_LAND_START for item in mission.items):
         del values["RTL_AUTOLAND"]
-        omitted = ", without RTL_AUTOLAND 0, with which it does not arm"
+        omitted = ", without RTL_AUTOLAND 0, because it does not arm with that value"
     title = f"{autopilot.title}: take-off, landing and returns "
     title += (
         "with which planfly judges the mission"

@@ -102,7 +102,7 @@ class LinkResult:
         """One line for each outage of the link, in order of time."""
         outages = () if self.along is None else self.along.outages
         return tuple(
-            f"{period_text(outage)}: {duration_text(outage.duration)} below the fade margin, by up to"
+            f"{period_text(outage)}: the signal is below the fade margin for {duration_text(outage.duration)}, by up to"
             f" {-worst.margin:.1f} dB at {worst.lat_deg:.6f}, {worst.lon_deg:.6f}"
             for outage, worst in zip(outages, self.worst_points, strict=True)
         )

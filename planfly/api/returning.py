@@ -144,13 +144,13 @@ class ReturnsResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        notes = [f"by the simulated {self.returns.autopilot} flying a point-mass model, in the mean wind"]
+        notes = [f"returns are simulated with {self.returns.autopilot}'s control of a point mass, in the mean wind"]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             reflown_text = count_text(len(self.returns.jsbsim_differences), "return")
             notes.append(
-                f"{reflown_text} close to a limit flown again in JSBSim; both"
-                f" simulations differ by up to {max_difference:.0f} m"
+                f"{reflown_text} close to a limit also flown in JSBSim; the heights of the two simulations differ by"
+                f" up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
             notes.append(

@@ -54,14 +54,13 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
     """Return the lines below the answer: volumes, population, zones, flights, and what the result is not."""
     flown, formula = result.flown, result.formula
     lines = [
-        f"flight geography: {result.half_width:.0f} m to either side of the path, {flown.height:.0f} m above ground"
-        f" ({_share_text(result)} stay within)",
-        f"contingency volume: {flown.contingency_width:.0f} m beyond it in flights and turns of returns,"
-        f" {flown.contingency_height:.0f} m above ground in flights and returns; {formula.width:.0f} m,"
-        f" {formula.height:.0f} m by Annex A; the returns reach {flown.return_distance:.0f} m beyond it on their way",
-        f"ground risk buffer: {flown.buffer_width:.0f} m beyond flights and returns by falls"
-        f"{' and glides' if result.goal.glide else ''};"
-        f" {result.one_to_one_buffer:.0f} m by the 1:1 rule{_glide_text(result)}",
+        f"flight geography: {result.half_width:.0f} m to either side of the path, up to {flown.height:.0f} m above"
+        f" ground ({_share_text(result)} stay inside)",
+        f"contingency volume: flights and turns of returns reach {flown.contingency_width:.0f} m beyond the flight"
+        f" geography, and {flown.contingency_height:.0f} m above ground; Annex A requires {formula.width:.0f} m and"
+        f" {formula.height:.0f} m; returns on their way home reach {flown.return_distance:.0f} m",
+        f"ground risk buffer: falls{' and glides' if result.goal.glide else ''} reach {flown.buffer_width:.0f} m"
+        f" beyond flights and returns; the 1:1 rule requires {result.one_to_one_buffer:.0f} m{_glide_text(result)}",
         f"areas: operational volume {result.volume.area / 1e6:.2f} km², with its ground risk buffer"
         f" {result.footprint.area / 1e6:.2f} km²",
     ]

@@ -402,7 +402,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     ]
     lines += failure_lines(summary.by_rule)
     lines += [
-        f"  narrow  {RULE_WORDS[entry.rule].title}: the smallest margin is"
+        f"  narrow  {RULE_WORDS[entry.rule].title}: the smallest margin of all flights is"
         f" {margin_text(entry.lowest or 0.0, entry.unit, passed=True)}"
         for entry in summary.ranking
         if entry.is_narrow_pass
@@ -422,7 +422,7 @@ def deciding_lines(summary: CampaignSummary) -> list[str]:
         flights_text = count_text(summary.estimate.tally.flown, "flight")
         text = f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} it, by an unknown margin"
     else:
-        text = f"one flight in twenty has a margin below {quantity_text(summary.low_margin, summary.unit)}"
+        text = f"5 % of the flights have a margin below {quantity_text(summary.low_margin, summary.unit)}"
     return [f"  decides {RULE_WORDS[summary.deciding].title}: {text}; {_drivers_text(summary)}"]
 
 
@@ -461,9 +461,9 @@ def _answer_text(summary: CampaignSummary) -> str:
 def _drivers_text(summary: CampaignSummary) -> str:
     """Return a clause on the quantities that explain most of the deciding margin's variance."""
     if not summary.sensitivities:
-        return f"at least {MIN_FLIGHTS_FOR_INDEX} flights that this rule judges would show what the margin depends on"
+        return f"what the margin depends on is known from {MIN_FLIGHTS_FOR_INDEX} flights that this rule judges"
     if not summary.drivers:
-        return "nothing that was drawn is shown to explain the margin"
+        return "no dispersed quantity significantly explains the margin"
     return "of the margin's variance " + ", ".join(
         f"{sensitivity.title} explains {100.0 * sensitivity.index:.0f} %"
         for sensitivity in summary.drivers[:_MAX_NAMED_QUANTITIES]

@@ -14,7 +14,7 @@ def answer_line(result: WindowResult) -> str:
     """Return the answer in one line: the asked departure, or the windows."""
     goal, asked = result.goal, result.asked
     windows = ", ".join(_window_text(*window) for window in result.windows)
-    open_text = f"open {windows} UTC" if windows else "no departure is open"
+    open_text = f"open for take-off: {windows} UTC" if windows else "no take-off time is open"
     if asked is None:
         unknown_text = ", but not judged in full" if windows and result.is_go is None else ""
         return f"{open_text}{unknown_text}{_best_text(result)}"
@@ -25,8 +25,9 @@ def answer_line(result: WindowResult) -> str:
     if result.is_go is None:
         return f"{subject}: not judged in full: {counts}, {asked.undecided} are not judged in full; {open_text}"
     if result.is_open(asked):
-        return f"{subject}: go: {counts}; {open_text}"
-    return f"{subject}: no go: {counts}, {goal.probability:g} is asked for; {open_text}{_best_text(result)}"
+        return f"{subject}: go, {counts}; {open_text}"
+    required_text = f"less than the required {100.0 * goal.probability:g} %"
+    return f"{subject}: no go, {counts}, {required_text}; {open_text}{_best_text(result)}"
 
 
 def _window_text(first: datetime, last: datetime) -> str:

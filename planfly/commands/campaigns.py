@@ -216,7 +216,9 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
 
     for option, target in (("--json", args.json), ("--junit", args.junit)):
         if target:
-            raise PlanflyError(f"{option}: only with a campaign, not with --refly", field=option, value=target)
+            raise PlanflyError(
+                f"{option}: cannot be combined with --refly, which flies a single flight", field=option, value=target
+            )
     flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
     print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
     for rule, place in flight.row.failed:

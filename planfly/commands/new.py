@@ -66,7 +66,7 @@ def new(args: argparse.Namespace) -> int:
     if plan.safe:
         ratio = plan.objectives.length_ratio
         safe_text = colour_text("plans     safe", "good")
-        print(f"{safe_text}: {len(plan.waypoints)} waypoints, {ratio:.3f} times the straight line")
+        print(f"{safe_text}: {len(plan.waypoints)} waypoints, {ratio:.3f} times as long as the straight line")
     else:
         print(colour_text("plans     no safe path", "bad"))
         for problem in (*plan.certificate.problems, *planfly.what_blocks(plan)):

@@ -232,11 +232,14 @@ def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> 
 
     state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
     length = plan.objectives.length_ratio
-    print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
+    print(
+        f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times as long as the straight line,"
+        f" algorithm {plan.algorithm}"
+    )
     conditions = conditions_of_plan(plan)
     print("\n".join([*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]))
     if plan.feasible and not is_dispersed:
-        print("Judged: in the stated wind and over the heights of the map, not over dispersions (--flights 40)")
+        print("Judged: in the stated wind over the terrain of the map; dispersions are not included (--flights 40)")
     if plan.ended != "completed":
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
         print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")

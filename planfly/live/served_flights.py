@@ -109,8 +109,8 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
         return ServedScenario(setup.scenario, airframe_for_setup(setup), setup.seed, setup.mission)
     scenario_name = options.flight_options.get("scenario")
     if scenario_name is None:
-        allowed = "expected a mission, or a scenario in which to wait for an upload: `scenario` NAME"
-        raise PlanflyError(f"mission: not named; {allowed}", field="scenario", allowed=allowed)
+        allowed = "expected a mission, or `scenario` NAME, in which to wait for the upload of a mission"
+        raise PlanflyError(f"mission: missing; {allowed}", field="scenario", allowed=allowed)
     fences = read_named_fences(options.flight_options.get("fence") or ())
     scenario = load_scenario_with_options(scenario_name, options.flight_options)
     scenario, seed = fences.add_to_scenario(scenario), options.flight_options.get("seed")

@@ -80,9 +80,10 @@ def _short_strip_text(plan: Plan) -> str:
         remedies.append("less turbulence")
     source = "the elevation file" if strip.height_sd is None else "its survey"
     return (
-        f"only {probability:.2f} of the landings may touch down on the {strip.length:.0f} m of the strip: its height is"
-        f" known within {height_sd:.1f} m by {source}, and the touchdown within {touchdown_sd:.0f} m (standard"
-        f" deviations, by the largest scatter of measured landings); what would help: {', or '.join(remedies)}"
+        f"only {100.0 * probability:.0f} % of the landings are expected to touch down on the strip of"
+        f" {strip.length:.0f} m: the standard deviation of its height is {height_sd:.1f} m ({source}), and that of the"
+        f" touchdown point {touchdown_sd:.0f} m (largest scatter of measured landings);"
+        f" would help: {', or '.join(remedies)}"
     )
 
 

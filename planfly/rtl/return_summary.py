@@ -88,7 +88,7 @@ def return_law_lines(setup: FlightSetup) -> list[str]:
         return []
     world = make_return_world(setup)
     behaviour, unjudged = world.autopilot.returns, world.unjudged_parts
-    lines = [f"returns to launch by the simulated {world.autopilot.title} flying a point-mass model"]
+    lines = [f"returns to launch are simulated with {world.autopilot.title}'s control of a point mass"]
     lines += [behaviour.path_text] if behaviour.path_text else []
     if unjudged:
         extent = "in full" if world.is_simulated else "at all"

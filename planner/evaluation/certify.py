@@ -229,16 +229,21 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
         elif margin < -_EPSILON:
             known = too_low.get(name, _LowPlace(math.inf, math.inf))
             too_low[name] = _LowPlace(min(known.margin, margin), min(known.height, float(piece["height"])))
-    required_text = f"{data.clearance:g} m and {data.buffer:.1f} m of margin required"
+    required_text = f"{data.clearance:g} m of clearance and {data.buffer:.1f} m of margin are required"
     problems += _summarise_faults([(0.0, name, "leaves the terrain data") for name in off_terrain])
     problems += _summarise_faults(
         [
-            (place.margin, name, f"{place.height:.1f} m above ground at its lowest, {required_text}")
+            (place.margin, name, f"{_ground_text(place.height)} at its lowest point; {required_text}")
             for name, place in too_low.items()
             if name not in off_terrain
         ]
     )
     return _without_rounding(float(margins.min()))
+
+
+def _ground_text(height: float) -> str:
+    """Describe a height above ground, m, that is negative below the ground."""
+    return f"{abs(height):.1f} m {'below' if height < 0.0 else 'above'} ground"
 
 
 class _LowPlace(NamedTuple):

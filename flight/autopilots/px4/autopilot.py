@@ -115,7 +115,7 @@ _TO_LANDING = (1.0, 3.0)
 # Destination of an RTL by the value of RTL_TYPE.
 _DESTINATION_TEXTS = {
     0: "the nearer of home and the nearest rally point",
-    1: "the nearer of the mission's landing and the nearest rally point, or home without both",
+    1: "the nearer of the mission's landing and the nearest rally point, or home if there is neither",
     2: "the mission's landing, or home, along the mission",
     3: "the nearest of home, the mission's landing and the rally points",
     4: "the mission's landing, or home, along the mission",
@@ -476,9 +476,9 @@ class Px4(Autopilot):
         return_type = parameters["RTL_TYPE"]
         first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
         return (
-            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}; unless it begins"
-            f" higher, it first climbs in a circle to RTL_RETURN_ALT {first_height} above that place; it flies there"
-            f" level, and over home or a rally point it descends in circles to RTL_DESCEND_ALT {last_height}"
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}; below RTL_RETURN_ALT"
+            f" ({first_height} above its destination) it first climbs in a loiter to that height; it then flies level,"
+            f" and over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
 
     @property

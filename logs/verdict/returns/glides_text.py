@@ -87,21 +87,23 @@ def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
     """Describe the best destination of a time range, and the altitude to spare or missing."""
     glide = glide_range.lowest_glide
     altitude_left = glides.altitude_left(glide)
-    time_text = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
+    worst_text = "" if glide_range.count == 1 else f" in the worst case, a failure at {glide.time:.0f} s"
     match glide.reach:
         case "home" | "site":
-            return f"{site_text(glides.sites[glide_range.site])}, {altitude_left:.0f} m of altitude to spare{time_text}"
+            site = site_text(glides.sites[glide_range.site])
+            return f"{site} is in reach with {altitude_left:.0f} m of altitude to spare{worst_text}"
         case "flat":
             east, north, up = glide.flat_position
             position_text = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            return f"only flat ground, {position_text}, {altitude_left:.0f} m of altitude to spare{time_text}"
+            spare_text = f"with {altitude_left:.0f} m of altitude to spare{worst_text}"
+            return f"only flat ground is in reach, {position_text}, {spare_text}"
         case "nothing":
             shortfall_text = (
                 "no glide path exists"
                 if math.isinf(altitude_left)
                 else f"at most {-altitude_left:.0f} m of altitude are missing"
             )
-            return f"nothing, {shortfall_text}"
+            return f"nothing is in reach: {shortfall_text}"
         case "unknown":
             return "unknown, because this part lies outside the elevation data"
 
@@ -130,10 +132,10 @@ def glide_notes(glides: Glides) -> list[str]:
     if not glides.each:
         return []
     notes = [
-        f"without the engine the aircraft flies on for {ENGINE_FAILURE_REACTION_S:.0f} s, then "
-        f"glides at {glides.airspeed_name} {glides.airspeed:g} m/s, at least {MARGIN:.0f} m above ground, "
-        "outside missiles' spheres, but also through zones",
-        "ground is flat according to the elevation file, which contains no trees, houses or water",
+        f"a glide begins {ENGINE_FAILURE_REACTION_S:.0f} s after the engine failure, at "
+        f"{glides.airspeed_name} {glides.airspeed:g} m/s; it stays at least {MARGIN:.0f} m above ground and outside "
+        "missiles' spheres, but may cross zones",
+        "flat ground is found in the elevation file, which contains no trees, houses or water",
     ]
     if glides.fuel:
         notes.append("glides are flown with the throttle closed, because the drag of a stopped engine is unknown")

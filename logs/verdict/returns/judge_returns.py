@@ -454,7 +454,7 @@ def _make_world(setup: FlightSetup, autopilot: Autopilot) -> ReturnWorld:
     return_positions = return_points(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not return_positions:
         source = setup.mission.source
-        message = f"{source}: home: not stated, so there is nowhere to return to"
+        message = f"{source}: home: missing, so no return can be simulated"
         raise MissionError(message, file=source, field="home")
     aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return ReturnWorld(

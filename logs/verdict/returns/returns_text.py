@@ -204,7 +204,8 @@ def point_of_no_return_text(returns: Returns) -> str:
         case "later":
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            text = f"{name}: none, because every return leaves {reserve} (at least {point.remaining_energy:.0f} Wh)"
+            left_text = f"at least {point.remaining_energy:.0f} Wh are left"
+            text = f"{name}: none, because every return leaves {reserve} ({left_text})"
     skipped_texts = {0: "", 1: "; 1 return that does not arrive is ignored"}
     return text + skipped_texts.get(
         point.skipped_count, f"; {point.skipped_count} returns that do not arrive are ignored"
@@ -219,8 +220,8 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     >>> made = ArduPilotParameters.defaults().changed(FS_GCS_ENABL=1, FS_LONG_ACTN=1)
     >>> for line in describe_causes(failsafe_causes(made, has_fence=False)):
     ...     print(line)
-    it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
-    it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): continues its mission
+    causes of a return: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
+    no return after battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): continues its mission
     """
 
     def setting_text(cause: Cause) -> str:
@@ -228,14 +229,14 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
     returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.is_return]
-    lines = [f"it returns: {', '.join(returning)}"] if returning else []
-    for heading, is_landing in (("it lands", True), ("it does not", False)):
+    lines = [f"causes of a return: {', '.join(returning)}"] if returning else []
+    for heading, is_landing in (("landing after", True), ("no return after", False)):
         other_causes: dict[str, list[str]] = {}
         for cause in causes:
             if not cause.is_return and (cause.action in ("land", "autoland", "land here")) == is_landing:
                 other_causes.setdefault(ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
         text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
-        lines += [f"{heading}: {'; '.join(text)}"] if text else []
+        lines += [f"{heading} {'; '.join(text)}"] if text else []
     return lines
 
 
@@ -285,7 +286,7 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
     )
     reason = f" ({worst_return.target.reason})" if worst_return.target.reason else ""
     return (
-        f"{time_text}, {_judgement_text(worst_return)}: to {worst_return.target.name}{reason}:"
+        f"started at {time_text}, {_judgement_text(worst_return)}: return to {worst_return.target.name}{reason};"
         f" {_range_outcome_text(worst_return, return_range, returns, scenario)}"
     )
 
@@ -301,7 +302,7 @@ def _range_outcome_text(
     worst_return: SimulatedReturn, return_range: ReturnRange, returns: Returns, scenario: Scenario
 ) -> str:
     """Describe the outcome of the worst return of a time range, with its position, height or energy."""
-    prefix = "" if return_range.count == 1 else f"at worst from {worst_return.time:.0f} s, "
+    prefix = "it " if return_range.count == 1 else f"the worst, started at {worst_return.time:.0f} s, "
     east, north, up = worst_return.lowest_position
     position_text = f"{east:.0f} m east, {north:.0f} m north"
     digits = 1 if abs(worst_return.clearance - returns.limit) < 1.0 else 0
@@ -311,7 +312,7 @@ def _range_outcome_text(
             return f"{prefix}hits the ground at {position_text}, {up:.0f} m AMSL"
         case "threat":
             return (
-                f"{prefix}{-worst_return.sphere_distance:.0f} m inside the sphere of"
+                f"{prefix}flies {-worst_return.sphere_distance:.0f} m into the sphere of"
                 f" {scenario.threats.names[worst_return.threat]}"
             )
         case "zone":
@@ -329,8 +330,8 @@ def _range_outcome_text(
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":
             return (
-                f"{prefix}{height_text} according to the point-mass model, but this return or a similar one, flown in"
-                f" JSBSim, differs by more than {POINT_MASS_ERROR_M:.0f} m in height or"
+                f"{prefix}stays {height_text} according to the point-mass model, but this return or a similar one,"
+                f" flown in JSBSim, differs by more than {POINT_MASS_ERROR_M:.0f} m in height or"
                 f" {POINT_MASS_POSITION_ERROR_M:.0f} m in distance from a missile's sphere"
             )
     if worst_return.required_height < returns.limit:
@@ -341,7 +342,7 @@ def _range_outcome_text(
         if math.isinf(worst_return.sphere_distance)
         else f", {worst_return.sphere_distance:.0f} m outside every missile's sphere"
     )
-    return f"{prefix}{height_text} at the lowest{sphere_text}{energy_text}"
+    return f"{prefix}comes down to {height_text}{sphere_text}{energy_text}"
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:

@@ -127,7 +127,7 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
         start -= 1
     energies = leg_energies(requirements)[0]
     round_energy = sum(energies[start:]) if route.items[start] == route.items[last_waypoint] else math.nan
-    fault = f"the jump of item {route.endless_jump} has no end"
+    fault = f"the jump of item {route.endless_jump} repeats without end"
     if not round_energy > 0.0:
         return [message(fault)]
     # The first round, the path to it, and the rest of the mission, which an endless jump never reaches.
@@ -136,8 +136,8 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
         first_energy = sum(energies[:start])
     repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
     if repeats < 0:
-        return [message(f"{fault}: the energy does not last for a round")]
-    return [message(f"{fault}: the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")]
+        return [message(f"{fault}, but the energy does not last for one round")]
+    return [message(f"{fault}, but the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:

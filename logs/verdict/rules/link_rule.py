@@ -104,7 +104,7 @@ def judge_link(
         reaction_text = _reaction_text(setup.autopilot.title, reactions, returns)
     elif judged.outages and not reactions:
         setting_text = "".join(f" ({reaction.parameter} {reaction.value:g})" for reaction in all_reactions)
-        reaction_text = f"; without the link {setup.autopilot.title} continues its mission{setting_text}"
+        reaction_text = f"; if the link is lost, {setup.autopilot.title} continues its mission{setting_text}"
     leg = None if judged.worst < 0 else _worst_leg(requirements, aligned if not geometric else None, judged)
     text = _link_text(judged, leg)
     finding = _link_finding(link, (planned, judged), outages, reactions, (text, reaction_text), geometric=geometric)
@@ -252,7 +252,7 @@ def _reaction_text(title: str, reactions: Sequence[LinkLossReaction], returns: R
         f"{ACTION_TEXTS[reaction.action]} after {reaction.delay:g} s ({reaction.parameter} {reaction.value:g})"
         for reaction in reactions
     ]
-    text = f"; without the link {title} {', then '.join(texts)}"
+    text = f"; if the link is lost, {title} {', then '.join(texts)}"
     if returns is not None:
         return f"{text}: {headline(returns)}"
     has_return = any(reaction.action == "return" for reaction in reactions)

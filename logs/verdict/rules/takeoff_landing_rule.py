@@ -52,7 +52,7 @@ def takeoff_findings(
         next_altitude = float(requirements.points[waypoint + 1, 2])
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
     if waypoint == 0 or not has_own_position:
-        reason = f"to {altitude:.0f} m AMSL over home, on a course that the autopilot chooses"
+        reason = f"the autopilot chooses the course of the climb to {altitude:.0f} m AMSL over home"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     source = requirements.setup.source
     if source is not None and not source.aircraft_known:

@@ -135,7 +135,9 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     assert route(*corners, "2 177 1 0 0 0 0 0 0").items.tolist() == [1, 2, 3]
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
-    assert endless.notes == ("item 4: DO_JUMP has no end: it is flown once, and the flight ends there",)
+    assert endless.notes == (
+        "item 4: DO_JUMP repeats without end: its items are flown once more, and the simulated flight ends there",
+    )
     assert (endless.endless_jump, route(*corners, "2 177 2 2 0 0 0 0 0").endless_jump) == (4, None)
     # What follows a jump without end is never flown.
     beyond = route(*corners, "2 177 2 -1 0 0 0 0 0", wp(0, 0))
@@ -199,8 +201,8 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     assert (home.rtl_start, home.rtl_loiter) == (1, pytest.approx((0.0, 0.0, 400.0, 80.0, 0.0), abs=0.01))
     assert home.notes == (
         "item 4: never reached",
-        "item 3: NAV_RETURN_TO_LAUNCH: to home, 1.5 km away, sinking 100 m on a straight slope to 400 m AMSL;"
-        " circles for 60 s; the mission ends there",
+        "item 3: NAV_RETURN_TO_LAUNCH: to home, 1.5 km away, descending 100 m on a straight slope to 400 m AMSL;"
+        " the simulated flight ends after 60 s of the loiter there",
     )
     landed = route(
         wp(0, 500, 150), "3 189 0 0 0 0 36.5 -84.2 0", wp(0, 1500, 60), wp(900, 1500, 0, command=21), wp(0, 0)

@@ -134,7 +134,10 @@ def test_a_tag_leads_to_the_first_item_of_its_number_wherever_the_jump_stands() 
     assert back.items.tolist() == [1, 3, 4, 6, 3, 4, 6, 3, 4, 6]
     endless = route(wp(0, 0), "2 600 4 0 0 0 0 0 0", wp(0, 900), wp(900, 900), "2 601 4 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 3, 4, 3, 4]
-    assert "item 5: DO_JUMP_TAG has no end: it is flown once, and the flight ends there" in endless.notes
+    assert (
+        "item 5: DO_JUMP_TAG repeats without end: its items are flown once more, and the simulated flight ends there"
+        in endless.notes
+    )
     assert "DO_JUMP_TAG p1 7: the mission has no JUMP_TAG 7" in refusal(wp(0, 0), wp(0, 900), "2 601 7 1 0 0 0 0 0")
     with pytest.raises(MissionError, match="p2 -3"):
         parse_mission("QGC WPL 110\n0 1 0 16 0 0 0 0 36.5 -84.2 300 1\n1 0 2 601 4 -3 0 0 0 0 0 1", "a.waypoints")

@@ -128,7 +128,7 @@ def test_stops_inside_a_circle_are_left_out() -> None:
     assert list(dict.fromkeys(over.items.tolist())) == [1, 3, 5]
     assert [note.split(":")[0] for note in over.notes] == ["items 2, 4"]
     start = route(wp(0, 0), wp(0, 0, command=18, p="1 0 120 0"), wp(3000, 2000))
-    assert "starts trimmed in the air on the circle of item 2" in start.started
+    assert "the flight starts in the air, trimmed, on the loiter of item 2" in start.started
     assert math.hypot(*start.positions[0, :2]) == pytest.approx(120.0, abs=0.1)
     two = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 120 0"), wp(0, 2050, command=19, p="30 0 -100 0"), wp(3000, 0))
     assert any("item 3: its circle has no tangent" in note for note in two.notes)
@@ -303,12 +303,16 @@ def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> N
         radius_of=lambda one: 0.0 if one.seconds else 200.0,
         radius_scale=lambda up: 1.0 + up / 1000.0,
     )
-    unread = "its radius of 150 m is not read: flown with WP_LOITER_RAD, 60 m"
+    unread = "its radius of 150 m is ignored: flown with WP_LOITER_RAD, 60 m"
     # 100 m above home's 300 m: 1.4 times as wide.
     for loiter, radius, note in (
         (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, f"{unread} to the left"),
         (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread),
-        (wp(0, 0, 100, 18, p="2 0 207 0"), 280.0, "loiter radius 207 m: flown with 280 m at this height"),
+        (
+            wp(0, 0, 100, 18, p="2 0 207 0"),
+            280.0,
+            "loiter radius 207 m: flown with 280 m, because the radius grows with altitude",
+        ),
     ):
         made = laid_for(rules, wp(0, -1500), loiter, wp(1500, 1500))
         turns, arc = circled(made, 2)

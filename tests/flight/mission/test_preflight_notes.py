@@ -67,9 +67,9 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
     """Landed to the east: what rises to the north falls to the right."""
     (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
     assert said == (
-        "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m around the landing point the ground rises by 3.0% "
-        "in the landing direction, and falls by 2.0% to the right; the scenario has no [landing], so touch-down and "
-        "roll-out are not judged"
+        "item 4: lands on course 90°, against 4.0 m/s of wind; over 200 m around the landing point the ground rises"
+        " by 3.0% in the landing direction, and falls by 2.0% to the right; the scenario has no [landing], so"
+        " touch-down and roll-out are not judged"
     )
     assert (
         "around the landing point the ground is level; the scenario has no [landing]"

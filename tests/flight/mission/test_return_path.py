@@ -73,14 +73,15 @@ def test_why_it_goes_there_is_said() -> None:
     far = choose_target(ReturnRules(rally_limit=1900.0), (0.0, 6000.0, 900.0), HOME, RALLY)
     assert rtl_note(far, ReturnRules(), 900.0) == (
         "NAV_RETURN_TO_LAUNCH: to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond RALLY_LIMIT_KM"
-        " 1.9), sinking 500 m on a straight slope to 400 m AMSL; circles for 60 s; the mission ends there"
+        " 1.9), descending 500 m on a straight slope to 400 m AMSL; the simulated flight ends after 60 s"
+        " of the loiter there"
     )
     climb = choose_target(ReturnRules(includes_home=True), (0.0, 1500.0, 380.0), HOME, RALLY)
     told = rtl_note(climb, ReturnRules(initial_climb=50.0), 380.0)
     assert "nearer than rally point 1, which is 2.5 km away (RALLY_INCL_HOME 1)" in told
     first = "banks no more than 5 degrees before it has climbed 50 m, even above that height;"
     assert f"climbing 20 m at once to 400 m AMSL; {first}" in told
-    assert f"sinking 500 m on a straight slope to 400 m AMSL; {first}" in rtl_note(
+    assert f"descending 500 m on a straight slope to 400 m AMSL; {first}" in rtl_note(
         climb, ReturnRules(initial_climb=50.0), 900.0
     )
     assert "before it has climbed 20 m" in rtl_note(climb, ReturnRules(initial_climb=math.inf), 380.0)
@@ -240,7 +241,7 @@ def test_a_small_fall_is_a_step_at_once() -> None:
         slope, _ = laid(0.0, (0.0, 8000.0, up), rules, base)
         assert not ((slope[:, 1] < 7000.0) & (slope[:, 2] < up + 2.0)).any()
     step = choose_target(ReturnRules(), (0.0, 6000.0, 414.0), HOME, [])
-    assert "sinking 14 m at once to 400 m AMSL" in rtl_note(step, ReturnRules(), 414.0)
+    assert "descending 14 m at once to 400 m AMSL" in rtl_note(step, ReturnRules(), 414.0)
 
 
 # ----------------------------------------------------------------------
@@ -313,7 +314,7 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     # Level until the circle about home, down to 100 m over it there.
     assert (ups[0], ups[-1]) == (900.0, 400.0)
     assert rtl_note(target, rules, 900.0).startswith(
-        "NAV_RETURN_TO_LAUNCH: to home, 8.0 km away, level, and sinking 500 m in circles there, to 400 m AMSL; circles"
+        "NAV_RETURN_TO_LAUNCH: to home, 8.0 km away, level, and descending 500 m in a loiter there, to 400 m AMSL; the"
     )
     low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
     assert ", climbing 50 m first, to 400 m AMSL" in rtl_note(low, rules, 350.0)
@@ -327,7 +328,7 @@ def test_a_return_climbs_first_and_descends_over_its_target_to_another_height() 
     assert (target.transit_altitude, target.position[2]) == (600.0, 400.0)
     ups = [point.map_position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
     assert (max(ups), ups[-1]) == (600.0, 400.0)
-    assert ", climbing 250 m first, to 600 m AMSL, and sinking 200 m in circles there, to 400 m AMSL;" in rtl_note(
+    assert ", climbing 250 m first, to 600 m AMSL, and descending 200 m in a loiter there, to 400 m AMSL;" in rtl_note(
         target, rules, 350.0
     )
     lower = choose_target(

@@ -234,13 +234,15 @@ def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
 def test_a_route_starts_at_the_first_position_or_over_home() -> None:
     plain = route(wp(0, 500, 120), wp(0, 1500, 150))
     assert plain.positions[0] == pytest.approx([0.0, 500.0, 420.0], abs=0.01)
-    assert plain.started.startswith("no TAKEOFF: starts trimmed at the first position, item 1: 36.504")
+    assert plain.started.startswith(
+        "no TAKEOFF: the flight starts in the air, trimmed, at the first position, item 1: 36.504"
+    )
     assert plain.started.endswith("420.0 m AMSL, on course 0 degrees")
     over_home = route("3 22 15 0 0 0 0 0 80", wp(900, 0))
     assert over_home.positions[0] == pytest.approx([0.0, 0.0, 380.0], abs=0.01)
     assert over_home.items.tolist() == [1, 2]
     assert over_home.started.startswith(
-        "NAV_TAKEOFF (item 1): starts trimmed in the air over home at that item's height"
+        "NAV_TAKEOFF (item 1): the flight starts in the air, trimmed, over home at this item's altitude"
     )
     own_place = route(wp(0, 700, 80, command=22), wp(900, 700))
     assert own_place.items.tolist() == [-1, 1, 2]

@@ -103,7 +103,8 @@ def test_items_whose_seq_jumps_are_counted_as_pymavlink_counts_them(tmp_path: Pa
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
     (said,) = mission.warnings
     assert said == (
-        "a.waypoints:3: a gap in seq before 3 (4 in all): items are numbered by their lines, as in ground stations, and"
+        "a.waypoints:3: a gap in the sequence numbers before 3 (4 in all): items are numbered by their lines,"
+        " as in ground stations, and"
         " jumps use these numbers"
     )
 
@@ -119,8 +120,9 @@ def test_items_whose_seq_does_not_rise_are_counted_as_pymavlink_counts_them(tmp_
         (loader.wp(k).seq, pytest.approx(loader.wp(k).x)) for k in range(1, loader.count())
     ]
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
-    assert [said for said in mission.warnings if "rise" in said] == [
-        "a.waypoints:4: seq 3 does not rise (2 in all): items are numbered by their lines, as in ground stations, and"
+    assert [said for said in mission.warnings if "not higher" in said] == [
+        "a.waypoints:4: sequence number 3 is not higher than the one before (2 in all): items are"
+        " numbered by their lines, as in ground stations, and"
         " jumps use these numbers"
     ]
 

@@ -129,8 +129,8 @@ def test_failed_rules_come_first_in_the_ranking_also_without_a_margin(base: Camp
     assert [line for line in lines if line.startswith(("  failed", "  narrow"))] == [
         "  failed  slopes in 2: leg 2 in 2",
         "  failed  corridor in 1: leg 2 in 1",
-        "  narrow  clearance: the smallest margin is -0.5 m, within the tolerance",
-        "  narrow  waypoints: the smallest margin is +4.0 m",
+        "  narrow  clearance: the smallest margin of all flights is -0.5 m, within the tolerance",
+        "  narrow  waypoints: the smallest margin of all flights is +4.0 m",
     ]
     closest = {row.draw.index: closest_text(row) for row in summary.worst}
     assert closest == {
@@ -162,8 +162,8 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
     unknown = "16 of 40 flights fail it, by an unknown margin"
     cases = {
         "many": ([*passed[:24], *[(None, True)] * 16], unknown, None, None),
-        "one": ([*passed, (None, True)], "one flight in twenty has a margin below 0.6°", 0.6, None),
-        "known": ([*passed, (-2.0, True)], "one flight in twenty has a margin below 0.6°", 0.6, -2.0),
+        "one": ([*passed, (None, True)], "5 % of the flights have a margin below 0.6°", 0.6, None),
+        "known": ([*passed, (-2.0, True)], "5 % of the flights have a margin below 0.6°", 0.6, -2.0),
         # A leg may pass by 3 degrees where another one fails without a number.
         "other leg": (
             [*passed[:24], *[(3.0, True)] * 16],
@@ -176,7 +176,7 @@ def test_a_flight_that_failed_by_an_unknown_margin_counts_as_beyond_the_limit(
         (tmp_path / name).mkdir()
         summary = summary_of_margins(base, tmp_path / name, flights)
         line = campaign_lines(summary)[-1]
-        assert line == f"  decides slopes: {text}; nothing that was drawn is shown to explain the margin"
+        assert line == f"  decides slopes: {text}; no dispersed quantity significantly explains the margin"
         data = json.loads(summary_json(summary))
         assert (data["margin_of_one_in_twenty"], data["margin_unit"]) == (low_margin, "deg")
         assert (data["closest_rules"][0]["smallest_margin"], data["closest_rules"][0]["unit"]) == (lowest, "deg")

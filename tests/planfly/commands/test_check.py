@@ -235,8 +235,8 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--for", "px4", "--guidance", "l1"], "not with --for, which flies several autopilots"),
-        (["--for", "px4", "--params", "a.params"], "not with --for, which flies several autopilots"),
+        (["--for", "px4", "--guidance", "l1"], "cannot be combined with --for, which judges by several autopilots"),
+        (["--for", "px4", "--params", "a.params"], "cannot be combined with --for, which judges by several autopilots"),
     ],
 )
 def test_what_does_not_go_with_several_autopilots_is_one_line(
@@ -271,8 +271,8 @@ def test_a_gap_in_seq_is_a_note_of_the_verdict(
     lines = [f"{seq} 0 {3 if alt else 0} 16 0 0 0 0 {lat} 8 {alt} 1" for seq, lat, alt in rows]
     Path("gap.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n")
     notes = [
-        "Note: gap.waypoints:4: a gap in seq before 3 (1 in all): ",
-        "Note: gap.waypoints:5: seq 3 does not rise (1 in all): ",
+        "Note: gap.waypoints:4: a gap in the sequence numbers before 3 (1 in all): ",
+        "Note: gap.waypoints:5: sequence number 3 is not higher than the one before (1 in all): ",
     ]
     main(["check", "gap.waypoints", *more, "--json", "a.json", "--junit", "a.xml"])
     printed = capsys.readouterr().out

@@ -84,11 +84,11 @@ def test_the_cruise_speed_of_a_plan_file_is_that_of_the_mission_or_the_aircraft(
     Path("x8.toml").write_text(f'name = "x"\n{terrain}{area}{ends}[flight]\naircraft = "x8"\n')
     x8 = planfly.aircraft("x8").airspeed
     for source, more, speed, words in (
-        ("m.waypoints", [], 25.0, "that of the default aircraft aerosonde; --aircraft names yours"),
-        ("m.waypoints", ["--aircraft", "x8"], x8, "that of x8"),
+        ("m.waypoints", [], 25.0, "from the default aircraft aerosonde; --aircraft names yours"),
+        ("m.waypoints", ["--aircraft", "x8"], x8, "from x8"),
         ("slow.waypoints", [], 19.0, "the mission's"),
-        ("m.waypoints", ["--scenario", "x8.toml"], x8, "that of x8"),
-        (str(log_file), [], 25.0, "that of aerosonde"),
+        ("m.waypoints", ["--scenario", "x8.toml"], x8, "from x8"),
+        (str(log_file), [], 25.0, "from aerosonde"),
     ):
         assert main(["export", source, "a.plan", *more, "--overwrite"]) == 0
         assert f"cruiseSpeed {speed:.0f} m/s: {words})" in capsys.readouterr().out
@@ -180,7 +180,7 @@ def test_a_value_with_which_the_autopilot_does_not_arm_is_not_written(
     mission.write_text(LANDING, encoding="ascii")
     mine.write_text("RTL_AUTOLAND,0\n", encoding="ascii")
     assert main(["export", str(mission), str(target), "--params", str(mine)]) == 0
-    assert "without RTL_AUTOLAND 0, with which it does not arm" in capsys.readouterr().out
+    assert "without RTL_AUTOLAND 0, because it does not arm with that value" in capsys.readouterr().out
     assert "RTL_AUTOLAND" not in read_parameter_file(target)
 
 

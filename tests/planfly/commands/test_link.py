@@ -81,7 +81,7 @@ def test_a_weaker_receiver_keeps_less_margin() -> None:
             r"station \(1\.0, 2\.0, 3\.0\): expected latitude -89\.\.89 and longitude -180\.\.180",
         ),
         ({**RADIO, "station": "46"}, "station 46: expected latitude -89"),
-        ({**RADIO, "station": (0.0, 0.0)}, "the elevation file has no data there"),
+        ({**RADIO, "station": (0.0, 0.0)}, "the elevation file has no data at the ground station"),
     ],
 )
 def test_bad_input_is_refused(options: dict[str, Any], message: str) -> None:
@@ -270,7 +270,7 @@ def test_the_ground_at_a_scenarios_station_is_read(place: str, far: Path) -> Non
 
 @pytest.mark.parametrize("station", [(46.5, 8.0), (0.0, 0.0), (-47.0, -172.0)])
 def test_a_station_beyond_the_elevation_file_is_refused(station: tuple[float, float], far: Path) -> None:
-    with pytest.raises(PlanflyError, match="the elevation file has no data there"):
+    with pytest.raises(PlanflyError, match="the elevation file has no data at the ground station"):
         planfly.link("far.waypoints", terrain="ground.tif", **RADIO, station=station)
 
 

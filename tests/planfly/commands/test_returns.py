@@ -43,9 +43,9 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     out = capsys.readouterr().out
     assert "of 13 returns 1 hits the ground, 1 comes lower than 30 m above ground; 11 are safe" in out
     assert out.splitlines()[1].startswith("  Aircraft: aerosonde, 11 kg, ")
-    assert "it returns: the pilot's RTL, the mission's end" in out
-    assert "it does not: RC lost (FS_LONG_ACTN 0), station lost (FS_GCS_ENABL 0), battery low" in out
-    assert "flown again in JSBSim" in out
+    assert "causes of a return: the pilot's RTL, the mission's end" in out
+    assert "no return after RC lost (FS_LONG_ACTN 0), station lost (FS_GCS_ENABL 0), battery low" in out
+    assert "also flown in JSBSim" in out
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
     assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
@@ -108,7 +108,7 @@ def test_an_aircraft_in_a_folder_returns_too(hill: Path, capsys: pytest.CaptureF
     change_model(hill, "aerosonde", "own")
     asked = ["hill.waypoints", "--scenario", "hill.toml", "--aircraft", "./own"]
     assert main(["returns", *asked, "--every", "50"]) in (0, 4)
-    assert "it returns: the pilot's RTL" in capsys.readouterr().out
+    assert "causes of a return: the pilot's RTL" in capsys.readouterr().out
     assert main(["check", *asked]) == 4
     assert "Aircraft: own, 11 kg" in capsys.readouterr().out
 
@@ -151,9 +151,9 @@ def test_px4_returns_by_its_own_parameters(behind: Path, capsys: pytest.CaptureF
         assert main([*asked, f"rtl{height}.params", "--json", f"{height}.json"]) == code
         out = capsys.readouterr().out
         assert not any(name in out for name in ARDUPLANES)
-        assert "it returns: the pilot's RTL, RC lost (NAV_RCL_ACT 2)" in out
-        assert f"it first climbs in a circle to RTL_RETURN_ALT {height} m above that place" in out
-        assert "by the simulated PX4 flying a point-mass model" in out
+        assert "causes of a return: the pilot's RTL, RC lost (NAV_RCL_ACT 2)" in out
+        assert f"below RTL_RETURN_ALT ({height} m above its destination) it first climbs in a loiter" in out
+        assert "returns are simulated with PX4's control of a point mass" in out
         assert "PX4's own return without the engine is not simulated" in out
         assert ("would help: RTL_RETURN_ALT 4" in out) is (height == 100)
         answers[height] = json.loads((behind / f"{height}.json").read_text(encoding="utf-8"))
@@ -182,7 +182,7 @@ def test_a_verdict_of_px4_agrees_with_itself_on_the_return(behind: Path, capsys:
     main(asked)
     out = capsys.readouterr().out
     assert "  return           1 of 1 ok" in out
-    assert "climbing 250 m first, to 450 m AMSL, and sinking 350 m in circles there, to 100 m AMSL" in out
+    assert "climbing 250 m first, to 450 m AMSL, and descending 350 m in a loiter there, to 100 m AMSL" in out
     assert "returns   all " in out
     assert "not simulated" not in out.partition("returns   all ")[2]
 
@@ -198,7 +198,7 @@ def test_arduplanes_program_does_not_fly_returns_of_px4(behind: Path, capsys: py
     [
         (["none.waypoints"], "none.waypoints"),
         (["hill.waypoints", "--flight", "2"], "only with an imported log"),
-        (["homeless.plan"], "home: not stated"),
+        (["homeless.plan"], "home: missing"),
     ],
 )
 def test_bad_input_is_one_line(hill: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

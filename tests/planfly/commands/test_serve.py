@@ -348,7 +348,7 @@ def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
         (["none.waypoints"], "no such file"),
         (["--sign-key", "none"], "none: cannot be read"),
         (["--allow", "300.1.1.1"], "--allow 300.1.1.1"),
-        ([], "mission: not named; expected a mission, or a scenario in which to wait for an upload: --scenario NAME"),
+        ([], "mission: missing; expected a mission, or --scenario NAME, in which to wait for the upload of a mission"),
         (["--aircraft", "nothing", "--scenario", "jacksboro-air"], "no aircraft called 'nothing'"),
         (["--wind", "8", "--scenario", "jacksboro-air"], "--wind"),
     ],

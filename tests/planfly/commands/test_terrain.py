@@ -377,8 +377,8 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        ([], "planfly: --around, --box: expected one of them"),
-        (["--box", "46,8,47,9", "--around", "m.waypoints"], "expected one of them"),
+        ([], "planfly: expected either --around or --box"),
+        (["--box", "46,8,47,9", "--around", "m.waypoints"], "expected either --around or --box"),
         (["--box", "46,8,47"], "argument --box: '46,8,47': expected S,W,N,E"),
         (["--box", "47,8,46,9"], "--box (47.0, 8.0, 46.0, 9.0): expected south, west, north, east"),
         (["--box", "46,8,nan,9"], "expected south, west, north, east"),

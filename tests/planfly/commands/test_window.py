@@ -66,9 +66,13 @@ def test_a_window_around_a_storm(folder: Path, capsys: pytest.CaptureFixture[str
         (
             "07:00",
             0,
-            "take-off at 2026-05-01 07:00 UTC: go: 10 of 10 flights are flyable; open 2026-05-01 06:00 to 07:",
+            "take-off at 2026-05-01 07:00 UTC: go, 10 of 10 flights are flyable; open for take-off: 2026-05-01 06:",
         ),
-        ("08:00", 4, "take-off at 2026-05-01 08:00 UTC: no go: 0 of 10 flights are flyable, 0.9 is asked for; open 2"),
+        (
+            "08:00",
+            4,
+            "take-off at 2026-05-01 08:00 UTC: no go, 0 of 10 flights are flyable, less than the required 90 %; open",
+        ),
         ("11:00", 3, "take-off at 2026-05-01 11:00 UTC: not judged: "),
     ],
 )
@@ -85,7 +89,7 @@ def test_the_exit_code_answers_for_the_time_that_is_asked_about(
 def test_no_open_departure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     times = ("--from", f"{DAY}08:00Z", "--to", f"{DAY}09:00Z", "--every", "30 min")
     answer = answered(capsys, 4, *WORDS, *times, "--workers", "1")
-    assert answer["headline"] == "no departure is open"
+    assert answer["headline"] == "no take-off time is open"
     assert [one["time"][11:16] for one in answer["departures"]] == ["08:00", "08:30", "09:00"]
 
 

@@ -187,7 +187,7 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     # Of 1000 Wh, 20 % are the reserve.
     repeats = math.floor((800.0 - first_energy) / round_energy)
     assert f"the energy lasts for {repeats + 1} rounds, with a count of {repeats} (" in item.reason
-    assert item.brief.startswith("the jump of item 5 has no end")
+    assert item.brief.startswith("the jump of item 5 repeats without end")
 
 
 def test_the_rounds_of_an_endless_jump_leave_the_rest_of_the_mission_and_the_reserve() -> None:

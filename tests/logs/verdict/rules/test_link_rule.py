@@ -251,7 +251,7 @@ def test_an_autopilot_that_goes_on_is_said_to(autopilot: Autopilot, use: str, se
     setup = with_home(linked(make_setup(WAY), max_outage_s=600.0, use=use), autopilot)
     item = of(judge_geometry(setup), "link")
     assert (item.ok, item.limit, item.limit_source) == (True, 600.0, "scenario")
-    assert item.reason.endswith(f"; without the link {autopilot.title} continues its mission{setting}")
+    assert item.reason.endswith(f"; if the link is lost, {autopilot.title} continues its mission{setting}")
 
 
 def test_an_outage_that_the_autopilot_does_not_notice_has_no_reaction() -> None:

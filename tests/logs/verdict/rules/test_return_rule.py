@@ -57,7 +57,7 @@ def test_a_return_is_flyable_on_every_level_though_it_turns_about() -> None:
         assert (ended, verdict.flyable) == ("completed", True), verdict.lines
         found = of(verdict, "return")
         assert (found.ok, found.place.index, found.place.item) == (True, 2, 3)
-        assert "to home, 2.7 km away, sinking 200 m on a straight slope to 200 m AMSL" in found.reason
+        assert "to home, 2.7 km away, descending 200 m on a straight slope to 200 m AMSL" in found.reason
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_a_planned_return_is_told_and_not_judged() -> None:
     setup = by_arduplane(setup_of(*WAY, home=HOME))
     found = of(judge_geometry(setup), "return")
     assert found.ok is None
-    assert "sinking 200 m on a straight slope" in found.reason
+    assert "descending 200 m on a straight slope" in found.reason
     assert "not flown yet" in found.reason
 
 
