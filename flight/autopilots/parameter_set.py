@@ -2,7 +2,7 @@
 
 A parameter is taken from the first source that states it: the user's file, the aircraft, the autopilot's default.
 `flight.autopilots.arduplane.parameters` and `flight.autopilots.px4.parameters` define which parameters an
-autopilot's law reads.
+autopilot's simulation reads.
 """
 
 import math
@@ -50,7 +50,7 @@ class Definition(NamedTuple):
 
 
 class ParameterTable:
-    """The parameters that an autopilot's law reads.
+    """The parameters that an autopilot's simulation reads.
 
     autopilot: name of the autopilot in a scenario.
     title: name of the autopilot in texts.

@@ -34,11 +34,11 @@ LOITER_LAPS_TOLERANCE = 0.5
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
 # Radii of the arc at the bank limit.  Distance from the center of a loiter too tight for the bank limit that an
-# autopilot which steers to the center may reach: up to 2.09 on 20 flights of ArduPlane's law with loiters of 10 to
-# 100 m, in up to 12 m/s of wind.
+# autopilot which steers to the center may reach: up to 2.09 on 20 flights of the simulated ArduPlane with
+# loiters of 10 to 100 m, in up to 12 m/s of wind.
 # Also the distance from a mission's last waypoint that PX4, which loiters there, may reach, in radii of this loiter or
-# of the arc at the bank limit, whichever is wider: up to 2.06 in 54 ends of missions by PX4's law, with loiters of 80
-# and 200 m, in up to 12 m/s of wind.
+# of the arc at the bank limit, whichever is wider: up to 2.06 in 54 ends of missions by the simulated PX4, with
+# loiters of 80 and 200 m, in up to 12 m/s of wind.
 LOITER_SWING_RADII = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5

@@ -26,11 +26,10 @@ def answer_line(result: BatteryResult) -> str:
     if math.isnan(result.capacity):
         return f"not judged: {_unknown_reason(result)}"
     low, high = result.interval
-    high_text = f"{high:.0f}" if math.isfinite(high) else "more"
+    interval_text = f"{low:.0f} to {high:.0f} Wh" if math.isfinite(high) else f"at least {low:.0f} Wh"
     volts_text = f", {1000.0 * result.capacity / result.volts:.0f} mAh at {result.volts:.1f} V" if result.volts else ""
     return (
-        f"{result.capacity:.0f} Wh ({low:.0f} to {high_text} at {goal.confidence:.0%} confidence{volts_text})"
-        f" keep {keeps_text}"
+        f"{result.capacity:.0f} Wh ({interval_text} at {goal.confidence:.0%} confidence{volts_text}) keep {keeps_text}"
     )
 
 
@@ -50,7 +49,7 @@ def battery_lines(result: BatteryResult) -> list[str]:
         return []
     lines, total = [_own_battery_line(result), *_mass_lines(result)], len(result.completed)
     lines += [
-        f"decided by {part}: in {flights} of {total} flights"
+        f"in {flights} of {total} flights {part} decides the capacity"
         for part, flights, _ in decision_rows(result)[:_MAX_LISTED]
     ]
     energies = result.leg_energies
@@ -68,8 +67,8 @@ def battery_lines(result: BatteryResult) -> list[str]:
             " see planfly returns"
         )
     lines.append(
-        f"{len(result.rows)} flights, {len(result.rows) - total} of them without completing the mission;"
-        f" a return every {result.goal.interval:g} s, up to its loiter: the reserve has to cover loiter and landing"
+        f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s"
+        " and is simulated up to its loiter; the reserve has to cover loiter and landing"
     )
     return [*lines, *return_law_lines(result.base.nominal_setup())]
 
@@ -110,19 +109,19 @@ def _own_battery_line(result: BatteryResult) -> str:
     """Compare the aircraft's own battery with the smallest battery."""
     if result.is_guessed:
         return "the aircraft does not state its battery, so it is not compared: state battery_wh in the scenario"
-    unknown_text = "may be enough, more flights would show it" if result.has_returns else "may not cover the returns"
+    unknown_text = "may be enough (more flights would decide)" if result.has_returns else "may not cover the returns"
     verdict = {True: "is enough", False: "is too small", None: unknown_text}
     low, high = result.own_probability
     return (
         f"the aircraft's battery of {result.own_capacity:.0f} Wh {verdict[result.is_enough]}: it keeps the reserve in"
-        f" {result.kept} of {len(result.rows)} flights (probability {low:.2f} to {high:.2f})"
+        f" {result.kept} of {len(result.rows)} flights (95 % interval of the probability: {low:.2f} to {high:.2f})"
     )
 
 
 def _mass_lines(result: BatteryResult) -> list[str]:
     """Return the mass of the aircraft with the found battery."""
     if result.goal.specific_energy is None:
-        return ["the mass is kept: --specific-energy states the battery's energy per mass"]
+        return ["the same mass is assumed for every capacity (--specific-energy states the battery's energy per mass)"]
     if not math.isfinite(result.capacity):
         return []
     limit_text = f"; not less than {MIN_MASS_FACTOR:g} of it" if result.mass_factor == MIN_MASS_FACTOR else ""

@@ -10,15 +10,15 @@ from world.wording import count_text
 
 # Explanation of the table for an application.
 TABLE_EXPLANATION = (
-    "Larger values count: the operational volume holds the flown contingency volume and that by formula, and the ground"
-    " risk buffer holds the falls and the width by formula. Formulas: SORA 2.5, Annex A, with the values of the guides"
-    " of LBA and FOCA. Class: SORA 2.5, main body, table 2."
+    "The larger value of each pair applies: the operational volume contains the flown contingency volume and the volume"
+    " by formula, and the ground risk buffer contains the simulated falls and the width by formula. Formulas:"
+    " SORA 2.5, Annex A, with the values of the guides of LBA and FOCA. Class: SORA 2.5, main body, table 2."
 )
 # Statement of what the result is not.
 DISCLAIMER = (
     "This is a computation, not an approval: the authority decides on the population data, the volumes and the class."
-    " It has no mitigations, no final ground risk class, and no air risk class: of the airspace it knows only the zones"
-    " that it was given."
+    " It contains no mitigations, no final ground risk class and no air risk class, and it considers no airspace except"
+    " the zones that were given."
 )
 
 
@@ -98,33 +98,33 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
     """Return the lines on the flights."""
     lines = []
     if result.lost:
-        lines.append(f"{result.lost} of {result.goal.flights} flights could not be flown, and do not count")
+        lines.append(f"{result.lost} of {result.goal.flights} flights could not be simulated, and are left out")
     endings = [row.ended for row in result.rows if row.ended != "completed"]
     if endings:
         most_frequent = max(set(endings), key=endings.count)
         lines.append(
             f"{len(endings)} of {len(result.rows)} flights do not complete the mission, most of them: {most_frequent};"
-            " their positions count too"
+            " the volumes contain them up to their end"
         )
     if result.base.mission.home is None:
         lines.append("the mission has no home, so no returns were simulated")
     ground_speed = max(row.ground_speed for row in result.rows)
     if ground_speed > result.speed:
         lines.append(
-            f"flights reach {ground_speed:.1f} m/s over the ground, more than the highest speed of"
+            f"flights reach a ground speed of {ground_speed:.1f} m/s, above the highest speed of"
             f" {result.speed:g} m/s in the formulas (--max-speed)"
         )
     spread = result.base.dispersions.name
     setup = result.base.nominal_setup()
     lines.append(
         f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}; returns to launch by"
-        f" {returning_title(setup)}'s law every {result.goal.interval:g} s"
+        f" {returning_title(setup)}'s rules every {result.goal.interval:g} s"
     )
     if result.goal.glide and setup.mission.home is not None:
         world = make_return_world(setup)
         if without_engine_world(world) is not world:
             lines.append(
-                f"glides without the engine by ArduPlane's law, because {world.autopilot.title}'s is not simulated"
+                f"engine-out glides follow ArduPlane's rules, because {world.autopilot.title}'s are not simulated"
             )
     return [*lines, *return_law_lines(setup)[1:]]
 

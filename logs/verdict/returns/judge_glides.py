@@ -36,8 +36,8 @@ from logs.verdict.returns.return_starts import ReturnStarts
 from world.arrays import Flags, Floats
 from world.kernels import Record
 
-# Height above ground that a glide keeps until it arrives, m.  ArduPlane's law without thrust was at most 13 m too high,
-# and the elevation file has its own error.
+# Height above ground that a glide keeps until it arrives, m.  The simulated ArduPlane without thrust was at most 13 m
+# too high, and the elevation file has its own error.
 MARGIN = 30.0
 
 _NO_POSITION = (math.nan, math.nan, math.nan)

@@ -1,7 +1,7 @@
 """The go-around rule: judge the path of an aborted landing, flown by ArduPlane's control law.
 
 A go-around is not an item of the mission; it can be commanded anywhere on the glide.  The rule therefore simulates it
-from several places on the glide that the autopilot lays out, with ArduPlane's law on a point mass
+from several places on the glide that the autopilot lays out, with the simulated ArduPlane on a point mass
 (`flight.autopilots.arduplane.go_around_point_mass`), back to the last waypoint before the glide, and judges the
 simulated path.  A go-around that never gets back fails; one whose path is not fully known is undecided.  The aircraft
 climbs on the landing course to a height above home, regardless of the altitude of the field, and only then turns.  From

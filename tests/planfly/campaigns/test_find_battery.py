@@ -196,7 +196,7 @@ def test_the_legs_around_a_loiter_are_one_in_the_energies_and_in_the_lines(tmp_p
     rows = [replace(row, return_energy=2.0 * row.mission_energy, return_leg=0, return_time=30.0 + k) for k in range(2)]
     lines_on_it = [line for line in battery_lines(battery_result(base, rows, own=888.0)) if "the return that" in line]
     assert lines_on_it == [
-        "decided by the return that starts at 30 s (leg 0, to item 2): in 2 of 2 flights",
+        "in 2 of 2 flights the return that starts at 30 s (leg 0, to item 2) decides the capacity",
     ]
 
 

@@ -184,7 +184,7 @@ def test_lines_and_table_say_what_counts_and_what_it_is_not(base: CampaignBase) 
     result = replace(volumes(base, rows), goal=GroundRiskGoal(flights=22))
     lines = risk_lines(result)
     assert lines[-1] == DISCLAIMER
-    assert "2 of 22 flights could not be flown, and do not count" in lines
+    assert "2 of 22 flights could not be simulated, and are left out" in lines
     assert any(line.startswith("1 of 20 flights do not complete the mission") for line in lines)
     table = table_text(result)
     assert "| width S_CV by formula | 207.7 m |" in table
@@ -194,19 +194,19 @@ def test_lines_and_table_say_what_counts_and_what_it_is_not(base: CampaignBase) 
 
 def test_the_autopilot_whose_returns_count_is_named(base: CampaignBase) -> None:
     rows = [row(50.0, 40.0, 60.0)] * 20
-    assert any("returns to launch by ArduPlane's law every 10 s" in line for line in risk_lines(volumes(base, rows)))
+    assert any("returns to launch by ArduPlane's rules every 10 s" in line for line in risk_lines(volumes(base, rows)))
     autopilot = Px4(Px4Parameters.load(base.airframe.aircraft))
     px4 = replace(base, airframe=replace(base.airframe, autopilot=autopilot))
     lines = risk_lines(volumes(px4, rows, glide_ratio=10.0))
-    assert any("returns to launch by PX4's law every 10 s" in line for line in lines)
-    assert "glides without the engine by ArduPlane's law, because PX4's is not simulated" in lines
+    assert any("returns to launch by PX4's rules every 10 s" in line for line in lines)
+    assert "engine-out glides follow ArduPlane's rules, because PX4's are not simulated" in lines
     assert any(line.startswith("RTL_TYPE 1: a return goes to ") for line in lines)
     assert not any("ArduPlane" in line for line in risk_lines(volumes(px4, rows)))
 
 
 def test_flights_faster_than_the_stated_speed_are_told(base: CampaignBase) -> None:
     result = volumes(base, [row(50.0, 40.0, 60.0)] * 20, speed=20.0)
-    assert any("flights reach 28.0 m/s over the ground" in line for line in risk_lines(result))
+    assert any("flights reach a ground speed of 28.0 m/s" in line for line in risk_lines(result))
 
 
 def test_no_known_ground_is_refused(base: CampaignBase) -> None:
