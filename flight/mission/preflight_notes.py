@@ -1,8 +1,8 @@
-"""Preflight notes on a mission's take-off, landing, home, rally points and return.
+"""Preflight notes on a mission's take-off, landing, home, altitudes, rally points and return.
 
-The verdict judges collisions. These notes cover what a pilot would find out on the field: tail wind, a wrong home, a
-rally point below ground or out of range, an RTL below the hills around home, a landing sequence that prevents arming,
-and the ground under a landing without a stated strip.
+The verdict judges collisions. These notes cover what a pilot would find out on the field: tail wind, a wrong home, an
+altitude in a wrong frame, a rally point below ground or out of range, an RTL below the hills around home, a landing
+sequence that prevents arming, and the ground under a landing without a stated strip.
 """
 
 import math
@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from flight.mission.altitude_frames import misread_altitudes
 from flight.mission.items import Command, Mission
 from flight.mission.placing import return_points
 from flight.mission.return_path import ReturnPoint, ReturnRules
@@ -58,6 +59,7 @@ def preflight_notes(
         *rally_problems,
         *_note_tail_winds(route, scenario),
         *_note_distant_home(mission, scenario),
+        *_note_misread_altitudes(mission, scenario),
         *_note_rally_points(return_targets[1:], route, scenario, rules),
         *_note_low_return(return_targets[:1], scenario, rules),
         *_note_autoland(mission, scenario, parameters, assumed_parameters),
@@ -93,6 +95,33 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
             f"the mission's home is {distance:.0f} m from the scenario's home: after a launch at the scenario's home, "
             "heights are relative to the scenario's home"
         )
+
+
+def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[str]:
+    """Yield notes on items whose altitudes fit the ground only as heights above home, or only as AMSL."""
+    below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    amsl, over_home = "altitudes above mean sea level (frame 0)", "heights above home (frame 3)"
+    for readings, stated_as, other in ((below_ground, amsl, over_home), (too_high, over_home, amsl)):
+        if readings:
+            numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
+            yield (
+                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: as {stated_as}"
+                f" {_heights_text([reading.height for reading in readings])};"
+                f" as {other} {_heights_text([reading.other_height for reading in readings])}"
+            )
+
+
+def _heights_text(heights: list[float]) -> str:
+    """Describe heights above ground, m, by their lowest and highest.
+
+    >>> _heights_text([-20.4, -330.0]), _heights_text([12.3])
+    ('330 to 20 m below ground', '12 m above ground')
+    """
+    low, high = round(min(heights)), round(max(heights))
+    side = "below" if high < 0 else "above"
+    if low < 0 <= high:
+        return f"from {-low} m below to {high} m above ground"
+    return f"{abs(low)} m {side} ground" if low == high else f"{abs(low)} to {abs(high)} m {side} ground"
 
 
 def _note_rally_points(

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
-from flight.mission.items import OVER_HOME
+from flight.mission.altitude_frames import misread_altitudes
+from flight.mission.items import OVER_HOME, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
@@ -444,7 +445,11 @@ def home_height(setup: FlightSetup) -> float:
 def suggest_flying_higher(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg higher above the ground, or home on the ground if home's altitude is that far below it."""
+    """Suggest flying a leg higher above the ground.
+
+    If home's altitude is that far below the ground, or if items are below the ground that are above it as heights above
+    home, suggest another altitude of home, or heights above home, instead.
+    """
     if finding.limit is None or finding.margin is None:
         return ()
     shortfall = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
@@ -454,6 +459,10 @@ def suggest_flying_higher(
     home, depth = requirements.setup.mission.home, -home_height(requirements.setup)
     if home is not None and depth > HOME_ERROR_M and depth >= shortfall - SUGGESTION_LENGTH_MARGIN_M:
         return ((Change("home altitude", MISSION, home.alt, round(home.alt + depth, 1), "m"),),)
+    setup = requirements.setup
+    if misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)[0]:
+        frames = float(Frame.GLOBAL), float(Frame.GLOBAL_RELATIVE_ALT)
+        return ((Change("altitude frame", MISSION, *frames, ""),),)
     return (
         ((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),),)
         if shortfall > SUGGESTION_LENGTH_MARGIN_M

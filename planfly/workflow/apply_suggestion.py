@@ -12,8 +12,9 @@ from itertools import product
 
 import numpy as np
 
+from flight.mission.altitude_frames import misread_altitudes
 from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude, set_loiter_radius
-from flight.mission.items import LANDINGS, Command, Mission
+from flight.mission.items import LANDINGS, Command, Frame, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.measures.violated_legs import violated_legs
@@ -300,6 +301,17 @@ def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding
         edited.is_changed = True
 
 
+def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
+    """State the altitudes of items below ground relative to home, with the same numbers."""
+    scenario, mission = edited.requirements.setup.scenario, edited.mission
+    below_ground, _ = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    items = list(mission.items)
+    for reading in below_ground:
+        items[reading.item_index] = replace(items[reading.item_index], frame=Frame.GLOBAL_RELATIVE_ALT)
+    if below_ground:
+        edited.mission, edited.is_changed = replace(mission, items=tuple(items)), True
+
+
 def _change_loiter_radius(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Set the radius of a loiter's item; it circles in the same direction as before."""
     index = None if change.place.index is None else edited.item_index(change.place.index)
@@ -379,6 +391,7 @@ _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] 
     "height": _change_altitude,
     "descent": _change_altitude,
     "home altitude": _set_home_altitude,
+    "altitude frame": _set_altitude_frame,
     "radius": _change_loiter_radius,
     "inset": _move_inside_area,
     "distance": _move_away_from_missile,

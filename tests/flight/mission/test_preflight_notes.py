@@ -192,3 +192,32 @@ def test_a_mission_without_home_has_no_return_to_speak_of() -> None:
     nowhere = Mission(None, setup.mission.items)
     found = preflight_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {}, {})
     assert [one for one in found if ": lands on " not in one] == []
+
+
+def test_an_item_that_states_its_height_above_home_as_amsl_is_named() -> None:
+    """The ground is at 100 m AMSL and home is on it: 80 m AMSL are 20 m below the ground, 180 m AMSL 80 m above it."""
+    (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 80, frame=0), LAND)
+    assert note == (
+        "item 3: as altitudes above mean sea level (frame 0) 20 m below ground;"
+        " as heights above home (frame 3) 80 m above ground"
+    )
+    # Above the ground in its own frame, and below the ground in both: nothing is said.
+    assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 180, frame=0), LAND) == []
+    assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, -20, frame=0), LAND) == []
+
+
+def test_a_mission_that_states_amsl_as_heights_above_home_is_named() -> None:
+    """With 100 m added to each height, the mission lands 100 m above the ground."""
+    raised = (wp(0, 0, 160, command=22), wp(0, 2000, 180), wp(1500, 2000, 180), wp(2500, 2000, 100, command=21))
+    (note,) = notes(*raised)
+    assert note == (
+        "items 1, 2, 3, 4: as heights above home (frame 3) 100 to 180 m above ground;"
+        " as altitudes above mean sea level (frame 0) 0 to 80 m above ground"
+    )
+    # One item that is higher than the others by home's altitude, and one that is 1 m short of it.
+    (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 160), LAND)
+    assert note.startswith("item 3: as heights above home (frame 3) 160 m above ground; as altitudes above mean sea ")
+    assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 159), LAND) == []
+    # A home near sea level does not tell the frames apart.
+    low = make_gridded_terrain(np.full((3, 3), 20.0), *[np.array([-9e3, 0.0, 9e3])] * 2, source="", sha256="", datum="")
+    assert notes(*raised, home="36.5 -84.2 20", ground=low) == []

@@ -140,6 +140,23 @@ def test_legs_that_are_low_because_home_is_below_the_ground_are_offered_homes_al
         assert changes == {what}
 
 
+def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame() -> None:
+    """The ground and home are at 100 m: 80 m AMSL are 20 m below the ground, 80 m above home are enough."""
+    lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0, frame=0), wp(2000, 2500, 80.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
+    (finding, *_) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    assert (
+        finding.suggestion
+        == "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
+    )
+    # Below the ground in both frames, the item is raised.
+    lines[1] = wp(0, 2500, -20.0, frame=0)
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100"))
+    assert not any(
+        change.what == "altitude frame" for one in judged.failed for way in one.suggestions for change in way
+    )
+
+
 @dataclass
 class Flights:
     """Trials whose flight fails by a test's own rule; their geometry passes."""

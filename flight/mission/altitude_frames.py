@@ -1,0 +1,75 @@
+"""Find items whose altitude fits the terrain only in another frame: above mean sea level, or above home.
+
+The altitude frame of an item is one number in a mission file (0 above mean sea level, 3 above home), and a wrong one
+moves the item by the altitude of home.  The number of the item then still looks right in a ground station's list.
+"""
+
+import statistics
+from typing import NamedTuple
+
+from flight.mission.edits import movable_indices
+from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Mission, MissionItem
+from world.frames import GeoOrigin, to_map
+from world.terrain import Terrain
+
+# Greatest height of a landing point above or below the ground with the right altitude frame, m.
+LANDING_HEIGHT_TOLERANCE_M = 30.0
+
+
+class AltitudeReading(NamedTuple):
+    """Heights above ground of an item with its altitude read in two frames, m.
+
+    item_index: index of the item in the mission.
+    height: height with the frame that the item states.
+    other_height: height with the other frame.
+    """
+
+    item_index: int
+    height: float
+    other_height: float
+
+
+def misread_altitudes(
+    mission: Mission, origin: GeoOrigin, terrain: Terrain | None
+) -> tuple[tuple[AltitudeReading, ...], tuple[AltitudeReading, ...]]:
+    """Return the items that state AMSL but fit a height above home, and the items that state the opposite.
+
+    The first are below the ground, and above it if read as heights above home.  The second are higher than the others
+    by at least the altitude of home, or belong to a mission whose landing point is in the air, but on the ground if
+    read as AMSL.  Both are empty if the ground or the altitude of home is unknown, and if home is near sea level.
+    """
+    home = mission.home
+    if home is None or terrain is None or not home.alt > LANDING_HEIGHT_TOLERANCE_M:
+        return (), ()
+    below_ground, above_home = [], []
+    for k in movable_indices(mission):
+        item = mission.items[k]
+        east, north = to_map(origin, item.lat_deg, item.lon_deg)
+        amsl_height = item.alt - float(terrain.height(float(east), float(north)))
+        home_height = amsl_height + home.alt
+        if item.frame in AMSL and amsl_height < 0.0 <= home_height + _height_tolerance(item):
+            below_ground.append(AltitudeReading(k, amsl_height, home_height))
+        elif item.frame in OVER_HOME:
+            above_home.append(AltitudeReading(k, home_height, amsl_height))
+    return tuple(below_ground), tuple(_too_high(mission, home.alt, above_home))
+
+
+def _height_tolerance(item: MissionItem) -> float:
+    """Return how far an item may be below the ground, m: a landing point by the errors of map and home."""
+    return LANDING_HEIGHT_TOLERANCE_M if item.command in LANDINGS else 0.0
+
+
+def _too_high(mission: Mission, home_altitude: float, readings: list[AltitudeReading]) -> list[AltitudeReading]:
+    """Return the readings of items above home that are too high by about the altitude of home."""
+    items = [mission.items[reading.item_index] for reading in readings]
+    lands_in_the_air = any(
+        item.command in LANDINGS and reading.height > LANDING_HEIGHT_TOLERANCE_M >= abs(reading.other_height)
+        for item, reading in zip(items, readings, strict=True)
+    )
+    too_high = []
+    for k, (item, reading) in enumerate(zip(items, readings, strict=True)):
+        others = [other.alt for other in items[:k] + items[k + 1 :]]
+        is_outlier = bool(others) and item.alt - statistics.median(others) >= home_altitude
+        if (is_outlier or lands_in_the_air) and reading.other_height >= -_height_tolerance(item):
+            too_high.append(reading)
+    return too_high
