@@ -44,11 +44,11 @@ def implied_scenario(
     flight: the scenario's [flight] table; None for the defaults.
     vertical_legs: see `flight.mission.placing.place_stops`.
 
-    The area is the bounding box of the mission's positions and loiters, with a margin of 2 km; for a mission that ends
-    with an RTL it includes the nearest rally point. Start and destination are the first and last of these positions. If
-    they are not above ground, they are raised to 1 m above it, as a scenario requires; the route and its verdict keep
-    the mission's altitudes. A part of the mission may lie where the terrain is unknown. Raises MissionError, or
-    TerrainError if the ground is unknown at all positions of the mission.
+    The area is the bounding box of the mission's positions and loiters, home and rally points, with a margin of 2 km. A
+    home or rally point more than 100 km from the start of the mission is left out. Start and destination are the first
+    and last positions of the mission. If they are not above ground, they are raised to 1 m above it, as a scenario
+    requires; the route and its verdict keep the mission's altitudes. A part of the mission may lie where the terrain is
+    unknown. Raises MissionError, or TerrainError if the ground is unknown at all positions of the mission.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -111,23 +111,16 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
 
 def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, points: Floats) -> Floats:
     """Return the area around a mission, (2, 2) [[e0, e1], [n0, n1]] m.  points: positions of its stops, (n, 2) m."""
-    stops = itinerary.stops
-    flown_box = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
+    stops, home = itinerary.stops, mission.home
     margin = AREA_MARGIN_M + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
-    area = flown_box
-    if itinerary.ends_with_rtl and (rally := rally_stops(mission)):
-        # The rally points in range are unknown here: take the one nearest to the start of the RTL.
-        rally_positions = project_stops(mission.source, rally, origin)
-        distances = np.hypot(*(rally_positions - points[max(0, len(points) - 2)]).T)
-        if distances.min() <= _MAX_HOME_DISTANCE_M:
-            nearest_rally_point = rally_positions[[int(np.argmin(distances))]].T
-            area = np.stack(
-                [
-                    np.minimum(flown_box[:, 0], nearest_rally_point[:, 0]),
-                    np.maximum(flown_box[:, 1], nearest_rally_point[:, 0]),
-                ],
-                axis=1,
-            )
+    # A return flies to home or a rally point from anywhere on the route.
+    targets = [(stop.lat_deg, stop.lon_deg) for stop in rally_stops(mission)]
+    targets += [] if home is None else [(home.lat_deg, home.lon_deg)]
+    lats, lons = np.reshape(targets, (-1, 2)).T
+    targets_on_map = np.stack(to_map(origin, lats, lons), axis=1)
+    is_near = np.hypot(*(targets_on_map - points[0]).T) <= _MAX_HOME_DISTANCE_M
+    positions = np.vstack([points, targets_on_map[is_near]])
+    area = np.stack([positions.min(axis=0), positions.max(axis=0)], axis=1)
     return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT)
 
 

@@ -94,15 +94,20 @@ def test_a_log_gives_the_same_scenario() -> None:
         assert np.array_equal(getattr(again, name), getattr(scenario, name))
 
 
-def test_the_area_holds_the_nearest_rally_point_of_a_return() -> None:
-    def box(*more: str) -> list[list[float]]:
-        read = mission(wp(0, 0), wp(0, 900), *more)
+def test_the_area_contains_home_and_rally_points_to_which_a_return_flies() -> None:
+    def box(*more: str, home: str = "36.5 -84.2 100") -> list[list[float]]:
+        read = mission(wp(0, 0), wp(0, 900), *more, home=home)
         return implied_scenario(read, None).scenario.bounds.round(-1).tolist()  # type: ignore[no-any-return]  # numpy
 
-    rtl, near, far = "0 20 0 0 0 0 0 0 0", wp(4000, 900, command=5100), wp(-9000, 900, command=5100)
-    around = [[-2000.0, 2000.0], [-2000.0, 2900.0]]
-    assert box() == box(near, far) == box(rtl) == around
-    assert box(rtl, far, near) == [[-2000.0, 6000.0], [-2000.0, 2900.0]]
+    near, far = wp(4000, 900, command=5100), wp(-9000, 900, command=5100)
+    assert box() == box("0 20 0 0 0 0 0 0 0") == [[-2000.0, 2000.0], [-2000.0, 2900.0]]
+    assert box(far, near) == [[-11000.0, 6000.0], [-2000.0, 2900.0]]
+    # A rally point of another airfield, 110 km away, is not among them, nor is a default home.
+    assert box(wp(0, 110_000, command=5100)) == box(home="47.4 8.5 488") == box()
+    # Home is the map's origin: the mission is 11.1 km north of it, 0.1 degrees of 110.96 km each.
+    (west, east), (south, north) = box(home="36.4 -84.2 100")
+    assert (west, east, south) == (-2000.0, 2000.0, -2000.0)
+    assert north == pytest.approx(11_096.0 + 2900.0, abs=20.0)
 
 
 def test_a_mission_off_the_tile_is_refused() -> None:
