@@ -18,10 +18,11 @@ _MAX_OWN_RATIO = 2.5
 def draw_battery(result: BatteryResult) -> Figure:
     """Draw the share of the flights that keep the reserve, by capacity, with the found and the aircraft's capacity.
 
-    A flight that does not complete the mission keeps no reserve.
+    A flight that does not complete the mission, and a flight with a return that does not arrive, keeps no reserve.
     """
     goal = result.goal
-    needed = np.sort([row.required_capacity(goal.reserve) for row in result.completed])
+    needed = np.sort([row.required_capacity(goal.reserve) for row in result.known])
+    needed = needed[np.isfinite(needed)]
     with clean_style():
         figure = new_figure(4.6)
         axes = figure.add_axes((0.08, 0.27, 0.89, 0.62))
@@ -37,7 +38,7 @@ def draw_battery(result: BatteryResult) -> Figure:
             axes.text(
                 0.5,
                 0.5,
-                "no flight completed with a known energy",
+                "no flight keeps the reserve" if result.known else "no flight completed with a known energy",
                 ha="center",
                 color=theme.colour("quiet"),
                 fontsize=9,
@@ -51,7 +52,7 @@ def draw_battery(result: BatteryResult) -> Figure:
 def _draw_capacities(axes: Axes, result: BatteryResult, needed: Floats) -> None:
     """Draw the needed capacities in steps, the required probability, the found capacity and the aircraft's own.
 
-    needed: capacities that the completed flights need, Wh, ascending, (n,).
+    needed: finite capacities that the flights need, Wh, ascending, (n,).
     """
     goal = result.goal
     shares = np.arange(1, len(needed) + 1) / len(result.rows)

@@ -17,7 +17,11 @@ def answer_line(result: BatteryResult) -> str:
     """Return the smallest battery in one line."""
     goal = result.goal
     where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
+    where_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
     keeps_text = f"{goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
+    lost = sum(math.isinf(row.return_energy) for row in result.rows)
+    if math.isinf(result.capacity) and lost:
+        return f"no battery keeps {keeps_text}: in {lost} of {len(result.rows)} flights a return does not arrive"
     if math.isinf(result.capacity):
         return (
             f"no battery keeps {keeps_text}: with {goal.specific_energy:g} Wh/kg its own mass needs too much of the"
@@ -37,6 +41,8 @@ def _unknown_reason(result: BatteryResult) -> str:
     """Return why the battery is unknown."""
     count, completed = len(result.rows), len(result.completed)
     endings = [row.ended for row in result.rows if row.ended != "completed"]
+    if unknown := len(result.completed) - len(result.known):
+        return f"in {unknown} of {count} flights a return flies where the terrain is unknown, so its energy is unknown"
     if not endings:
         return "the aircraft's model states no power, so the energy is unknown"
     most_frequent = max(set(endings), key=endings.count)
@@ -48,23 +54,24 @@ def battery_lines(result: BatteryResult) -> list[str]:
     if not result.completed:
         return []
     lines, total = [_own_battery_line(result), *_mass_lines(result)], len(result.completed)
-    lines += [
-        f"in {flights} of {total} flights {part} decides the capacity"
-        for part, flights, _ in decision_rows(result)[:_MAX_LISTED]
-    ]
+    if math.isfinite(result.capacity):
+        lines += [
+            f"in {flights} of {total} flights {part} decides the capacity"
+            for part, flights, _ in decision_rows(result)[:_MAX_LISTED]
+        ]
     energies = result.leg_energies
     if float(energies.sum()) > 0.0:
         largest = sorted(range(len(energies)), key=lambda leg: -float(energies[leg]))[:_MAX_LISTED]
         names = leg_names(result)
         parts = [f"{energies[leg]:.1f} Wh ({names[leg]})" for leg in largest]
         lines.append(f"the mission uses {float(energies.sum()):.1f} Wh (median); most of it: {', '.join(parts)}")
-    lost = sum(row.lost_returns > 0 for row in result.completed)
+    blocked = sum(row.blocked_returns > 0 for row in result.completed)
     if result.base.mission.home is None:
         lines.append("the mission has no home, so no returns were simulated")
-    elif lost:
+    elif blocked:
         lines.append(
-            f"in {lost} of {total} flights some returns do not arrive, and their energy is not counted:"
-            " see planfly returns"
+            f"in {blocked} of {total} flights some returns hit something before they arrive, whatever the battery, and"
+            " are left out: see planfly returns"
         )
     lines.append(
         f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s"
@@ -109,6 +116,8 @@ def _own_battery_line(result: BatteryResult) -> str:
     """Compare the aircraft's own battery with the smallest battery."""
     if result.is_guessed:
         return "the aircraft does not state its battery, so it is not compared: state battery_wh in the scenario"
+    if math.isnan(result.capacity):
+        return f"whether the aircraft's battery of {result.own_capacity:.0f} Wh is enough is not judged"
     unknown_text = "may be enough (more flights would decide)" if result.has_returns else "may not cover the returns"
     verdict = {True: "is enough", False: "is too small", None: unknown_text}
     low, high = result.own_probability

@@ -31,6 +31,7 @@ from planfly.campaigns.statistics.decision import Interval
 from planfly.campaigns.worker_pool import Workers, worker_pool
 from planfly.runtime.stages import Advance
 from world.arrays import Floats
+from world.errors import PlanflyError
 
 # Default number of flights.
 DEFAULT_BATTERY_FLIGHTS = 100
@@ -73,12 +74,14 @@ class EnergyRow(FlightRow):
     """Row of a flight with the energies that it needs.
 
     mission_energy: energy used at the end of the mission, Wh.
-    return_energy: highest energy used at the end of a return, Wh; NaN if no return's energy is known.
+    return_energy: highest energy used at the end of a return, Wh; inf if a return does not reach its loiter, for
+        example against the wind; NaN if no return's energy is known.
     return_time: start of this return, s.
     return_leg: number of the leg on which this return starts, as in messages.
     leg_energies: energy used on each leg by its number, Wh: all legs around a loiter are one.
     battery_factor: drawn factor on the battery's capacity.
-    lost_returns: number of returns that do not arrive, whose energy is unknown.
+    blocked_returns: number of returns that hit something before they arrive, whatever the battery.
+    unknown_returns: number of returns whose energy is unknown, because they leave the terrain data.
     """
 
     mission_energy: float = math.nan
@@ -87,10 +90,16 @@ class EnergyRow(FlightRow):
     return_leg: int = -1
     leg_energies: tuple[float, ...] = ()
     battery_factor: float = 1.0
-    lost_returns: int = 0
+    blocked_returns: int = 0
+    unknown_returns: int = 0
 
     def required_capacity(self, reserve: float) -> float:
-        """Return the smallest nominal capacity that leaves a fraction of the battery unused, Wh."""
+        """Return the smallest nominal capacity that leaves a fraction of the battery unused, Wh.
+
+        It is inf if a return does not arrive with any battery, and NaN if an energy is unknown.
+        """
+        if self.unknown_returns and not math.isinf(self.return_energy):
+            return math.nan
         return float(np.fmax(self.mission_energy, self.return_energy)) / ((1.0 - reserve) * self.battery_factor)
 
     @property
@@ -146,14 +155,20 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     returns: Returns = judge_returns(
         make_return_world(varied.setup), flown_starts(varied.setup, track, interval), interval
     )
+    kinds = Counter(one.kind for one in returns.each if math.isnan(one.time_to_loiter))
+    lost = [one for one in returns.each if one.kind == "lost"]
     arriving = [one for one in returns.each if math.isfinite(one.time_to_loiter)]
-    row = replace(row, lost_returns=len(returns.each) - len(arriving))
-    if not arriving:
+    row = replace(
+        row,
+        unknown_returns=kinds["unknown"] + kinds["low"],
+        blocked_returns=kinds["ground"] + kinds["threat"] + kinds["zone"],
+    )
+    if not lost and not arriving:
         return row
-    worst = max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
+    worst = lost[0] if lost else max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
     worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))
     leg = int(varied.setup.route.leg_numbers_of(track.leg[worst_row : worst_row + 1])[0])
-    needed = worst.energy_used + ratio * worst.energy
+    needed = math.inf if lost else worst.energy_used + ratio * worst.energy
     return replace(row, return_energy=needed, return_time=worst.time, return_leg=leg)
 
 
@@ -181,8 +196,8 @@ class BatteryDecision(NamedTuple):
 class BatteryResult:
     """Result of `planfly.battery`.
 
-    capacity: smallest capacity that keeps the reserve with the probability, Wh; inf if no battery does, because the
-        energy that it adds is needed for its own mass; NaN if it is unknown.
+    capacity: smallest capacity that keeps the reserve with the probability, Wh; inf if no battery does, because returns
+        do not arrive, or because the energy that it adds is needed for its own mass; NaN if it is unknown.
     interval: its interval with the goal's confidence, Wh; its upper end is inf if there are too few flights.
     own_capacity: capacity of the aircraft's battery, Wh.
     is_guessed: True if the aircraft does not state its battery.
@@ -236,6 +251,11 @@ class BatteryResult:
         return False if self.own_probability.high < self.goal.probability else None
 
     @property
+    def known(self) -> tuple[EnergyRow, ...]:
+        """Flights that completed the mission and whose returns have known energies."""
+        return tuple(row for row in self.completed if not math.isnan(row.required_capacity(self.goal.reserve)))
+
+    @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
         """Parts that decide the battery, the most frequent first."""
         legs = Counter(row.return_leg if row.is_decided_by_return else -1 for row in self.completed)
@@ -260,10 +280,18 @@ class BatteryResult:
 def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advance: Advance) -> BatteryResult:
     """Find the smallest battery that keeps the reserve in the flights of a campaign.
 
+    Raises PlanflyError for an aircraft that burns fuel.
+
     If the mass changes with the battery, campaigns of the same draws are flown with the mass of the battery that the
     campaign before has found, until the battery no longer changes.
     """
     aircraft = base.airframe.aircraft
+    if not aircraft.battery_voltage > 0.0:
+        raise PlanflyError(
+            f"{base.name}: {aircraft.name} burns fuel: expected an electric aircraft",
+            field="aircraft",
+            value=aircraft.name,
+        )
     own_capacity = base.airframe.battery
     rows = fly_energy_campaign(base, goal, workers, 1.0, advance)
     kept = sum(row.required_capacity(goal.reserve) <= own_capacity for row in rows)
@@ -325,17 +353,19 @@ def fly_energy_campaign(
 def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tuple[float, CapacityRange]:
     """Return the quantile of the capacities that the flights need, Wh, and its interval from the order statistics.
 
-    Both are NaN if a larger part of the flights than the goal leaves open did not complete the mission, or if the
-    aircraft's power is unknown.
+    Both are NaN if a larger part of the flights than the goal leaves open did not complete the mission or has returns
+    of unknown energy, or if the aircraft's power is unknown.  A bound is inf if no battery covers so many flights.
     """
     from scipy import stats
 
-    needed = np.array([row.required_capacity(goal.reserve) for row in rows if row.mission_energy > 0.0])
+    capacities = np.array([row.required_capacity(goal.reserve) for row in rows if row.mission_energy > 0.0])
+    needed = np.minimum(capacities[~np.isnan(capacities)], _ENDLESS_BATTERY_WH)
     if len(needed) < 2 or len(needed) < goal.probability * len(rows):
         return math.nan, CapacityRange(math.nan, math.nan)
     capacity = float(np.quantile(needed, goal.probability, method="median_unbiased"))
-    test = stats.quantile_test(needed, p=goal.probability)
-    low, high = test.confidence_interval(goal.confidence)
-    return capacity, CapacityRange(
-        float(low) if math.isfinite(low) else 0.0, float(high) if math.isfinite(high) else math.inf
-    )
+    low, high = stats.quantile_test(needed, p=goal.probability).confidence_interval(goal.confidence)
+    largest = float(needed[needed < _ENDLESS_BATTERY_WH].max(initial=0.0))
+    bounds = [float(low) if math.isfinite(low) else 0.0, float(high) if math.isfinite(high) else math.inf]
+    # A quantile between the largest capacity and none is that of a flight that no battery covers.
+    capacity, *bounds = (math.inf if value > largest else value for value in (capacity, *bounds))
+    return capacity, CapacityRange(*bounds)

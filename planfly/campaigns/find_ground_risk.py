@@ -46,7 +46,7 @@ from planfly.campaigns.worker_pool import Workers, worker_pool
 from planfly.runtime.stages import Advance
 from world.airspace.zones_on_map import zone_parts
 from world.arrays import Floats
-from world.errors import FlightError, ScenarioError, StartError
+from world.errors import ArgumentError, FlightError, ScenarioError, StartError
 from world.population import Population, PopulationUnit, read_population
 from world.terrain import Terrain
 from world.wind import Wind
@@ -403,8 +403,9 @@ class GroundRiskResult:
 
     @property
     def is_judged(self) -> bool:
-        """True if the class is known, or known to be outside SORA."""
-        return self.goal.controlled or (self.population is not None and self.population.is_complete)
+        """True if the class is known, or known to be outside SORA; False without a home, to which returns fly."""
+        is_populated = self.goal.controlled or (self.population is not None and self.population.is_complete)
+        return is_populated and self.base.mission.home is not None
 
     @property
     def entered_zones(self) -> tuple[str, ...]:
@@ -427,6 +428,10 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     if scenario.terrain is None:
         message = f"{base.name}: the heights above ground need terrain: name an elevation file (--terrain)"
         raise ScenarioError(message, file=base.name, field="terrain")
+    commanded = float(base.nominal_setup().demanded_route.leg_airspeeds.max())
+    if goal.speed is not None and goal.speed < commanded:
+        allowed = f"expected at least {commanded:.1f} m/s, the highest true airspeed that the mission commands"
+        raise ArgumentError.of_argument("max_speed", goal.speed, allowed)
     path = nominal_path(base)
     if goal.population is not None:
         # A bad raster is refused before the flights.

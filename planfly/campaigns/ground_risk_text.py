@@ -40,6 +40,8 @@ def density_text(population: Population | None) -> str:
 
 def _unknown_reason(result: GroundRiskResult) -> str:
     """Return why the class is not judged."""
+    if result.base.mission.home is None:
+        return "the mission has no home, so its returns, which enlarge the volumes, were not simulated"
     if result.population is None:
         return "no population raster was named (--population)"
     known = result.population.known_fraction
@@ -106,8 +108,6 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
             f"{len(endings)} of {len(result.rows)} flights do not complete the mission, most of them: {most_frequent};"
             " the volumes contain them up to their end"
         )
-    if result.base.mission.home is None:
-        lines.append("the mission has no home, so no returns were simulated")
     ground_speed = max(row.ground_speed for row in result.rows)
     if ground_speed > result.speed:
         lines.append(
@@ -116,10 +116,10 @@ def _flight_lines(result: GroundRiskResult) -> list[str]:
         )
     spread = result.base.dispersions.name
     setup = result.base.nominal_setup()
-    lines.append(
-        f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}; returns to launch by"
-        f" {returning_title(setup)}'s rules every {result.goal.interval:g} s"
-    )
+    returns_text = f"; returns to launch by {returning_title(setup)}'s rules every {result.goal.interval:g} s"
+    if setup.mission.home is None:
+        returns_text = ", without returns to launch"
+    lines.append(f"{count_text(len(result.rows), 'flight')} with {spread}, seed {result.base.seed}{returns_text}")
     if result.goal.glide and setup.mission.home is not None:
         world = make_return_world(setup)
         if without_engine_world(world) is not world:

@@ -27,6 +27,7 @@ from planfly.campaigns.worker_pool import Workers
 from planfly.cli import main
 from tests.logs.verdict.returns import hill
 from tests.mission_lines import mission, wp
+from world.errors import PlanflyError
 
 _DRAW = draw_flight(default_dispersions(), 1, 0)
 
@@ -135,6 +136,53 @@ def test_no_battery_carries_itself(base: CampaignBase) -> None:
         interval=none,
     )
     assert answer_line(result).startswith("no battery keeps 20%")
+
+
+@pytest.mark.parametrize(("lost", "is_known"), [(4, True), (5, False)])
+def test_no_battery_covers_a_return_that_does_not_arrive(base: CampaignBase, lost: int, is_known: bool) -> None:
+    """The quantile of 100 flights is between the 95th and the 96th capacity."""
+    rows = [energy_row(80.0, return_energy=96.0) for _ in range(100 - lost)]
+    rows += [energy_row(80.0, return_energy=math.inf) for _ in range(lost)]
+    result = battery_result(base, rows, own=200.0)
+    assert result.kept == 100 - lost
+    assert math.isfinite(result.capacity) == is_known
+    nothing = (
+        "no battery keeps 20% in the mission and in every return with probability 0.95: in 5 of 100 flights a return "
+    )
+    assert (answer_line(result) == f"{nothing}does not arrive") != is_known
+    battery_page(result, draw_battery(result), "").render()
+
+
+def test_a_return_of_unknown_energy_leaves_it_unknown(base: CampaignBase) -> None:
+    rows = [energy_row(80.0, return_energy=96.0)] * 94 + [energy_row(80.0, unknown_returns=1)] * 6
+    result = battery_result(base, rows, own=888.0)
+    assert math.isnan(result.capacity)
+    assert result.is_enough is None
+    assert answer_line(result).startswith("not judged: in 6 of 100 flights a return flies where the terrain is unknown")
+    assert "whether the aircraft's battery of 888 Wh is enough is not judged" in battery_lines(result)
+
+
+def test_a_return_that_hits_something_is_no_matter_of_the_battery(base: CampaignBase) -> None:
+    result = battery_result(base, [energy_row(80.0, return_energy=96.0, blocked_returns=2)] * 100, own=888.0)
+    assert result.capacity == pytest.approx(96.0 / 0.8)
+    assert "in every return that arrives with probability 0.95" in answer_line(result)
+
+
+def test_a_return_against_more_wind_than_the_airspeed_is_covered_by_no_battery(tmp_path: Path) -> None:
+    """With 30 m/s from home, 5 m/s more than its airspeed, no return comes back."""
+    file = tmp_path / "away.waypoints"
+    file.write_text(mission_text(mission(wp(0, 0), wp(0, 1500)), "waypoints"), encoding="ascii")
+    base = open_campaign(str(file), default_dispersions(), {"seed": 1, "wind": (30.0, 180.0)})
+    row = fly_for_energy(base, 0, interval=5.0, mass_factor=1.0)
+    assert row.ended == "completed"
+    assert math.isinf(row.return_energy)
+    assert not row.blocked_returns
+
+
+def test_an_aircraft_that_burns_fuel_is_refused(base: CampaignBase) -> None:
+    fuelled = replace(base.airframe, aircraft=replace(base.airframe.aircraft, battery_voltage=0.0))
+    with pytest.raises(PlanflyError, match="tight: aerosonde burns fuel: expected an electric aircraft"):
+        find_battery(replace(base, airframe=fuelled), BatteryGoal(flights=2), Workers(1), lambda *_: None)
 
 
 def test_a_flight_uses_what_its_track_says(base: CampaignBase) -> None:

@@ -18,6 +18,7 @@ from planfly.campaigns.find_ground_risk import (
     GroundRiskGoal,
     GroundRiskResult,
     areas_between,
+    find_ground_risk,
     fly_for_excursions,
     make_volumes,
     nominal_path,
@@ -26,9 +27,10 @@ from planfly.campaigns.find_ground_risk import (
     with_ground_class,
 )
 from planfly.campaigns.ground_risk_text import DISCLAIMER, answer_line, risk_lines, table_text
+from planfly.campaigns.worker_pool import Workers
 from tests.world.made.elevation_files import from_origin, write_raster
 from world.arrays import Floats
-from world.errors import PlanflyError
+from world.errors import ArgumentError, PlanflyError
 
 # Wing span (m) and highest airspeed (m/s) of the aerosonde, as in its data.
 SPAN_M = 2.8956
@@ -207,6 +209,22 @@ def test_the_autopilot_whose_returns_count_is_named(base: CampaignBase) -> None:
 def test_flights_faster_than_the_stated_speed_are_told(base: CampaignBase) -> None:
     result = volumes(base, [row(50.0, 40.0, 60.0)] * 20, speed=20.0)
     assert any("flights reach a ground speed of 28.0 m/s" in line for line in risk_lines(result))
+
+
+def test_a_highest_speed_below_the_commanded_airspeed_is_refused(base: CampaignBase) -> None:
+    """`tight` is flown at 25 m/s: with 24 m/s the class would be that of a slower column."""
+    goal = GroundRiskGoal(flights=1, speed=24.0)
+    with pytest.raises(ArgumentError, match=r"max_speed 24.0: expected at least 25.0 m/s, the highest true airspeed"):
+        find_ground_risk(base, goal, Workers(1), lambda *_: None)
+
+
+def test_a_mission_without_a_home_has_no_class(base: CampaignBase, tmp_path: Path) -> None:
+    """Its returns, which enlarge the volumes, are unknown."""
+    homeless = replace(base, mission=replace(base.mission, home=None))
+    result = volumes(homeless, [row(50.0, 40.0, 60.0)] * 20, controlled=True)
+    assert not result.is_judged
+    assert answer_line(result).startswith("class not judged: the mission has no home")
+    assert not any("returns to launch by" in line for line in risk_lines(result))
 
 
 def test_no_known_ground_is_refused(base: CampaignBase) -> None:
