@@ -213,7 +213,18 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
     aircraft = base.airframe.aircraft
     check_level_flight(aircraft, base.airframe.limits.envelope)
     _check_draws(base)
-    model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
+    try:
+        model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
+    except FlightError as error:
+        quantity = _VARIED_PROPERTIES.get(error.field)
+        if quantity is None:
+            raise
+        raise SpreadError(
+            f"{base.dispersions.name}: {quantity}: the model of {aircraft.name} has no property {error.field}, which it"
+            f" varies; leave {quantity} out of a file of dispersions (--spread FILE)",
+            file=base.dispersions.name,
+            field=quantity,
+        ) from error
     amsl = float(base.scenario.start[2])
     if steady_flight(model, base.airframe.airspeed, amsl) is None:
         factors = ", ".join(
@@ -225,6 +236,10 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             file=base.dispersions.name,
             value=factors,
         )
+
+
+# Dispersed quantity that varies a property of a JSBSim model.
+_VARIED_PROPERTIES = {"aero/drag-factor": "drag", "aero/control-factor": "control_power"}
 
 
 def _check_draws(base: CampaignBase) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aircraft.catalog import copy_aircraft_folder, read_aircraft
+from aircraft.catalog import copy_aircraft_folder, load_aircraft, read_aircraft
 from aircraft.data_sheet import DataSheet
 from planfly.campaigns.campaign_base import (
     CampaignBase,
@@ -64,6 +64,14 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
         SpreadError, match=r"mine.toml: with the median factors mass 1.9, drag 2.85, .* cannot fly level at 25 m/s"
     ):
         check_level_flight_at_medians(made)
+
+
+def test_a_model_that_a_dispersion_cannot_vary_is_refused(base: CampaignBase) -> None:
+    cessna = replace(base, airframe=replace(base.airframe, aircraft=load_aircraft("c172x")))
+    with pytest.raises(
+        SpreadError, match=r"drag: the model of c172x has no property aero/drag-factor, which it varies"
+    ):
+        check_level_flight_at_medians(cessna)
 
 
 def test_a_missing_mission_is_one_line() -> None:
