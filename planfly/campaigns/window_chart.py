@@ -22,6 +22,8 @@ _UNKNOWN_COLOUR = theme.colour("quiet")
 _GRID_COLOUR = theme.colour("grid")
 _INK_COLOUR = theme.colour("ink")
 _WIND_COLOUR = theme.colour("second")
+# Largest number of times on the axis: more overlap on a narrow page.
+_MAX_TIME_TICKS = 7
 # Largest number of departures at which each has a label of its own.
 _MAX_LABELS = 26
 
@@ -67,7 +69,7 @@ def draw_window(result: WindowResult) -> Figure:
             for spine in ("top", "right"):
                 axes.spines[spine].set_visible(False)
             axes.tick_params(labelbottom=axes is energy)
-        locator = _DATES.AutoDateLocator(minticks=3, maxticks=12)
+        locator = _DATES.AutoDateLocator(minticks=3, maxticks=_MAX_TIME_TICKS)
         energy.xaxis.set_major_locator(locator)
         energy.xaxis.set_major_formatter(_DATES.ConciseDateFormatter(locator))
     return figure
