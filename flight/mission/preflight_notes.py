@@ -29,6 +29,8 @@ MAX_HOME_DISTANCE_M = 50.0
 # Minimum radius about home within which the ground is checked for an RTL, m: with WP_LOITER_RAD 60, ArduPlane flew
 # loiters of up to 260 m.
 MIN_RTL_LOITER_RADIUS_M = 260.0
+# Largest depth below the ground of a rally point that was set on the ground, m.
+RALLY_ALTITUDE_ERROR_M = 10.0
 # Number of rings about home on which the ground is checked.
 _RING_COUNT = 13
 # Number of directions on each ring.
@@ -131,11 +133,12 @@ def _note_rally_points(
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
-        altitude = point.up + rules.rally_height
-        if altitude <= ground:
+        # A return that ends above the rally point may use a point on the ground, whose altitude has errors.
+        tolerance = RALLY_ALTITUDE_ERROR_M if rules.rally_height > 0.0 else 0.0
+        if point.up <= ground - tolerance:
             yield (
-                f"{name} is {ground - altitude:.0f} m below the ground:"
-                f" {altitude:.0f} m AMSL, and the ground there {ground:.0f} m"
+                f"{name} is {ground - point.up:.0f} m below the ground:"
+                f" {point.up:.0f} m AMSL, and the ground there {ground:.0f} m"
             )
         distance = _distance_from_path(route.positions, (point.east, point.north))
         if 0.0 < rules.rally_limit < distance:

@@ -137,6 +137,14 @@ def test_a_rally_point_in_the_ground(alt: float, told: bool) -> None:
     assert all(one.startswith("rally point 1 is 0 m below the ground: 100 m AMSL") for one in found)
 
 
+@pytest.mark.parametrize(("alt", "depth"), [(-9.0, None), (-11.0, 11), (-50.0, 50)])
+def test_a_rally_point_in_the_ground_is_named_though_the_return_ends_above_it(alt: float, depth: int | None) -> None:
+    """PX4 descends to RTL_DESCEND_ALT over a rally point: with 60 m, a point 50 m below the ground looks flyable."""
+    found = notes(*WAY, rally(300, 300, alt), rules=ReturnRules(rally_height=60.0))
+    expected = [f"rally point 1 is {depth} m below the ground: {100 + alt:.0f} m AMSL, and the ground there 100 m"]
+    assert found == ([] if depth is None else expected)
+
+
 @pytest.mark.parametrize(("east", "told"), [(-4990.0, False), (-5010.0, True)])
 def test_a_rally_point_that_no_return_flies_to(east: float, told: bool) -> None:
     found = notes(*WAY, rally(east, 1000, 100), rules=ReturnRules(rally_limit=5000.0))
