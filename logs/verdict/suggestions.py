@@ -503,9 +503,13 @@ def suggest_staying_inside(
 def suggest_using_less_energy(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a shorter flight, or a battery or tank with more energy."""
+    """Suggest a shorter flight, or a battery or tank with more energy.
+
+    Neither moves a battery failsafe that leaves the mission, and the trial of a shorter flight has a larger battery.
+    """
     energy = finding.planned if finding.flown is None else finding.flown
-    if energy is None or finding.limit is None or finding.margin is None:
+    is_failsafe = finding.limit_source == "autopilot"
+    if energy is None or finding.limit is None or finding.margin is None or (is_failsafe and finding.ok is False):
         return ()
     if finding.planned is not None and finding.flown is not None and finding.flown >= requirements.setup.battery:
         # The flight ended with an empty battery or tank; only the prediction covers the whole mission.
@@ -519,7 +523,10 @@ def suggest_using_less_energy(
     storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
     larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
-    return (shorter_flight,), (larger_storage,)
+    # Shortened by 100 %, nothing would be left of the flight.
+    changes = [shorter_flight] if shorter_flight.wanted < 100.0 else []
+    changes += [larger_storage] if not is_failsafe else []
+    return tuple((change,) for change in changes)
 
 
 def suggest_flying_faster(
