@@ -98,6 +98,7 @@ _PLACED_SUBJECTS = {
     "speed": ("airspeed", "on", "leg"),
     "turn": ("turn", "at", "waypoint"),
     "loiter": ("loiter", "at", "waypoint"),
+    "landing": ("landing", "at", "waypoint"),
 }
 
 

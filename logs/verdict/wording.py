@@ -72,6 +72,8 @@ def change_text(change: Change) -> str:
     'lower both ends of leg 3 by 12 m'
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
     'lower both ends of leg 3, to item 5, by 12 m'
+    >>> change_text(Change("descent", Place("waypoint", 4, item=5), None, 12.0, "m"))
+    'lower waypoint 4 (item 5) by 12 m'
     >>> change_text(Change("radius", Place("waypoint", 4, item=5), 80.0, 94.0, "m"))
     'set the radius of item 5 to 94 m instead of 80 m'
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
@@ -95,6 +97,8 @@ def change_text(change: Change) -> str:
             if change.place.kind == "leg":
                 verb = "raise" if change.what == "height" else "lower"
                 return f"{verb} both ends of {place_name} by {requested_value:.0f} m"
+            if change.place.kind == "waypoint":
+                return f"lower {place_text(change.place)} by {requested_value:.0f} m"
             return (
                 f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
             )
