@@ -10,6 +10,8 @@ from world.wording import count_text as count_text
 
 # Text of a unit after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "dB": " dB", "legs": " legs", "%": " %"}
+# Rules that judge a flight where another rule judges the route.
+FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 # Greatest length of a statement in a headline, characters.
 _MAX_STATEMENT_LENGTH = 80
 
@@ -272,12 +274,16 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
+    >>> disagreement_text(Disagreement("landing", Place("waypoint", 2), "geometry", there=False, here=True))
+    'landing at waypoint 2 fails by geometry, and touchdown, by which a flight judges it, passes in flight'
     """
     verbs = {True: "passes", False: "fails"}
     rule_and_place = f"{disagreement.rule} at {place_text_within(disagreement.place)}"
+    counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
+    conjunction = f", and {counterpart}, by which a flight judges it," if counterpart else " and"
     return (
         f"{rule_and_place} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
-        f" and {verbs[disagreement.here]} in flight"
+        f"{conjunction} {verbs[disagreement.here]} in flight"
     )
 
 

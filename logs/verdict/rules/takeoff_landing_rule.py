@@ -171,7 +171,10 @@ def _slope_finding(
     if abs(slope) > limit.limit + PLAN_TOLERANCE_RAD:
         ok = _RESULT_BEYOND_LIMIT[rule]
         check = GROUND_PATH if ok is None else ""
-        limit_text = f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
+        limit_text = (
+            f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
+            f"{_flown_text(requirements, rule)}"
+        )
         faults, reason = [message(fault_text, limit_text)], text + limit_text
     elif limit.certain < limit.limit and abs(slope) > max(limit.certain, LEVEL_SLOPE_RAD):
         ok, check, faults = None, _UNCERTAIN_CHECK[rule], [message(fault_text)]
@@ -203,6 +206,12 @@ def _not_flown_text(requirements: RouteRequirements, rule: str) -> str:
     ground_phases = requirements.setup.ground_phases
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     return "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
+
+
+def _flown_text(requirements: RouteRequirements, rule: str) -> str:
+    """Return a clause that a flight judges the touchdown of a landing instead of its slope; "" if it does not."""
+    is_flown = rule == "landing" and requirements.setup.ground_phases.approach is not None
+    return " without gaining speed; a flight judges its touchdown instead" if is_flown else ""
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
