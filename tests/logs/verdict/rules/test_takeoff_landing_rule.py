@@ -187,12 +187,9 @@ def test_a_landing_that_is_too_steep_suggests_a_lower_or_a_further_waypoint() ->
     item = of(judge_geometry(setup), "landing")
     assert item.limit is not None
     slope = math.tan(math.radians(item.limit - 0.1))
-    lower, further = (
-        (next(change for (change,) in item.suggestions if change.what == what) for what in ("descent", "length"))
-        if len(item.suggestions) == 2
-        else (item.suggestions[0][0], None)
-    )
+    (lower,), (further,) = item.suggestions
+    assert (lower.what, further.what) == ("descent", "length")
     # 100 m in 100 m.
     assert lower.wanted == math.ceil(100.0 - 100.0 * slope)
     assert (lower.place.kind, lower.place.item) == ("waypoint", 2)
-    assert further is None or further.wanted == math.ceil(100.0 / slope)
+    assert further.wanted == math.ceil(100.0 / slope)
