@@ -48,10 +48,9 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    If a battery failsafe leaves the mission before the reserve is reached, its energy is the limit.
-
-    A mission with an endless jump fails.  A guessed battery is not judged.  If the power of the aircraft's model is
-    uncertain, an energy that may exceed the limit is undecided, except in an imported log, which has measured energy.
+    The energy at which a battery failsafe leaves the mission is the limit if it is smaller.  An endless jump fails, and
+    a guessed battery is not judged.  If the power of the aircraft's model is uncertain, an energy that may exceed the
+    limit is undecided, except in an imported log, which has measured energy.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -61,8 +60,8 @@ def energy_findings(
     is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
-    jump_faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0)
-    faults = [*jump_faults, *failsafes.faults]
+    energy_ratio = energy / planned_energy if is_flown else 1.0
+    faults = [*_endless_jump_faults(requirements, limit, energy_ratio), *failsafes.faults]
     # A flight that ends with an empty battery does not show the energy that it needs; the prediction does.
     is_empty = not geometric and not is_measured and energy >= setup.battery
     needed_energy = float(np.fmax(energy, planned_energy)) if is_empty else energy

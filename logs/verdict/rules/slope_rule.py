@@ -82,17 +82,14 @@ def _leg_finding(
         sign = math.copysign(1.0, planned_slope)
         faults = [_steep_ground_message(requirements, leg, ground)]
     # A fault of the plan states the planned slope itself.
-    facts = facts if faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
+    facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
         flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
         fit = measure.slope if ground is None else None
-        method = "not flown" if ground is None else "route"
-        if fit is not None:
-            method_text = "least squares" if fit.is_fitted else "least squares, short leg,"
-            method = f"{method_text} over {fit.length:.0f} m"
+        method = _fit_text(fit) if fit is not None else "not flown" if ground is None else "route"
     # The arc at the leg's end may be steep only because the leg is.
     faults = faults + arc_faults
     ok: bool | None = not faults
@@ -123,6 +120,11 @@ def _leg_finding(
         check=check,
         facts=_measured_facts(requirements, leg, measure),
     )
+
+
+def _fit_text(fit: LegFit) -> str:
+    """Return the method by which a flown slope was measured."""
+    return f"least squares{'' if fit.is_fitted else ', short leg,'} over {fit.length:.0f} m"
 
 
 def _flown_messages(

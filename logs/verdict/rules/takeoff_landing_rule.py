@@ -165,19 +165,16 @@ def _slope_finding(
     limit_deg = math.degrees(limit.limit)
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
-    fault_text = f"the {_PHASE_TITLES[rule]} {text}"
     ok: bool | None = True
     check, faults = "", list[Message]()
     if abs(slope) > limit.limit + PLAN_TOLERANCE_RAD:
         ok = _RESULT_BEYOND_LIMIT[rule]
         check = GROUND_PATH if ok is None else ""
-        limit_text = (
-            f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
-            f"{_flown_text(requirements, rule)}"
-        )
-        faults, reason = [message(fault_text, limit_text)], text + limit_text
+        limit_text = f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
+        limit_text += _flown_text(requirements, rule)
+        faults, reason = [message(f"the {_PHASE_TITLES[rule]} {text}", limit_text)], text + limit_text
     elif limit.certain < limit.limit and abs(slope) > max(limit.certain, LEVEL_SLOPE_RAD):
-        ok, check, faults = None, _UNCERTAIN_CHECK[rule], [message(fault_text)]
+        ok, check, faults = None, _UNCERTAIN_CHECK[rule], [message(f"the {_PHASE_TITLES[rule]} {text}")]
         reason = (
             f"{text}; the limit according to {requirements.setup.envelope.source} is {limit_deg:.1f}° at"
             f" {limit.airspeed:.1f} m/s, but with its uncertainty only {math.degrees(limit.certain):.1f}° is certain"
