@@ -193,3 +193,14 @@ def test_a_landing_that_is_too_steep_suggests_a_lower_or_a_further_waypoint() ->
     assert lower.wanted == math.ceil(100.0 - 100.0 * slope)
     assert (lower.place.kind, lower.place.item) == ("waypoint", 2)
     assert further.wanted == math.ceil(100.0 / slope)
+
+
+def test_a_take_off_close_to_the_limit_of_an_uncertain_aircraft_is_left_open() -> None:
+    """1.645 standard deviations of 0.5 degrees below the limit are certain."""
+    setup = setup_of(*FAR, home=HOME)
+    able = math.degrees(min(setup.envelope.air_angles(25.0, amsl)[0] for amsl in (100.0, 200.0)))
+    for slope, ok in ((able - 0.87, True), (able - 0.77, None)):
+        made = setup_of(*climb(slope), home=HOME)
+        limits = replace(made.limits, envelope=replace(made.envelope, climb_sd=math.radians(0.5)))
+        item = of(judge_geometry(replace(made, limits=limits)), "takeoff")
+        assert (item.ok, item.check) == (ok, "" if ok else "ground way")
