@@ -60,8 +60,7 @@ def energy_findings(
     is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
-    energy_ratio = energy / planned_energy if is_flown else 1.0
-    faults = [*_endless_jump_faults(requirements, limit, energy_ratio), *failsafes.faults]
+    faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0) + failsafes.faults
     # A flight that ends with an empty battery does not show the energy that it needs; the prediction does.
     is_empty = not geometric and not is_measured and energy >= setup.battery
     needed_energy = float(np.fmax(energy, planned_energy)) if is_empty else energy
