@@ -469,6 +469,8 @@ class BatteryFailsafe(NamedTuple):
     shares_charge: True if several batteries are monitored: the share of this battery in the used charge is unknown.
     remaining_fraction: remaining fraction of the energy, estimated from the voltage, at which the autopilot leaves the
         mission; NaN for a threshold of the charge or of the voltage itself.
+    capacity_parameter: name of the parameter that states the battery's capacity; "" for a threshold of the voltage.
+    capacity: value of this parameter, mAh.
     """
 
     parameter: str
@@ -476,6 +478,8 @@ class BatteryFailsafe(NamedTuple):
     used_charge: float = math.nan
     shares_charge: bool = False
     remaining_fraction: float = math.nan
+    capacity_parameter: str = ""
+    capacity: float = math.nan
 
 
 class MissionParts(NamedTuple):

@@ -254,7 +254,8 @@ def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
     """
     points = np.array(route.positions)
     if ground_phases.take_off is not None:
-        points[ground_phases.take_off.waypoint, 2] = ground_phases.take_off.home[2]
+        # The flight starts at home, even if the take-off item has a position of its own.
+        points[0, 2] = ground_phases.take_off.home[2]
     if ground_phases.approach is not None:
         points[ground_phases.approach.leg + 1, 2] = ground_phases.approach.point[2]
     return points

@@ -29,6 +29,7 @@ from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Refer
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.summary import headline, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
+from logs.verdict.wording import FLOWN_COUNTERPARTS
 
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 
@@ -151,14 +152,18 @@ def _disagreements(
 ) -> tuple[Disagreement, ...]:
     """Return the findings that a level and the flight judge differently, in the order of the level's findings.
 
+    A flown landing is judged by the rule of `FLOWN_COUNTERPARTS`.
+
     level: name of the level.
     """
     level_outcomes, flight_outcomes = _worst_outcomes(level_findings), _worst_outcomes(flight_findings)
-    return tuple(
-        Disagreement(worst.rule, worst.place, level, bool(worst.ok), bool(flight_outcomes[key].ok))
-        for key, worst in level_outcomes.items()
-        if key in flight_outcomes and worst.ok != flight_outcomes[key].ok
-    )
+    flown_by_rule = {outcome.rule: outcome for outcome in flight_outcomes.values()}
+    disagreements = []
+    for key, worst in level_outcomes.items():
+        flown = flight_outcomes.get(key) or flown_by_rule.get(FLOWN_COUNTERPARTS.get(worst.rule, ""))
+        if flown is not None and worst.ok != flown.ok:
+            disagreements.append(Disagreement(worst.rule, worst.place, level, bool(worst.ok), bool(flown.ok)))
+    return tuple(disagreements)
 
 
 def _worst_outcomes(findings: Sequence[Finding]) -> dict[tuple[object, ...], Finding]:

@@ -21,6 +21,7 @@ from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     available_lengths,
+    ground_slope_limit,
     leg_performance,
     slope_limit,
     steep_arc,
@@ -202,6 +203,36 @@ def suggest_gentler_slope(
     relative_growth = longer_length / leg_length - 1.0 if leg_length >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
     alternatives.append((relative_growth, (Change("length", place, leg_length, float(math.ceil(longer_length)), "m"),)))
     return _smallest_first(alternatives)
+
+
+def suggest_gentler_landing(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest a lower waypoint before a landing that is too steep, or one further from it.
+
+    If the aircraft is not known well enough, suggest a flight that measures its descent.
+    """
+    if finding.check == UNKNOWN_AIRCRAFT:
+        return ((Change("no throttle", finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),),)
+    ground = requirements.setup.route.landing_ground
+    if finding.ok is not False or not finding.place.index or ground is None:
+        return ()
+    leg = finding.place.index - 1
+    altitude, length = float(requirements.points[leg, 2]), float(requirements.runs[leg])
+    limit = ground_slope_limit(requirements, leg, (altitude, ground), is_climb=False, is_landing=True)
+    max_slope = min(limit.limit, max(limit.certain, LEVEL_SLOPE_RAD)) - SUGGESTION_ANGLE_MARGIN_RAD
+    if max_slope <= 0.0:
+        return ()
+    height = altitude - ground
+    step = float(math.ceil(height - length * math.tan(max_slope)))
+    longer_length = float(math.ceil(height / math.tan(max_slope)))
+    lower, further = (
+        Change("descent", requirements.waypoint(leg), None, step, "m"),
+        Change("length", requirements.leg(leg), length, longer_length, "m"),
+    )
+    return _smallest_first(
+        [(step / height, (lower,)), (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,))]
+    )
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
@@ -512,9 +543,13 @@ def suggest_staying_inside(
 def suggest_using_less_energy(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a shorter flight, or a battery or tank with more energy."""
+    """Suggest a shorter flight, or a battery or tank with more energy.
+
+    Neither moves a battery failsafe that leaves the mission, and the trial of a shorter flight has a larger battery.
+    """
     energy = finding.planned if finding.flown is None else finding.flown
-    if energy is None or finding.limit is None or finding.margin is None:
+    is_failsafe = finding.limit_source == "autopilot"
+    if energy is None or finding.limit is None or finding.margin is None or (is_failsafe and finding.ok is False):
         return ()
     if finding.planned is not None and finding.flown is not None and finding.flown >= requirements.setup.battery:
         # The flight ended with an empty battery or tank; only the prediction covers the whole mission.
@@ -528,7 +563,10 @@ def suggest_using_less_energy(
     storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
     larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
-    return (shorter_flight,), (larger_storage,)
+    # Shortened by 100 %, nothing would be left of the flight.
+    changes = [shorter_flight] if shorter_flight.wanted < 100.0 else []
+    changes += [larger_storage] if not is_failsafe else []
+    return tuple((change,) for change in changes)
 
 
 def suggest_flying_faster(

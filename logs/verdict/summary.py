@@ -98,6 +98,7 @@ _PLACED_SUBJECTS = {
     "speed": ("airspeed", "on", "leg"),
     "turn": ("turn", "at", "waypoint"),
     "loiter": ("loiter", "at", "waypoint"),
+    "landing": ("landing", "at", "waypoint"),
 }
 
 
@@ -205,7 +206,11 @@ def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, referen
 
 
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
-    """Select at most four failed findings: the worst of each rule before the second worst of any rule."""
+    """Select at most four failed findings: the worst of each rule before the second worst of any rule.
+
+    Of one rule, those within their limit come last: they may fail only because of the others, as the arc at a steep
+    leg's end does.
+    """
     margins = [0.0 if finding.margin is None else finding.margin for finding in failed]
     indices_by_margin = sorted(range(len(failed)), key=margins.__getitem__)
     counts: dict[str, int] = {}
@@ -213,7 +218,8 @@ def _headline_findings(failed: list[Finding]) -> list[Finding]:
     for k in indices_by_margin:
         rank_in_rule[k] = counts[failed[k].rule] = counts.get(failed[k].rule, 0) + 1
     chosen_indices = sorted(range(len(failed)), key=lambda k: (rank_in_rule[k], k))[:_MAX_NAMED_FINDINGS]
-    return [failed[k] for k in sorted(chosen_indices)]
+    rules = [finding.rule for finding in failed]
+    return [failed[k] for k in sorted(chosen_indices, key=lambda k: (rules.index(rules[k]), margins[k] >= 0.0, k))]
 
 
 def _headline_phrase(finding: Finding) -> str:

@@ -10,6 +10,8 @@ from world.wording import count_text as count_text
 
 # Text of a unit after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "dB": " dB", "legs": " legs", "%": " %"}
+# Rules that judge a flight where another rule judges the route.
+FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 # Greatest length of a statement in a headline, characters.
 _MAX_STATEMENT_LENGTH = 80
 
@@ -72,6 +74,8 @@ def change_text(change: Change) -> str:
     'lower both ends of leg 3 by 12 m'
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
     'lower both ends of leg 3, to item 5, by 12 m'
+    >>> change_text(Change("descent", Place("waypoint", 4, item=5), None, 12.0, "m"))
+    'lower waypoint 4 (item 5) by 12 m'
     >>> change_text(Change("radius", Place("waypoint", 4, item=5), 80.0, 94.0, "m"))
     'set the radius of item 5 to 94 m instead of 80 m'
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
@@ -95,6 +99,8 @@ def change_text(change: Change) -> str:
             if change.place.kind == "leg":
                 verb = "raise" if change.what == "height" else "lower"
                 return f"{verb} both ends of {place_name} by {requested_value:.0f} m"
+            if change.place.kind == "waypoint":
+                return f"lower {place_text(change.place)} by {requested_value:.0f} m"
             return (
                 f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
             )
@@ -270,12 +276,16 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
+    >>> disagreement_text(Disagreement("landing", Place("waypoint", 2), "geometry", there=False, here=True))
+    'landing at waypoint 2 fails by geometry, and touchdown, by which a flight judges it, passes in flight'
     """
     verbs = {True: "passes", False: "fails"}
     rule_and_place = f"{disagreement.rule} at {place_text_within(disagreement.place)}"
+    counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
+    conjunction = f", and {counterpart}, by which a flight judges it," if counterpart else " and"
     return (
         f"{rule_and_place} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
-        f" and {verbs[disagreement.here]} in flight"
+        f"{conjunction} {verbs[disagreement.here]} in flight"
     )
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -48,7 +48,7 @@ _MIN_FLIGHTS_EACH = 3
 _MAX_FLIGHTS_EACH = 6
 # Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
 _CHECK_GROWTH_RATIO = 1.04
-# Minimum number of flights in calm air that must all fail for a search to end without a flight in wind.
+# Minimum number of flights in calm air, none of which may be flyable, for a search to end without a flight in wind.
 _MIN_CALM_FLIGHTS = 3
 # Dispersed quantities that the wind of the search replaces.
 SEARCHED_QUANTITIES = ("wind_speed", "wind_from")
@@ -90,13 +90,15 @@ def flight_limit(requested: int | None, folder: Path, *, resume: bool) -> int:
 
 # Boundary below which a mission is not flyable with the target probability even in calm air, m/s; printed as 0.0.
 CALM_MPS = 0.05
+# Maximum wind whose flights show what happens in calm air, m/s: no boundary is known more accurately.
+NEARLY_CALM_MPS = 2.0 * BOUNDARY_ACCURACY_MPS
 
 
 @dataclass(frozen=True)
 class CalmFailures:
-    """Failures in the weakest wind flown, for directions in which the mission fails even in calm air.
+    """Failures in calm or nearly calm air, for directions in which the mission fails even there.
 
-    speed: speed of this wind, m/s.
+    speed: speed of the weakest wind flown, m/s, at most `NEARLY_CALM_MPS`.
     flights: number of flights in this wind.
     failed_count: number of failed flights among them.
     by_rule: failures by rule and place; empty if no flight failed or could be flown.
@@ -118,6 +120,8 @@ class WindsResult:
     calm: failures in calm air if the mission is not flyable in calm air with the target probability; None otherwise.
     failures: for each direction, the failures, by rule and place, of its flights in winds up to the upper bound of its
         boundary; () if no wind was searched.
+    undecided: index of each flight that is not judged in full, and its rules and reasons; it is neither flyable nor
+        a failure.
     """
 
     goal: WindsGoal
@@ -127,6 +131,7 @@ class WindsResult:
     conditions: Conditions | None = None
     calm: CalmFailures | None = None
     failures: tuple[tuple[RuleFailures, ...], ...] = ()
+    undecided: tuple[tuple[int, str], ...] = ()
 
     def from_deg(self, direction: int) -> float:
         """Return the direction from which the wind blows, degrees.  direction: index of the direction."""
@@ -135,6 +140,11 @@ class WindsResult:
     def flight_counts(self) -> list[int]:
         """Return the number of flights of each direction."""
         counts = Counter(direction for direction, _, _ in self.flights)
+        return [counts[direction] for direction in range(len(self.boundaries))]
+
+    def undecided_counts(self) -> list[int]:
+        """Return the number of flights of each direction that are not judged in full."""
+        counts = Counter(self.flights[number][0] for number, _ in self.undecided)
         return [counts[direction] for direction in range(len(self.boundaries))]
 
     def __repr__(self) -> str:
@@ -176,7 +186,8 @@ def find_winds(
 ) -> WindsResult:
     """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
 
-    A search starts with a few flights in calm air. If all of them fail, no wind is searched, and the table stays empty.
+    A search starts with a few flights in calm air. If none of them is flyable, no wind is searched, and the table
+    stays empty.
     Flights in the table are not flown again. The winds of a round depend only on the earlier rounds, so the result is
     the same for any number of workers and interruptions. Flights completed before an error or Ctrl-C stay in the
     table.
@@ -193,9 +204,9 @@ def find_winds(
                     # Report before the workers start, because the start takes seconds.
                     progress.report_start(len(stored_flights.flown))
                     pool = stack.enter_context(worker_pool(workers, base, fly))
-                    calm_failures = None if stored_flights.flown else _fly_in_calm_air(pool, goal)
-                    if calm_failures is not None:
-                        return search.result_in_calm_air(calm_failures)
+                    calm_rows = [] if stored_flights.flown else _fly_in_calm_air(pool, goal)
+                    if calm_rows:
+                        return search.result_in_calm_air(calm_rows)
                 _fly_round(pool, search, missing_requests, stored_flights, progress)
             for request in requests:
                 search.add_result(request, stored_flights.flown[request.number])
@@ -220,6 +231,8 @@ class _Search:
         self._next_check = [MIN_FLIGHTS_PER_DIRECTION] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
+        # Flights that are not judged in full, with rules and reasons.
+        self.undecided: list[tuple[int, str]] = []
         # Failed rules and places of each flight.
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
@@ -255,7 +268,9 @@ class _Search:
             margins = None
         self.directions[request.direction].add(request.speed, request.draw, failed_keys, margins)
         self.flown.append((request.direction, request.speed, is_flyable))
-        self._failed.append(flight.failed)
+        self._failed.append(() if flight.undecided else flight.failed)
+        if flight.undecided:
+            self.undecided.append((request.number, flight.undecided))
         if flight.outcome == "lost":
             self.lost.append(request.number)
 
@@ -277,13 +292,23 @@ class _Search:
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         calm_failures, failures = self._calm_failures(boundaries), self._failures_by_direction(boundaries)
         return WindsResult(
-            self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures, failures
+            self.goal,
+            boundaries,
+            tuple(self.flown),
+            tuple(self.lost),
+            conditions,
+            calm_failures,
+            failures,
+            tuple(self.undecided),
         )
 
-    def result_in_calm_air(self, calm: CalmFailures) -> WindsResult:
-        """Return the result of a search that ends after its flights in calm air."""
+    def result_in_calm_air(self, rows: Sequence[FlightRow]) -> WindsResult:
+        """Return the result of a search that ends after its flights in calm air.  rows: these flights."""
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
-        self.flown = [(0, 0.0, False)] * calm.flights
+        self.flown = [(0, 0.0, False)] * len(rows)
+        self.undecided = [(number, row.undecided_text) for number, row in enumerate(rows) if row.undecided_text]
+        failed = [row.failed for row in rows if not row.undecided_text]
+        calm = CalmFailures(0.0, len(rows), len(failed), count_failures(failed))
         return replace(self.result(), boundaries=boundaries, calm=calm, failures=())
 
     def _failures_by_direction(self, boundaries: tuple[WindBoundary, ...]) -> tuple[tuple[RuleFailures, ...], ...]:
@@ -306,29 +331,34 @@ class _Search:
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest wind flown, over the directions whose boundary is calm air.
 
-        Returns None if there is no such direction.
+        Returns None if there is no such direction, or if the weakest wind of these directions is not nearly calm.
         """
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [
-            (number, flight) for number, flight in enumerate(self.flown) if flight[0] in calm_directions
+            (number, speed)
+            for number, (direction, speed, _) in enumerate(self.flown)
+            if direction in calm_directions and speed <= NEARLY_CALM_MPS
         ]
         if not numbered_flights:
             return None
-        min_speed = min(speed for _, (_, speed, _) in numbered_flights)
-        numbers = [number for number, (_, speed, _) in numbered_flights if speed == min_speed]
-        failed_findings = [self._failed[number] for number in numbers if not self.flown[number][2]]
+        min_speed = min(speed for _, speed in numbered_flights)
+        numbers = [number for number, speed in numbered_flights if speed == min_speed]
+        undecided_numbers = {number for number, _ in self.undecided}
+        failed_findings = [
+            self._failed[number] for number in numbers if not self.flown[number][2] and number not in undecided_numbers
+        ]
         return CalmFailures(min_speed, len(numbers), len(failed_findings), count_failures(failed_findings))
 
 
-def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | None:
-    """Fly the first draws in calm air; return their failures if all of them fail, otherwise None.
+def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
+    """Fly the first draws in calm air; return the flights if none of them is flyable, otherwise [].
 
     The number of flights is chosen so that, if the mission had the target probability, all of them would fail with a
     probability of at most 1 minus the confidence.
     """
     count = max(_MIN_CALM_FLIGHTS, math.ceil(math.log(1.0 - goal.confidence) / math.log(1.0 - goal.target)))
     if count > goal.flights:
-        return None
+        return []
     draws, rows = iter(range(count)), dict[int, FlightRow]()
 
     def next_request() -> FlightRequest | None:
@@ -339,8 +369,8 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | None:
     for request, row in pool.fly(next_request):
         rows[request.index] = row
     if any(row.outcome != "not flyable" for row in rows.values()):
-        return None
-    return CalmFailures(0.0, count, count, count_failures([rows[draw].failed for draw in range(count)]))
+        return []
+    return [rows[draw] for draw in range(count)]
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:
@@ -375,7 +405,7 @@ class _StoredFlights:
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
         """Write a flight to the table."""
         self._store.add(request, row)
-        self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.marginal_passes)
+        self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.marginal_passes, row.undecided_text)
 
 
 def _fly_round(

@@ -17,7 +17,7 @@ import numpy as np
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, closest_to_limit, undecided_findings
+from logs.verdict.findings import APART_FROM_FLIGHT, Finding, closest_to_limit, undecided_findings
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
@@ -215,7 +215,7 @@ class FlightRow:
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
     marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
-    undecided: True if the flight is not judged in full; the tables do not store it.
+    undecided: True if the flight is not judged in full; the table of a campaign does not store it.
     unjudged: rules that are not judged in a flight without failures, with places and reason as in the verdict's
     summary; the tables do not store them.
     """
@@ -242,6 +242,14 @@ class FlightRow:
         """Minimum of all scaled margins, by which flights are sorted; inf if no margin is known."""
         fractions = (fraction for rule, margin in self.margins if (fraction := scale_margin(rule, margin)) is not None)
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
+
+    @property
+    def undecided_text(self) -> str:
+        """Rules that leave a flight undecided, with their reasons; "" if it counts as flyable or as failed."""
+        if self.outcome == "flyable" or not self.undecided:
+            return ""
+        rules = {rule for rule, _ in self.failed}
+        return "; ".join(text for rule, text in self.unjudged if rule in rules)
 
 
 def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
@@ -315,13 +323,17 @@ def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
     """Return the rule and the place of each failed finding.
 
-    If a flight that does not count as flyable has no failed finding, these are its undecided findings, or else the rule
-    `completion`.
+    If a flight that does not count as flyable has no failed finding, these are the undecided findings for which it does
+    not count, or else the rule `completion`.
     """
     failed_findings = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     if failed_findings or verdict.flies:
         return failed_findings
-    undecided = tuple((finding.rule, finding.place) for finding in undecided_findings(verdict.findings))
+    undecided = tuple(
+        (finding.rule, finding.place)
+        for finding in undecided_findings(verdict.findings)
+        if finding.check not in APART_FROM_FLIGHT
+    )
     return undecided or (("completion", Place("flight")),)
 
 

@@ -473,16 +473,18 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _is_only_calm(winds: WindsResult) -> bool:
-    """Return True if all flights were in calm air and failed, so that no wind was searched."""
+    """Return True if all flights were in calm air and none was flyable, so that no wind was searched."""
     return winds.calm is not None and winds.calm.flights == len(winds.flights)
 
 
 def _fails_in_calm_air(winds: WindsResult) -> bool:
     """Return True if the flights in calm air show that the mission misses the target probability there."""
-    if _is_only_calm(winds):
-        return True
     calm = winds.calm
-    return calm is not None and wilson(calm.flights - calm.failed_count, calm.flights).high < winds.goal.target
+    if calm is None:
+        return False
+    if _is_only_calm(winds) and calm.failed_count == calm.flights:
+        return True
+    return wilson(calm.flights - calm.failed_count, calm.flights).high < winds.goal.target
 
 
 def unsettled_reasons(winds: WindsResult) -> list[str]:
@@ -490,12 +492,14 @@ def unsettled_reasons(winds: WindsResult) -> list[str]:
 
     A direction whose boundary is calm air is judged if the flights there show it.
     """
-    fails_in_calm_air, counts = _fails_in_calm_air(winds), winds.flight_counts()
-    max_width = 2.0 * BOUNDARY_ACCURACY_MPS
+    fails_in_calm_air, max_width = _fails_in_calm_air(winds), 2.0 * BOUNDARY_ACCURACY_MPS
+    counts = zip(winds.flight_counts(), winds.undecided_counts(), strict=True)
     reasons = []
-    for boundary, count in zip(winds.boundaries, counts, strict=True):
+    for boundary, (count, undecided_count) in zip(winds.boundaries, counts, strict=True):
         is_calm = fails_in_calm_air and boundary.estimate < CALM_MPS
-        if is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
+        if undecided_count and not is_calm:
+            reasons.append(f"{undecided_count} of {count_text(count, 'flight')} not judged in full")
+        elif is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
             reasons.append("")
         elif count < MIN_FLIGHTS_PER_DIRECTION:
             reasons.append(f"{count_text(count, 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
@@ -507,11 +511,13 @@ def unsettled_reasons(winds: WindsResult) -> list[str]:
 def _estimated_directions(winds: WindsResult) -> list[bool]:
     """Return True for each direction whose boundary is stated: it is judged, or only its interval is too wide.
 
-    With fewer flights the boundary and its interval depend mostly on assumptions.
+    With fewer flights the boundary and its interval depend mostly on assumptions, and flights that are not judged in
+    full may be on either side of it.
     """
+    counts = zip(winds.flight_counts(), winds.undecided_counts(), strict=True)
     return [
-        not reason or count >= MIN_FLIGHTS_PER_DIRECTION
-        for reason, count in zip(unsettled_reasons(winds), winds.flight_counts(), strict=True)
+        not reason or (count >= MIN_FLIGHTS_PER_DIRECTION and not undecided_count)
+        for reason, (count, undecided_count) in zip(unsettled_reasons(winds), counts, strict=True)
     ]
 
 
@@ -531,19 +537,28 @@ def winds_answer(winds: WindsResult) -> WindsAnswer:
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return a line that the search or some of its directions are not judged, and why; [] if all are judged."""
+    """Return lines that the search or some of its directions are not judged, and why; [] if all are judged."""
     reasons = unsettled_reasons(winds)
-    counts = [count for count, reason in zip(winds.flight_counts(), reasons, strict=True) if reason]
-    if not counts:
-        return []
-    unsettled_count, total = len(counts), len(reasons)
-    word = "not judged" if unsettled_count == total else "not judged in full"
+    word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
+    lines = []
+    if winds.undecided and any(reasons):
+        _, first_text = winds.undecided[0]
+        lines.append(
+            f"{word}: {len(winds.undecided)} of {count_text(len(winds.flights), 'flight')} are not judged in full, the"
+            f" first of them because of {first_text}"
+        )
+    all_counts = zip(winds.flight_counts(), winds.undecided_counts(), reasons, strict=True)
+    counts = [count for count, undecided_count, reason in all_counts if reason and not undecided_count]
+    if not counts or _is_only_calm(winds):
+        return lines
+    unsettled_count = len(counts)
     directions_text = f"{count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'}"
     flights_text, max_width = count_range_text(counts, "flight"), 2.0 * BOUNDARY_ACCURACY_MPS
     return [
+        *lines,
         f"{word}: {unsettled_count} of {directions_text} too few flights ({flights_text}): each requires at least"
         f" {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most {max_width:g} m/s; with fewer flights, the interval"
-        " depends mostly on assumptions"
+        " depends mostly on assumptions",
     ]
 
 
@@ -604,13 +619,28 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
 def _calm_lines(winds: WindsResult) -> list[str]:
     """Return lines about the rules that fail in calm air; empty if the mission flies in calm air."""
     calm = winds.calm
-    if calm is None:
+    if calm is None or not calm.failed_count:
         return []
     wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
     return [
         f"in {wind}, {calm.failed_count} of {count_text(calm.flights, 'flight')} fail",
         *failure_lines(calm.by_rule),
     ]
+
+
+def _failing_lines(winds: WindsResult) -> list[str]:
+    """Return a line for each direction from which every flight fails, and whose boundary is not judged."""
+    lines = []
+    for direction, undecided_count in zip(chart_directions(winds), winds.undecided_counts(), strict=True):
+        has_passed = any(flyable for _, _, flyable in direction.flights)
+        if direction.is_judged or undecided_count or has_passed or not direction.flights:
+            continue
+        speed, count, _ = direction.flights[0]
+        lines.append(
+            f"{direction.from_deg:g}°: fails in {speed:.1f} m/s, the weakest wind flown ({count} of"
+            f" {count_text(count, 'flight')}); the boundary is below {speed:.1f} m/s, not judged"
+        )
+    return lines
 
 
 def _boundary_lines(winds: WindsResult) -> list[str]:
@@ -650,12 +680,13 @@ def wind_lines(winds: WindsResult) -> list[str]:
         answer_lines.reverse()
     flights_text = count_text(len(winds.flights), "flight")
     if _is_only_calm(winds):
-        flights_text += "; no wind was tried, because every flight in calm air fails"
+        flights_text += "; no wind was tried, because no flight in calm air is flyable"
     elif any(_estimated_directions(winds)):
         flights_text += f"; intervals at {percent}, from the flights in each direction"
     return [
         *answer_lines,
         *_calm_lines(winds),
+        *_failing_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
         *_deciding_lines(winds),
         *_lines_without_failures(winds),

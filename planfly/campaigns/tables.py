@@ -525,6 +525,7 @@ WINDS_KIND = TableKind(
         "asked_speed": "REAL NOT NULL",
         "draw": "INTEGER NOT NULL",
         "narrow": "TEXT NOT NULL",
+        "undecided": "TEXT NOT NULL",
         **ROW_COLUMNS,
     },
     FIXED_SETTINGS,
@@ -549,11 +550,15 @@ class RequestedFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownFlight:
-    """Outcome of a flight, the rule and place of each failed finding, and the marginal passes."""
+    """Outcome of a flight, the rule and place of each failed finding, and the marginal passes.
+
+    undecided: rules that leave the flight undecided, with their reasons; "" for other flights.
+    """
 
     outcome: Outcome
     failed: tuple[tuple[str, Place], ...]
     marginal_passes: tuple[MarginalPass, ...] = ()
+    undecided: str = ""
 
 
 class WindsStore(LockedTable):
@@ -576,20 +581,22 @@ class WindsStore(LockedTable):
             "narrow": json.dumps(
                 [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.marginal_passes]
             ),
+            "undecided": row.undecided_text,
         }
         self.insert({**request_values, **row_values(replace(row, made_of=self.made_of))})
 
     def stored_flights(self) -> dict[int, tuple[RequestedFlight, FlownFlight]]:
         """Return the request and the outcome of each flight, keyed by number."""
         rows = self._connection.execute(
-            "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow FROM flights ORDER BY flight"
+            "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow, undecided FROM flights"
+            " ORDER BY flight"
         )
         return {
             number: (
                 RequestedFlight(number, *request),
-                FlownFlight(outcome, parse_failed_findings(failed_text), parse_marginal_passes(passes_text)),
+                FlownFlight(outcome, parse_failed_findings(failed_text), parse_marginal_passes(passes_text), undecided),
             )
-            for number, *request, outcome, failed_text, passes_text in rows
+            for number, *request, outcome, failed_text, passes_text, undecided in rows
         }
 
 

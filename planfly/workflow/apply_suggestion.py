@@ -168,16 +168,22 @@ class _EditedMission:
         offset = np.zeros(3) if index is None else self.offsets.get(index, np.zeros(3))
         return np.asarray(self.route.positions[waypoint] + offset)
 
-    def move_items(self, waypoints: Sequence[int], offset: Floats) -> None:
+    def is_landing(self, waypoint: int) -> bool:
+        """Return True if the item of a waypoint is a landing."""
+        index = self.item_index(waypoint)
+        return index is not None and self.mission.items[index].command in LANDINGS
+
+    def move_items(self, waypoints: Sequence[int], offset: Floats, *, along_approach: bool = False) -> None:
         """Move the items of waypoints, except landings, each item once.
 
         offset: east, north and up, m.
+        along_approach: True for a move along the final approach, which a landing sequence allows.
         Raises MissionError for a move to a side of an item of a landing sequence.
         """
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
-            if offset[:2].any() and index in self.approach_indices:
+            if offset[:2].any() and index in self.approach_indices and not along_approach:
                 raise MissionError(
                     f"{self.mission.source}: this suggestion moves item {self.mission.items[index].seq} of the landing"
                     " sequence to a side: change it by hand",
@@ -216,7 +222,7 @@ def _changed_leg(change: Change, route: Route) -> int:
 
 
 def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Lengthen a leg by moving only its end along the leg's course."""
+    """Lengthen a leg by moving only its end along the leg's course, or the start of a leg that ends with a landing."""
     leg = _changed_leg(change, edited.route)
     start, end = edited.current_position(leg), edited.current_position(leg + 1)
     step = end[:2] - start[:2]
@@ -224,8 +230,11 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
     if length < MIN_LEG_LENGTH_M:
         course = float(leg_courses(edited.waypoint_positions())[leg])
         step, length = np.array([math.sin(course), math.cos(course)]), 1.0
-    target = start[:2] + change.wanted / length * step
-    edited.move_items([leg + 1], np.array([*(target - end[:2]), 0.0]))
+    offset = (change.wanted / length - 1.0) * step
+    if edited.is_landing(leg + 1):
+        edited.move_items([leg], np.array([*-offset, 0.0]), along_approach=True)
+    else:
+        edited.move_items([leg + 1], np.array([*offset, 0.0]))
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
@@ -278,17 +287,18 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
 
 
 def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Raise or lower a leg, or the legs that violate a zone, by a step.
+    """Raise or lower a waypoint, a leg, or the legs that violate a zone, by a step.
 
     A waypoint between two legs moves by the larger of their steps.
     """
     sign = 1.0 if change.what == "height" else -1.0
-    legs = (
-        [_changed_leg(change, edited.route)]
-        if change.place.kind == "leg"
-        else violated_legs(edited.requirements, finding)
-    )
-    for waypoint in sorted({end for leg in legs for end in (leg, leg + 1)}):
+    if change.place.kind == "waypoint" and change.place.index is not None:
+        waypoints = {change.place.index}
+    else:
+        is_leg = change.place.kind == "leg"
+        legs = [_changed_leg(change, edited.route)] if is_leg else violated_legs(edited.requirements, finding)
+        waypoints = {end for leg in legs for end in (leg, leg + 1)}
+    for waypoint in sorted(waypoints):
         previous_step = sign * float(edited.current_position(waypoint)[2] - edited.route.positions[waypoint, 2])
         if change.wanted > previous_step:
             edited.move_items([waypoint], np.array([0.0, 0.0, sign * (change.wanted - previous_step)]))

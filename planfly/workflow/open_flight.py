@@ -1,5 +1,6 @@
 """Make the `FlightSetup` of a plan or a mission file with the options of its flight."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -7,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from flight.autopilots.autopilot import Autopilot
-from flight.autopilots.parts import MissionDialect, RtlSettings, SpeedLimits
+from flight.autopilots.parts import BatteryFailsafe, MissionDialect, RtlSettings, SpeedLimits
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
@@ -31,6 +32,9 @@ from world.scenario import Scenario, with_ground_at
 
 # Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
+# Fraction of the battery's charge by which the capacity that an autopilot counts from may differ without a note.
+MAX_CAPACITY_DIFFERENCE = 0.2
+_MAH_PER_AH = 1000.0
 
 
 def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
@@ -220,6 +224,9 @@ def make_setup(
     notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
     notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
     notes += _item_count_notes(mission, autopilot.checks.dialect)
+    envelope, stated_battery = limits.envelope, scenario.flight.battery_wh
+    if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
+        notes += _capacity_notes(autopilot.checks.battery_failsafes, airframe.battery, envelope.volts)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
@@ -279,6 +286,28 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
         return autopilot
     values = autopilot.returns.parameters_of(RtlSettings(lands=True))
     return autopilot.with_parameters("assumed", **values) if values else autopilot
+
+
+def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts: float) -> tuple[str, ...]:
+    """Return a note on each failsafe that counts from a capacity unlike that of the aircraft's battery.
+
+    Such a failsafe acts too early or too late.  A monitor that shares the load with others has its own battery.
+
+    battery: energy of the battery, Wh.  volts: its voltage, V.
+
+    >>> import math
+    >>> early = BatteryFailsafe("BATT_LOW_MAH", 800.0, 1200.0, False, math.nan, "BATT_CAPACITY", 2000.0)
+    >>> _capacity_notes([early], 59.2, 14.8)[0].partition("; ")[2]
+    'BATT_LOW_MAH 800 leaves the mission with 2800 mAh left'
+    """
+    charge = _MAH_PER_AH * battery / volts
+    return tuple(
+        f"{failsafe.capacity_parameter} {failsafe.capacity:g} mAh, but the aircraft's battery has {charge:.0f} mAh"
+        f" ({battery:g} Wh at {volts:g} V); {failsafe.parameter} {failsafe.threshold:g} leaves the mission with"
+        f" {max(0.0, charge - failsafe.used_charge):.0f} mAh left"
+        for failsafe in failsafes
+        if not failsafe.shares_charge and abs(failsafe.capacity - charge) > MAX_CAPACITY_DIFFERENCE * charge
+    )
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:

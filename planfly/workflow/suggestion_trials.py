@@ -41,6 +41,8 @@ MAX_TRIED_LEGS = 5000
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
+# Horizontal move of an item that is suggested only if nothing else passes, m.
+FAR_MOVE_DISTANCE_M = 1000.0
 # Greatest share of a leg's height error that may remain with a suggestion for its slope.
 MAX_HEIGHT_ERROR_SHARE = 0.5
 # Factor on the part that a step still lacks.
@@ -167,14 +169,27 @@ class PassedTrial:
 
 
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
-    """Return the suggestions that passed, grouped by finding."""
+    """Return the suggestions that passed, grouped by finding, without far moves if another suggestion passed."""
     trials_by_finding: dict[int, list[PassedTrial]] = {}
     for trial in passed_trials:
         trials_by_finding.setdefault(id(trial.finding), []).append(trial)
     return tuple(
-        TriedSuggestions(trials[0].finding.rule, trials[0].finding.place, tuple(trial.suggestion for trial in trials))
+        TriedSuggestions(trials[0].finding.rule, trials[0].finding.place, _without_far_moves(trials))
         for trials in trials_by_finding.values()
     )
+
+
+def _without_far_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
+    """Return the suggestions of the trials, without those that move an item very far if there are others."""
+    suggestions = tuple(trial.suggestion for trial in trials)
+    near = tuple(
+        suggestion
+        for suggestion in suggestions
+        if all(
+            math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for change in suggestion for move in change.moves
+        )
+    )
+    return near or suggestions
 
 
 def judge_mission_geometry(setup: FlightSetup) -> Verdict:

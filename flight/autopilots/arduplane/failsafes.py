@@ -168,8 +168,10 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
             if _BATTERY_FAILSAFE.get(int(action), "on") == "on":
                 continue
             if charge > 0.0 and measures_current(parameters, monitor):
-                used_charge = parameters[f"{monitor}_CAPACITY"] - charge
-                found.append(BatteryFailsafe(f"{monitor}_{level}_MAH", charge, used_charge, len(monitors) > 1))
+                capacity_name = f"{monitor}_CAPACITY"
+                capacity = parameters[capacity_name]
+                failsafe = BatteryFailsafe(f"{monitor}_{level}_MAH", charge, capacity - charge, len(monitors) > 1)
+                found.append(failsafe._replace(capacity_parameter=capacity_name, capacity=capacity))
             if voltage > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0:
                 found.append(BatteryFailsafe(f"{monitor}_{level}_VOLT", voltage))
     return tuple(found)

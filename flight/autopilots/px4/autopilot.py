@@ -340,7 +340,8 @@ class Px4(Autopilot):
         name = max("BAT_CRIT_THR", "BAT_EMERGEN_THR", key=lambda threshold_name: parameters[threshold_name])
         threshold, capacity = parameters[name], parameters["BAT1_CAPACITY"]
         if capacity > 0.0:
-            return (BatteryFailsafe(name, threshold, (1.0 - threshold) * capacity),)
+            failsafe = BatteryFailsafe(name, threshold, (1.0 - threshold) * capacity)
+            return (failsafe._replace(capacity_parameter="BAT1_CAPACITY", capacity=capacity),)
         # Without a capacity the charge is estimated from the voltage.
         return (BatteryFailsafe(name, threshold, remaining_fraction=threshold),)
 

@@ -25,5 +25,5 @@ def bank_limit_text(setup: FlightSetup) -> str:
     if (stated_bank := setup.scenario.flight.max_bank_deg) is not None:
         limits.append(("the scenario's", math.radians(stated_bank)))
     owner = next((owner for owner, limit in limits if abs(limit - setup.max_bank) <= _SAME_BANK_RAD), "a")
-    guess_text = " (a guess)" if setup.envelope.bank_guessed and owner == limits[0][0] else ""
+    guess_text = " (a guess: state --bank)" if setup.envelope.bank_guessed and owner == limits[0][0] else ""
     return f"{owner} bank limit of {math.degrees(setup.max_bank):.0f}°{guess_text}"

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -685,6 +686,49 @@ def slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool | N
     if scenario_limit is not None and scenario_limit <= aircraft_limit:
         return scenario_limit, "scenario"
     return aircraft_limit, "aircraft" if math.isfinite(aircraft_limit) else "none"
+
+
+class GroundSlopeLimit(NamedTuple):
+    """Limit on the slope between the ground and a waypoint.
+
+    limit: rad, positive.
+    certain: the certain part of the limit if the aircraft's model is uncertain, rad.
+    source: "scenario" or "aircraft".
+    airspeed: true airspeed for which it holds, m/s.
+    """
+
+    limit: float
+    certain: float
+    source: str
+    airspeed: float
+
+
+def ground_slope_limit(
+    requirements: RouteRequirements, leg: int, altitudes: tuple[float, float], *, is_climb: bool, is_landing: bool
+) -> GroundSlopeLimit:
+    """Return the limit on a climb from the ground or a descent to it, on a leg's course, the tighter of both ends.
+
+    The airspeed of a landing is the autopilot's on the glide: ArduPlane flies it from the leg's start on, as soon as
+    it is lined up (AP_Landing_Slope.cpp, `type_slope_verify_land` and `type_slope_get_target_airspeed_cm`), but here no
+    slower than level flight.  Any other airspeed is the leg's.
+
+    altitudes: altitudes of both ends, m AMSL.
+    """
+    limits, course = requirements.limits, float(requirements.courses[leg])
+    airspeed, side = float(requirements.route.leg_airspeeds[leg]), 0 if is_climb else 1
+    if is_landing:
+        ground = min(altitudes)
+        tail_wind = limits.wind.components_on_course(course, ground)[0]
+        glide_airspeed = requirements.setup.autopilot.ground.airspeed(airspeed, tail_wind, ground)
+        airspeed = max(glide_airspeed, min(airspeed, limits.envelope.level_speeds(ground)[0]))
+    able, certain = (
+        min(limit_set.slopes(course, altitude, airspeed)[side] for altitude in altitudes)
+        for limit_set in (limits, limits.with_margin())
+    )
+    scenario_limit = (limits.max_climb, limits.max_dive)[side]
+    if scenario_limit is not None and scenario_limit < able:
+        return GroundSlopeLimit(scenario_limit, min(certain, scenario_limit), "scenario", airspeed)
+    return GroundSlopeLimit(able, certain, "aircraft", airspeed)
 
 
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:

@@ -48,19 +48,19 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    A mission with an endless jump fails.  A guessed battery is not judged.  If the power of the aircraft's model is
-    uncertain, an energy that may exceed the limit is undecided, except in an imported log, which has measured energy.
+    The energy at which a battery failsafe leaves the mission is the limit if it is smaller.  An endless jump fails, and
+    a guessed battery is not judged.  If the power of the aircraft's model is uncertain, an energy that may exceed the
+    limit is undecided, except in an imported log, which has measured energy.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
-    limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
+    limit, source, failsafe_text = _energy_limit(requirements)
     planned_energy, peak_current = predicted_energy(requirements)
     is_guessed = envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
-    jump_faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0)
-    faults = [*jump_faults, *failsafes.faults]
+    faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0) + failsafes.faults
     # A flight that ends with an empty battery does not show the energy that it needs; the prediction does.
     is_empty = not geometric and not is_measured and energy >= setup.battery
     needed_energy = float(np.fmax(energy, planned_energy)) if is_empty else energy
@@ -79,10 +79,10 @@ def energy_findings(
             reason += " by prediction" if geometric else f"; {planned_energy:.1f} Wh by prediction"
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
-        elif energy > limit:
+        elif energy > limit and not failsafe_text:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
         reason += "" if is_guessed or max_energy <= needed_energy else _max_energy_text(max_energy, envelope.source)
-        reason += failsafes.unjudged_text
+        reason += failsafes.unjudged_text if failsafes.faults else f"{failsafe_text}{failsafes.unjudged_text}"
     undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []
     is_open = is_guessed or is_uncertain or bool(undecided_faults) or math.isnan(energy)
     return [
@@ -95,7 +95,7 @@ def energy_findings(
             planned=planned_energy,
             flown=None if geometric else energy,
             limit=limit,
-            source="aircraft" if setup.scenario.flight.battery_wh is None else "scenario",
+            source=source,
             tolerance=0.0,
             margin=math.nan if is_guessed else limit - energy,
             unit="Wh",
@@ -103,6 +103,29 @@ def energy_findings(
             method="power of steady flight on each leg times its duration" if geometric else "power times duration",
         )
     ]
+
+
+def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
+    """Return the energy that a flight may use, Wh, the limit's source, and a clause on a battery failsafe.
+
+    The clause is "" if the reserve is reached before any failsafe's charge.  The share of one of several batteries in
+    the used charge is unknown, so their failsafes set no limit.
+    """
+    setup, volts = requirements.setup, requirements.setup.envelope.volts
+    limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
+    source = "aircraft" if setup.scenario.flight.battery_wh is None else "scenario"
+    failsafes = [
+        failsafe
+        for failsafe in setup.autopilot.checks.battery_failsafes
+        if setup.source is None and not failsafe.shares_charge and failsafe.used_charge / _MAH_PER_AH * volts < limit
+    ]
+    if not failsafes:
+        return limit, source, ""
+    first = min(failsafes, key=lambda failsafe: failsafe.used_charge)
+    charge = max(0.0, first.used_charge)
+    energy = charge / _MAH_PER_AH * volts
+    clause = f"; {first.parameter} {first.threshold:g} leaves the mission after {energy:.1f} Wh ({charge:.0f} mAh)"
+    return energy, "autopilot", clause
 
 
 def _max_energy_text(max_energy: float, source: str) -> str:

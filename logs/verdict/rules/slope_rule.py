@@ -75,23 +75,23 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
-    ground = None if faults else _steep_ground(requirements, leg, measure)
+    arc_faults = _steep_arc_faults(requirements, leg)
+    ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
     if ground is not None:
         planned_slope, limit, source = ground.slope, ground.limit, ground.source
         sign = math.copysign(1.0, planned_slope)
         faults = [_steep_ground_message(requirements, leg, ground)]
     # A fault of the plan states the planned slope itself.
-    facts = facts if faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
+    facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
         flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
         fit = measure.slope if ground is None else None
-        method = "not flown" if ground is None else "route"
-        if fit is not None:
-            method_text = "least squares" if fit.is_fitted else "least squares, short leg,"
-            method = f"{method_text} over {fit.length:.0f} m"
+        method = _fit_text(fit) if fit is not None else "not flown" if ground is None else "route"
+    # The arc at the leg's end may be steep only because the leg is.
+    faults = faults + arc_faults
     ok: bool | None = not faults
     check = ""
     uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
@@ -122,6 +122,11 @@ def _leg_finding(
     )
 
 
+def _fit_text(fit: LegFit) -> str:
+    """Return the method by which a flown slope was measured."""
+    return f"least squares{'' if fit.is_fitted else ', short leg,'} over {fit.length:.0f} m"
+
+
 def _flown_messages(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
 ) -> tuple[list[Message], list[str]]:
@@ -130,9 +135,8 @@ def _flown_messages(
     If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error on
     the leg is only reported.
     """
-    performance_faults = _performance_faults(requirements, leg, measure) + _rate_limit_faults(
-        requirements, leg, measure
-    )
+    rate_limit_faults = _rate_limit_faults(requirements, leg, measure)
+    performance_faults = [*rate_limit_faults, *_performance_faults(requirements, leg, measure)]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
     if requirements.envelope:
@@ -143,7 +147,7 @@ def _flown_messages(
 def _planned_slope_messages(
     requirements: RouteRequirements, leg: int, limit: float, source: str
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults of a leg's planned slope and of the fly-by arc at the leg's end, and facts.
+    """Return the faults of a leg's planned slope, and facts.
 
     A leg that is too steep, but only a negligible step in height, is reported as a fact.
     """
@@ -155,7 +159,7 @@ def _planned_slope_messages(
             faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
             facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
-    return faults + _steep_arc_faults(requirements, leg), facts
+    return faults, facts
 
 
 class _SteepGround(NamedTuple):
@@ -522,8 +526,8 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
     speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
-            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s",
-            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
+            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s;"
+            f" the leg needs {math.degrees(abs(planned_slope)):.1f}°"
         )
     ]
 

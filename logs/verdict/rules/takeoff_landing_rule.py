@@ -4,25 +4,28 @@ A flight begins and ends in the air, so both are judged from only the mission's 
 flown.  An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than the
 aircraft can climb is not judged, because QGroundControl draws a climb-out of 30 degrees (its TakeoffMissionItem), and
 autopilots continue to climb.  Any part of a mission's own take-off or landing that is not judged leaves the verdict
-undecided.
+undecided, and so does a slope that is close to the limit of an uncertain model of the aircraft.
 """
 
 import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
-from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
-from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, Finding, Message, make_finding, message
+from logs.verdict.measures.route_requirements import RouteRequirements, ground_slope_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
-from logs.verdict.tolerances import PLAN_TOLERANCE_RAD
+from logs.verdict.suggestions import suggest_gentler_landing
+from logs.verdict.tolerances import LEVEL_SLOPE_RAD, PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
 # Verb for a flight that begins or ends in the air, without this phase.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
 _PHASE_TITLES = {"takeoff": "take-off", "landing": "landing"}
+# Check of a slope that only the aircraft's uncertainty leaves undecided.
+_UNCERTAIN_CHECK = {"takeoff": GROUND_PATH, "landing": UNKNOWN_AIRCRAFT}
 # Result for a slope beyond the limit.
 _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 
@@ -152,34 +155,60 @@ def _slope_finding(
     if first_altitude is None or last_altitude is None:
         return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, distance)
-    limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
+    limit = ground_slope_limit(
+        requirements,
+        first,
+        (first_altitude, last_altitude),
+        is_climb=slope >= 0.0,
+        is_landing=rule == "landing",
+    )
+    limit_deg = math.degrees(limit.limit)
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
-    is_within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
-    ground_phases = requirements.setup.ground_phases
-    is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
-    reason = f"{text} (at most {math.degrees(limit):.1f}°)"
-    reason += "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
-    fault = message(
-        f"the {_PHASE_TITLES[rule]} {text}",
-        f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",
-    )
-    ok = True if is_within else _RESULT_BEYOND_LIMIT[rule]
+    ok: bool | None = True
+    check, faults = "", list[Message]()
+    if abs(slope) > limit.limit + PLAN_TOLERANCE_RAD:
+        ok = _RESULT_BEYOND_LIMIT[rule]
+        check = GROUND_PATH if ok is None else ""
+        limit_text = f"; at most {limit_deg:.1f}° can be flown at {limit.airspeed:.1f} m/s and in this wind"
+        limit_text += _flown_text(requirements, rule)
+        faults, reason = [message(f"the {_PHASE_TITLES[rule]} {text}", limit_text)], text + limit_text
+    elif limit.certain < limit.limit and abs(slope) > max(limit.certain, LEVEL_SLOPE_RAD):
+        ok, check, faults = None, _UNCERTAIN_CHECK[rule], [message(f"the {_PHASE_TITLES[rule]} {text}")]
+        reason = (
+            f"{text}; the limit according to {requirements.setup.envelope.source} is {limit_deg:.1f}° at"
+            f" {limit.airspeed:.1f} m/s, but with its uncertainty only {math.degrees(limit.certain):.1f}° is certain"
+        )
+    else:
+        reason = f"{text} (at most {limit_deg:.1f}° at {limit.airspeed:.1f} m/s){_not_flown_text(requirements, rule)}"
     return make_finding(
         rule,
         waypoint_place,
         ok=ok,
-        reason=reason if is_within else fault.text.removeprefix(f"the {_PHASE_TITLES[rule]} "),
-        faults=[] if is_within else [fault],
+        reason=reason,
+        faults=faults,
         planned=math.degrees(abs(slope)),
-        limit=math.degrees(limit),
-        source=source,
+        limit=limit_deg,
+        source=limit.source,
         tolerance=math.degrees(PLAN_TOLERANCE_RAD),
-        margin=math.degrees(limit - abs(slope)),
+        margin=math.degrees(limit.limit - abs(slope)),
         unit="deg",
         method="mission items",
-        check=GROUND_PATH if ok is None else "",
+        check=check,
     )
+
+
+def _not_flown_text(requirements: RouteRequirements, rule: str) -> str:
+    """Return a clause that a take-off or a landing is not flown; "" if it is flown."""
+    ground_phases = requirements.setup.ground_phases
+    is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
+    return "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
+
+
+def _flown_text(requirements: RouteRequirements, rule: str) -> str:
+    """Return a clause that a flight judges the touchdown of a landing instead of its slope; "" if it does not."""
+    is_flown = rule == "landing" and requirements.setup.ground_phases.approach is not None
+    return " without gaining speed; a flight judges its touchdown instead" if is_flown else ""
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
@@ -188,32 +217,15 @@ def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_PATH)
 
 
-def _slope_limit(
-    requirements: RouteRequirements, leg: int, first_altitude: float, last_altitude: float, slope: float
-) -> tuple[float, str]:
-    """Return the slope limit (rad) of a climb or descent on a leg's course, and the name of its source.
-
-    slope: rad; its sign selects the limit for a climb or for a descent.
-    """
-    direction, limits = (0 if slope >= 0.0 else 1), requirements.limits
-    speed, course = float(requirements.route.leg_airspeeds[leg]), float(requirements.courses[leg])
-    aircraft_limit = min(
-        limits.slopes(course, altitude, speed)[direction] for altitude in (first_altitude, last_altitude)
-    )
-    scenario_limit = (limits.max_climb, limits.max_dive)[direction]
-    if scenario_limit is not None and scenario_limit < aircraft_limit:
-        return scenario_limit, "scenario"
-    return aircraft_limit, "aircraft"
-
-
 TAKEOFF = Rule(
     name="takeoff",
-    tolerances=("PLAN_TOLERANCE_RAD",),
+    tolerances=("PLAN_TOLERANCE_RAD", "LEVEL_SLOPE_RAD", "UNDECIDED_FRACTION"),
     judge=takeoff_findings,
 )
 LANDING = Rule(
     name="landing",
-    tolerances=("PLAN_TOLERANCE_RAD",),
+    tolerances=("PLAN_TOLERANCE_RAD", "LEVEL_SLOPE_RAD", "UNDECIDED_FRACTION"),
     judge=landing_findings,
+    suggest=suggest_gentler_landing,
     log=LogNeeds(needs_aircraft=True),
 )

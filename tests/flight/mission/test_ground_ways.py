@@ -69,6 +69,22 @@ def test_pictures_show_the_ends_that_are_flown_on_the_ground() -> None:
         assert (heights[0], heights[-1]) == pytest.approx(ends, abs=0.02)
 
 
+def test_pictures_climb_from_home_to_a_take_off_item_with_a_place_of_its_own() -> None:
+    """The item is 60 m over home and on the way to the next; the path begins on the ground."""
+    setup = circuit(RAIL, STRIP)
+    takeoff, *way = setup.mission.items
+    first = way[0]
+    home = setup.mission.home
+    assert home is not None
+    lat, lon = (
+        getattr(home, name) + 0.4 * (getattr(first, name) - getattr(home, name)) for name in ("lat_deg", "lon_deg")
+    )
+    placed = with_items(setup, replace(takeoff, lat_deg=lat, lon_deg=lon), *way)
+    assert placed.ground_phases.take_off is not None
+    assert placed.ground_phases.take_off.waypoint == 1
+    assert placed.display_waypoints[:3, 2].tolist() == pytest.approx([0.0, 60.0, 80.0], abs=0.02)
+
+
 def test_what_a_mission_does_not_hold_is_not_flown_and_says_why() -> None:
     setup = circuit(RAIL, STRIP)
     takeoff, *way, land = setup.mission.items

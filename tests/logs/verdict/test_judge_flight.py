@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,10 @@ from hypothesis import strategies as st
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import make_finding
-from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.judge_flight import _disagreements, judge_flight, judge_geometry
 from logs.verdict.judge_geometry import geometric_findings
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.places import FLIGHT, Place
+from logs.verdict.places import FLIGHT, Disagreement, Place
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import verdict_json
 from tests.logs.verdict.judging import ROUTE, SILENT_ON_WAYPOINTS, failing, judge, leg, of, waypoint
@@ -186,3 +187,15 @@ def test_what_a_flight_cannot_change_is_judged_once_for_flight_and_geometry(setu
     found = geometric_findings(route_requirements(setup), of_flight)
     assert [item for item in found if item.reason == "as flown"] == of_flight[:1]
     assert len(found) == len(geometric_findings(route_requirements(setup))) + 1
+
+
+def test_a_landing_by_geometry_is_compared_with_the_flown_touchdown() -> None:
+    """Geometry judges the glide from the items, a flight the touchdown; a flown landing without one is compared."""
+    place = Place("waypoint", 2, item=3)
+    landing, touchdown = (
+        make_finding(rule, place, ok=rule != "landing", reason="") for rule in ("landing", "touchdown")
+    )
+    (found,) = _disagreements("geometry", [landing], [touchdown])
+    assert found == Disagreement("landing", place, "geometry", there=False, here=True)
+    assert _disagreements("geometry", [landing], [replace(touchdown, ok=False)]) == ()
+    assert _disagreements("geometry", [landing], [landing]) == ()

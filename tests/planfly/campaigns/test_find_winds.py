@@ -17,6 +17,7 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.failure_counts import RuleFailures
 from planfly.campaigns.find_winds import (
+    MIN_FLIGHTS_PER_DIRECTION,
     SEARCHED_QUANTITIES,
     CalmFailures,
     WindsGoal,
@@ -28,7 +29,7 @@ from planfly.campaigns.find_winds import (
 )
 from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
-from planfly.campaigns.report import wind_lines
+from planfly.campaigns.report import unsettled_reasons, wind_lines, winds_answer
 from planfly.campaigns.tables import WINDS_DATABASE, FlownFlight, RequestedFlight, StoreError
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
@@ -117,6 +118,80 @@ def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBas
     assert windy.result().calm is None
 
 
+def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_calm_air(wind_base: CampaignBase) -> None:
+    """From S all of 4 flights fail in 5 m/s and of 6 in 10 m/s; from the others all of 18 fly in 10 m/s."""
+    search = _Search(GOAL, wind_base)
+    failed = FlownFlight("not flyable", (("landing", Place("waypoint", 9)),))
+    flown = [(2, 5.0, failed)] * 4 + [(2, 10.0, failed)] * 6
+    flown += [(direction, 10.0, FlownFlight("flyable", ())) for direction in (0, 1, 3) for _ in range(6)]
+    for number, (direction, speed, outcome) in enumerate(flown):
+        search.add_result(RequestedFlight(number, direction, speed, number), outcome)
+    found = search.result()
+    assert found.calm is None
+    assert winds_answer(found) == "not judged"
+    assert unsettled_reasons(found)[2] == "10 flights of at least 150"
+    lines = wind_lines(found)
+    assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
+    assert lines[1] == (
+        "180°: fails in 5.0 m/s, the weakest wind flown (4 of 4 flights); the boundary is below 5.0 m/s, not judged"
+    )
+    assert not any("calm" in line for line in lines)
+    # Flights in nearly calm air show it.
+    search.add_result(RequestedFlight(len(flown), 2, 0.5, 0), failed)
+    assert search.result().calm == CalmFailures(0.5, 1, 1, (RuleFailures("landing", 1, ((Place("waypoint", 9), 1),)),))
+
+
+def test_flights_that_are_not_judged_in_full_are_no_failures(wind_base: CampaignBase) -> None:
+    """From N 6 flights are undecided and 6 fail; from E 150 fly, in 20 m/s, and one is undecided."""
+    search = _Search(GOAL, wind_base)
+    loiter = (("loiter", Place("waypoint", 4)),)
+    undecided = FlownFlight("not flyable", loiter, undecided="loiters (state the bank limit)")
+    flown = [(0, 5.0, undecided)] * 6 + [(0, 10.0, FlownFlight("not flyable", loiter))] * 6
+    flown += [(1, 20.0, FlownFlight("flyable", ()))] * MIN_FLIGHTS_PER_DIRECTION + [(1, 20.0, undecided)]
+    for number, (direction, speed, outcome) in enumerate(flown):
+        search.add_result(RequestedFlight(number, direction, speed, number), outcome)
+    found = search.result()
+    assert found.undecided_counts() == [6, 1, 0, 0]
+    assert found.failures[:2] == ((RuleFailures("loiter", 6, ((Place("waypoint", 4), 6),)),), ())
+    assert found.calm is None
+    assert winds_answer(found) == "not judged"
+    assert unsettled_reasons(found)[:2] == [
+        "6 of 12 flights not judged in full",
+        "1 of 151 flights not judged in full",
+    ]
+    lines = wind_lines(found)
+    assert lines[0] == (
+        "not judged: 7 of 163 flights are not judged in full, the first of them because of loiters (state the bank"
+        " limit)"
+    )
+    assert lines[1].startswith("not judged: 2 of 4 directions have too few flights (0 flights)")
+    assert not any("best estimate" in line or "the weakest wind" in line for line in lines)
+
+
+def undecided_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """A flight whose loiter is not judged."""
+    return replace(
+        made_flight(base, index, wind),
+        outcome="not flyable",
+        failed=(("loiter", LEG),),
+        undecided=True,
+        unjudged=(("threat", "threats (no scenario)"), ("loiter", "loiters (a guess)")),
+    )
+
+
+@pytest.mark.usefixtures("here")
+def test_a_mission_that_is_not_judged_in_calm_air_is_not_searched(wind_base: CampaignBase, tmp_path: Path) -> None:
+    found = searched(wind_base, tmp_path, fly=undecided_flight)
+    assert winds_answer(found) == "not judged"
+    assert found.undecided == tuple((number, "loiters (a guess)") for number in range(3))
+    lines = wind_lines(found)
+    assert lines[0] == (
+        "not judged: 3 of 3 flights are not judged in full, the first of them because of loiters (a guess)"
+    )
+    assert lines[-1] == "3 flights; no wind was tried, because no flight in calm air is flyable"
+    assert not any("fail" in line for line in lines)
+
+
 def test_failures_are_counted_by_direction_up_to_the_boundary(wind_base: CampaignBase) -> None:
     """From N the slope fails from 5 m/s on, and in 20 m/s control; from E control fails; from S every flight flies."""
     search = _Search(GOAL, wind_base)
@@ -158,7 +233,7 @@ def test_a_mission_that_always_fails_in_calm_air_is_answered_at_once(
     assert lines[1] == f"in calm air, {flights} of {flights} flights fail"
     assert "clearance" in lines[2]
     assert "leg 3" in lines[2]
-    assert lines[-1] == f"{flights} flights; no wind was tried, because every flight in calm air fails"
+    assert lines[-1] == f"{flights} flights; no wind was tried, because no flight in calm air is flyable"
     assert not any("not settled" in line for line in lines)
     assert searched(wind_base, tmp_path, goal, fly=flight_that_fails_in_calm_air) == found
 

@@ -261,6 +261,11 @@ def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:
     ):
         assert not other.flies
         assert list_failed_findings(other)
+    # Only what it does not count for is named.
+    both = replace(
+        verdict, findings=(ways[0], make_finding("slope", Place("leg", 1), ok=None, reason="x", check=CHECKS[1]))
+    )
+    assert list_failed_findings(both) == (("slope", Place("leg", 1)),)
 
 
 def test_a_flight_names_what_it_does_not_judge_unless_it_fails() -> None:

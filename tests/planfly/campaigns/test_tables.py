@@ -83,13 +83,20 @@ def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Pa
     narrow = (("slope", Place("leg", 1), 0.1 * 3), ("threat", Place("missile", 0, name="Alfa"), 0.0))
     bad = replace(made_flight(base, 3, GivenWind(15.0, 0.0)), marginal_passes=narrow)
     with opened(tmp_path / "w.sqlite", resume=False) as store:
-        store.add(later, all_fly(base, 2))
+        open_row = replace(
+            all_fly(base, 2),
+            outcome="not flyable",
+            failed=(("loiter", Place("waypoint", 1)),),
+            undecided=True,
+            unjudged=(("threat", "threats"), ("loiter", "loiters (a guess)")),
+        )
+        store.add(later, open_row)
         store.add(RequestedFlight(8, 3, 15.0, 3), bad)
         # The draw of another direction's flight: a number of its own.
         store.add(first, make_lost_row(base, 2, "lost: x"))
         assert list(store.stored_flights().items()) == [
             (2, (first, FlownFlight("lost", ()))),
-            (7, (later, FlownFlight("flyable", ()))),
+            (7, (later, FlownFlight("not flyable", open_row.failed, undecided="loiters (a guess)"))),
             (
                 8,
                 (RequestedFlight(8, 3, 15.0, 3), FlownFlight("not flyable", (("clearance", Place("leg", 1)),), narrow)),

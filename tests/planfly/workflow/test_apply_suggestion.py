@@ -75,6 +75,23 @@ def test_no_item_of_an_approach_is_moved_to_a_side(leg: int) -> None:
         apply_suggestion(context, judged, *longer(leg, 3000.0))
 
 
+@pytest.mark.parametrize(
+    ("change", "offset"),
+    [
+        (Change("descent", Place("waypoint", 5), None, 12.0, "m"), (0.0, 0.0, -12.0)),
+        # The last leg is 1500 m long, to the west.
+        (Change("length", Place("leg", 5), 1500.0, 1900.0, "m"), (400.0, 0.0, 0.0)),
+    ],
+)
+def test_a_gentler_landing_moves_the_waypoint_before_it(change: Change, offset: tuple[float, float, float]) -> None:
+    """Item 7 is waypoint 5; the landing point, item 8, stays."""
+    context, judged = judged_mission()
+    finding = make_finding("landing", Place("waypoint", 6), ok=False, reason="")
+    [move] = item_moves(context, judged.mission, apply_suggestion(context, judged, finding, (change,)))
+    assert move.item == 7
+    assert (move.east, move.north, move.up) == pytest.approx(offset, abs=0.5)
+
+
 def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did() -> None:
     context, judged = judged_mission()
     told = []

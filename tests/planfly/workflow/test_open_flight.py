@@ -11,6 +11,7 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane_sitl.process import load_user_parameters
+from flight.autopilots.parts import BatteryFailsafe
 from flight.mission.fences import fence_shapes
 from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import read_fence, read_mission
@@ -25,7 +26,7 @@ from planfly.named_fences import read_named_fences
 from planfly.plan_fence import add_plan_fence
 from planfly.workflow.airframe import airframe_for_setup, load_airframe
 from planfly.workflow.make_plan import make_plan
-from planfly.workflow.open_flight import _item_count_notes, mission_of_plan, open_flight
+from planfly.workflow.open_flight import _capacity_notes, _item_count_notes, mission_of_plan, open_flight
 from planner.plan import plan_json
 from tests.mission_lines import a_plan, setup_of, wp
 from tests.planfly.conftest import FIELD
@@ -367,3 +368,21 @@ def test_a_mission_that_a_common_board_does_not_store_is_noted(dialect: Any, cou
     notes = _item_count_notes(Mission(None, items), dialect)
     assert len(notes) == (limit is not None)
     assert all(note.startswith(f"{count} items: ") and f" stores {limit}," in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("capacity", "left"),
+    # 2,000 mAh at 14.8 V are 29.6 Wh.  A failsafe at 800 mAh left counts from BATT_CAPACITY.
+    [(2000.0, None), (1620.0, None), (2380.0, None), (1580.0, 1220), (2420.0, 380), (3000.0, 0)],
+)
+def test_a_capacity_unlike_the_batterys_is_noted_with_what_the_failsafe_leaves(
+    capacity: float, left: int | None
+) -> None:
+    failsafe = BatteryFailsafe("BATT_LOW_MAH", 800.0, capacity - 800.0)
+    failsafe = failsafe._replace(capacity_parameter="BATT_CAPACITY", capacity=capacity)
+    notes = _capacity_notes([failsafe, BatteryFailsafe("BATT_LOW_VOLT", 14.0)], 29.6, 14.8)
+    expected = (
+        f"BATT_CAPACITY {capacity:g} mAh, but the aircraft's battery has 2000 mAh (29.6 Wh at 14.8 V);"
+        f" BATT_LOW_MAH 800 leaves the mission with {left} mAh left"
+    )
+    assert notes == (() if left is None else (expected,))

@@ -9,7 +9,7 @@ import pytest
 from flight.mission.edits import movable_indices, raise_items
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
-from logs.verdict.places import FLIGHT, Change, Place, RemainingFinding, Suggestion
+from logs.verdict.places import FLIGHT, Change, ItemMove, Place, RemainingFinding, Suggestion
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
 from planfly.workflow import suggestion_trials
@@ -18,6 +18,7 @@ from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.suggestion_trials import (
     MAX_TRIAL_FLIGHTS,
     MAX_TRIED_FINDINGS,
+    PassedTrial,
     SuggestionTrials,
     is_improved,
     is_passed,
@@ -205,6 +206,18 @@ def test_another_leg_that_then_fails_is_raised_with_it(monkeypatch: pytest.Monke
     trials, _ = trials_of(monkeypatch, [item], lambda up: next(state))
     [tried] = tried_suggestions(trials.find_passing())
     assert tried.suggestions == ((*higher(1, 12.0), *higher(4, 10.0), *higher(5, 8.0)),)
+
+
+@pytest.mark.parametrize(("distance", "count"), [(999.0, 2), (1001.0, 1)])
+def test_a_move_by_kilometres_is_offered_only_if_nothing_else_passes(distance: float, count: int) -> None:
+    [near], [far] = higher(1, 12.0), higher(1, 30.0)
+    far = replace(far, moves=(ItemMove(3, 0.6 * distance, 0.8 * distance, 0.0),))
+    item = low(1, (near,), (far,))
+    near_trial, far_trial = (PassedTrial(item, (change,), SESSION.judged.setup) for change in (near, far))
+    [tried] = tried_suggestions([far_trial, near_trial])
+    assert len(tried.suggestions) == count
+    assert (near,) in tried.suggestions
+    assert tried_suggestions([far_trial])[0].suggestions == ((far,),)
 
 
 def test_what_helps_nothing_or_harms_elsewhere_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:

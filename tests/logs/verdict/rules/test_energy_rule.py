@@ -70,7 +70,7 @@ def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, acti
     law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
     item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
     assert item.ok is ok
-    assert ("BATT_LOW_MAH 1500 leaves the mission after" in item.reason) is not ok
+    assert (", and the flight needs" in item.reason) is not ok
 
 
 def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judged() -> None:
@@ -287,3 +287,33 @@ def test_an_empty_battery_is_said_and_what_is_needed_follows_from_the_prediction
             is_empty,
         )
         assert f"at most {1.50871 * (predicted if is_empty else used):.1f} Wh with 95 % probability" in item.reason
+
+
+@pytest.mark.parametrize(
+    ("share", "ok", "check"),
+    [
+        # exp(1.645 * 0.25) = 1.509: the flight may need so much more than predicted.
+        (1.55, True, ""),
+        (1.45, None, "unknown aircraft"),
+        (0.95, False, ""),
+    ],
+)
+def test_a_failsafe_that_an_uncertain_power_may_reach_leaves_the_energy_open(
+    share: float, ok: bool | None, check: str
+) -> None:
+    """The limit is the charge of the failsafe, which acts before the reserve is reached."""
+    unsure = replace(load_envelope(AEROSONDE), source="a data sheet", power_sd=0.25)
+    setup = replace(real_setup(table=unsure), battery=4000.0, autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    needed, _ = predicted_energy(route_requirements(setup))
+    capacity = 1500.0 + share * 1000.0 * needed / setup.envelope.volts
+    text = f"BATT_CAPACITY {capacity:.3f}\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n"
+    law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
+    item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
+    assert (item.ok, item.check) == (ok, check)
+    assert item.limit == pytest.approx(share * needed, rel=1e-4)
+    assert item.limit_source == "autopilot"
+    # A larger battery changes nothing: the failsafe counts from BATT_CAPACITY.
+    assert all(change.what == "duration" for suggestion in item.suggestions for change in suggestion)
+    if ok is None:
+        assert f"BATT_LOW_MAH 1500 leaves the mission after {share * needed:.1f} Wh" in item.reason
+        assert item.suggestions

@@ -150,6 +150,14 @@ def corner(turn_deg: float, slopes_deg: tuple[float, float]) -> np.ndarray:
     return np.array([[0.0, 0.0, 1500.0], [0.0, 2000.0, 1500.0 + first], [east, north, 1500.0 + first + second]])
 
 
+def test_a_headline_names_a_steep_leg_before_the_arc_that_it_makes_steep() -> None:
+    """Leg 0 descends 6 degrees, which the aircraft can; the arc to leg 1, which descends 20 degrees, is too steep."""
+    verdict = judge_geometry(make_setup(corner(60.0, (-6.0, -20.0))))
+    assert of(verdict, "slope", leg(0)).brief == "the arc at waypoint 1"
+    assert verdict.headline.startswith("not flyable: slope on leg 1, to item 2 (-20° < ")
+    assert "slope on leg 0, to item 1 (the arc at waypoint 1)" in verdict.headline
+
+
 def test_the_arc_and_both_legs_are_named() -> None:
     item = of(judge_geometry(make_setup(corner(120.0, (-7.0, -6.0)))), "slope", leg(0))
     turn = math.radians(120.0)

@@ -240,6 +240,8 @@ def test_the_autopilots_rate_limit_fails_a_leg_that_it_misses(law: Autopilot, na
     short = judged_with(2.0, 20.0)
     assert short.ok is False
     assert f"{name} 2 m/s permits a {'climb' if sign > 0.0 else 'descent'} of 4.4° at {speed} m/s" in short.reason
+    # The headline names the leg by the limit, before what the flight showed and the arc at its end.
+    assert short.brief == f"{short.reason.partition('; the leg needs 5.0°')[0]}; the leg needs 5.0°"
     assert judged_with(2.0, 8.0).ok  # within 10 m of the leg
     assert judged_with(2.0, -20.0).ok  # it does not fall short of the leg
     assert judged_with(3.0, 20.0).ok  # the limit does not explain it

@@ -152,3 +152,55 @@ def test_a_launch_is_judged_by_its_climb_from_the_ground_to_the_next_place() -> 
     assert found.planned == pytest.approx(math.degrees(math.atan(300.0 / 3000.0)), abs=0.02)
     # And without one it is the autopilot's business.
     assert of(judge_geometry(setup), "takeoff").ok is None
+
+
+def test_a_landing_close_to_the_limit_of_an_uncertain_aircraft_is_left_open() -> None:
+    """1.645 standard deviations of 0.5 degrees below the limit are certain; a certain aircraft has no such range."""
+    setup = setup_of(*FAR, home=HOME)
+    able = math.degrees(min(setup.envelope.air_angles(25.0, amsl)[1] for amsl in (100.0, 200.0)))
+    for slope, ok in ((able - 0.87, True), (able - 0.77, None), (able + 0.05, False)):
+        for descent_sd in (0.5, 0.0):
+            made = setup_of(*landing(slope), home=HOME)
+            limits = replace(made.limits, envelope=replace(made.envelope, descent_sd=math.radians(descent_sd)))
+            item = of(judge_geometry(replace(made, limits=limits)), "landing")
+            expected = True if descent_sd == 0.0 and ok is None else ok
+            assert (item.ok, item.check) == (expected, "unknown aircraft" if expected is None else "")
+            if expected is None:
+                assert f"only {able - 1.645 * 0.5:.1f}° is certain" in item.reason
+
+
+def test_a_landing_is_judged_at_the_airspeed_of_the_approach() -> None:
+    """ArduPlane glides at TECS_LAND_ARSPD, or midway between AIRSPEED_MIN and AIRSPEED_CRUISE."""
+    setup = setup_of(*landing(5.0), home=HOME)
+    for values, airspeed in (({"TECS_LAND_ARSPD": 20.0}, 20.0), ({"AIRSPEED_MIN": 19.0}, 22.0)):
+        law = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_CRUISE=25.0, **values))
+        item = of(judge_geometry(replace(setup, autopilot=law)), "landing")
+        # A parameter is an equivalent airspeed; at 100 m the air is 0.48 % thinner in the root of its density.
+        true_airspeed = 1.0048 * airspeed
+        able = min(setup.envelope.air_angles(true_airspeed, amsl)[1] for amsl in (100.0, 200.0))
+        assert item.limit == pytest.approx(math.degrees(able), abs=0.02)
+        assert f"at {true_airspeed:.1f} m/s" in item.reason
+
+
+def test_a_landing_that_is_too_steep_suggests_a_lower_or_a_further_waypoint() -> None:
+    setup = setup_of(*landing(45.0), home=HOME)
+    item = of(judge_geometry(setup), "landing")
+    assert item.limit is not None
+    slope = math.tan(math.radians(item.limit - 0.1))
+    (lower,), (further,) = item.suggestions
+    assert (lower.what, further.what) == ("descent", "length")
+    # 100 m in 100 m.
+    assert lower.wanted == math.ceil(100.0 - 100.0 * slope)
+    assert (lower.place.kind, lower.place.item) == ("waypoint", 2)
+    assert further.wanted == math.ceil(100.0 / slope)
+
+
+def test_a_take_off_close_to_the_limit_of_an_uncertain_aircraft_is_left_open() -> None:
+    """1.645 standard deviations of 0.5 degrees below the limit are certain."""
+    setup = setup_of(*FAR, home=HOME)
+    able = math.degrees(min(setup.envelope.air_angles(25.0, amsl)[0] for amsl in (100.0, 200.0)))
+    for slope, ok in ((able - 0.87, True), (able - 0.77, None)):
+        made = setup_of(*climb(slope), home=HOME)
+        limits = replace(made.limits, envelope=replace(made.envelope, climb_sd=math.radians(0.5)))
+        item = of(judge_geometry(replace(made, limits=limits)), "takeoff")
+        assert (item.ok, item.check) == (ok, "" if ok else "ground way")

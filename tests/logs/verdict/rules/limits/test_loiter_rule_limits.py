@@ -31,7 +31,7 @@ def test_a_guessed_bank_limit_leaves_circles_open_that_60_degrees_hold(short: fl
     verdict = judge_geometry(setup)
     item = of(verdict, "loiter")
     assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
-    assert "and the aircraft's bank limit of 30° (a guess) the aircraft needs 110 m" in item.reason
+    assert "and the aircraft's bank limit of 30° (a guess: state --bank) the aircraft needs 110 m" in item.reason
     if ok is None:
         assert verdict.undecided
         assert [change.what for one in item.suggestions for change in one] == ["stated bank"]

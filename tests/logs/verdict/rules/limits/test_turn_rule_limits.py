@@ -136,6 +136,6 @@ def test_a_guessed_bank_limit_leaves_turns_open_that_fit_with_60_degrees(spare: 
     assert of(judge_geometry(setup), "turn", waypoint(1)).ok is False
     item = of(judge_geometry(with_guessed_bank(setup)), "turn", waypoint(1))
     assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
-    assert "the aircraft's bank limit of 30° (a guess)" in item.reason
+    assert "the aircraft's bank limit of 30° (a guess: state --bank)" in item.reason
     whats = [change.what for one in item.suggestions for change in one]
     assert ("stated bank" in whats) is (ok is None)
