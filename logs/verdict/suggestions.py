@@ -519,7 +519,8 @@ def suggest_using_less_energy(
     storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
     larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
-    return (shorter_flight,), (larger_storage,)
+    # Shortened by 100 %, nothing would be left of the flight.
+    return ((shorter_flight,), (larger_storage,)) if shorter_flight.wanted < 100.0 else ((larger_storage,),)
 
 
 def suggest_flying_faster(

@@ -182,6 +182,18 @@ def test_a_step_that_is_too_small_in_flight_is_enlarged_by_what_is_missing(monke
     assert flights.count == 2
 
 
+def test_no_larger_step_shortens_a_flight_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """99 %, and half of the remaining 1 %, round up to 100 %."""
+
+    def long(percent: float) -> Finding:
+        change = Change("duration", FLIGHT, None, percent, "%")
+        return replace(make_finding("energy", FLIGHT, ok=False, reason=""), suggestions=((change,),))
+
+    trials, flights = trials_of(monkeypatch, [long(99.0)], lambda _: [long(50.0)])
+    assert trials.find_passing() == []
+    assert flights.count == 1
+
+
 def test_another_leg_that_then_fails_is_raised_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     item, other = low(1, higher(1, 12.0)), low(4, higher(4, 10.0))
     state = iter([[other, low(5, higher(5, 8.0))], []])
