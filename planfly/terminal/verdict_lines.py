@@ -118,7 +118,8 @@ def _rule_summary(rule: RuleFindings) -> str:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
-        return rule.count_text
+        # Of several such findings the first stands for all.
+        return "; ".join([rule.count_text, *(f"{one.where}: {one.reason}" for one in rule.passed_otherwise[:1])])
     value, limit = closest.compared_texts()
     if not value or not limit:
         return rule.count_text

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from flight.mission.edits import movable_indices, raise_items
+from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
 from logs.verdict.places import FLIGHT, Change, Place, RemainingFinding, Suggestion
@@ -132,6 +133,11 @@ def test_legs_that_are_low_because_home_is_below_the_ground_are_offered_homes_al
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 0"))
     texts = {finding.suggestion for finding in judged.failed if finding.rule == "clearance"}
     assert texts == {"set home to 100.0 m AMSL, the ground there, instead of 0.0 m"}
+    # With an item in the place of home there is no altitude of home to set.
+    setup = setup_of(*lines, home="36.5 -84.2 0")
+    mission = replace(setup.mission, warnings=(f"a.waypoints:2: {HOME_LINE_MISSING_TEXT}",))
+    judged = judge_mission_geometry(replace(setup, mission=mission))
+    assert {finding.suggestion for finding in judged.failed if finding.rule == "clearance"} == {""}
     # 60 m below the ground there, home is beyond the errors of heights, and 40 m below it is within them.
     for home, what in ((40.0, "home altitude"), (60.0, "height")):
         lines = [wp(0, 500 + 1000 * k, 50.0) for k in range(3)]
