@@ -30,6 +30,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "energy": "takes more energy than may be used",
     "unknown": "flies where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
+    "used": "is not judged by energy, as the energy used before is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "comes lower than {limit:.0f} m above ground",
 }
@@ -41,6 +42,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "energy": "take more energy than may be used",
     "unknown": "fly where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
+    "used": "are not judged by energy, as the energy used before is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
@@ -53,6 +55,7 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "energy": "a return takes too much energy",
     "unknown": "a return is not judged: terrain unknown",
     "power": "a return is not judged: power uncertain",
+    "used": "a return is not judged: energy used before unknown",
     "unsure": "a return is not judged: the point mass and JSBSim disagree",
     "low": "a return comes lower than required",
     "safe": "a return is safe",
@@ -322,10 +325,14 @@ def _range_outcome_text(
             return f"{prefix}does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy":
             left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
+            if worst_return.energy_left < 0.0:
+                left_text = f"ends with an empty battery, as {worst_return.energy_used:.0f} Wh are used before it"
             return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}"
         case "power":
             left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
             return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}, but the power is uncertain"
+        case "used":
+            return f"{prefix}takes {worst_return.energy:.0f} Wh, and the energy used before is unknown"
         case "unknown":
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":

@@ -120,8 +120,9 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
         else:
             brief = f"the return after the last item {outcome_text(simulated, world.limit)}"
             text = f": {measured_text(simulated, world.limit, setup.scenario)}"
-            is_without_terrain = simulated.kind == "unknown" and setup.scenario.terrain is None
-            ok = simulated.safe or is_without_terrain or (None if simulated.kind in UNJUDGED else False)
+            # The rules of clearance and energy report what is missing.
+            is_reported = simulated.kind == "used" or (simulated.kind == "unknown" and setup.scenario.terrain is None)
+            ok = simulated.safe or is_reported or (None if simulated.kind in UNJUDGED else False)
             text += "" if ok else f"; {judged_return_text(setup)}"
         check = UNKNOWN_RETURN if ok is None else ""
     fault = message(brief, text)
