@@ -60,7 +60,9 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
     """
     # Findings on returns state their own remedy.
     is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
-    has_hint = any(finding.suggestions for finding in verdict.failed) or all(finding.rule == "return" for finding in verdict.failed)
+    has_hint = any(finding.suggestions for finding in verdict.failed) or all(
+        finding.rule == "return" for finding in verdict.failed
+    )
     if not is_judged or has_hint:
         return ""
     if verdict.level == "geometric":

@@ -59,9 +59,14 @@ def unjudged_return_text(setup: FlightSetup) -> str:
         return ""
     if _ends_at_destination(setup):
         return f"the mission ends at the scenario's destination; {setup.autopilot.title} then returns to launch"
-    if setup.mission.home is None:
-        return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"
-    return ""
+    return missing_home_text(setup)
+
+
+def missing_home_text(setup: FlightSetup) -> str:
+    """Explain why a missing home leaves the return after the last item unjudged; return "" if it does not."""
+    if setup.mission.home is not None or not judges_return_after_last_item(setup):
+        return ""
+    return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"
 
 
 def judged_return_text(setup: FlightSetup) -> str:

@@ -20,7 +20,7 @@ from logs.verdict.findings import NO_HOME, UNKNOWN_RETURN, Finding, Message, mak
 from logs.verdict.measures.mission_ends import (
     judged_return_text,
     judges_return_after_last_item,
-    unjudged_return_text,
+    missing_home_text,
 )
 from logs.verdict.measures.route_progress import rtl_arrival_circle
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -106,8 +106,8 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     if not judges_return_after_last_item(setup):
         return []
     end_waypoint = requirements.waypoint(requirements.legs)
-    if setup.mission.home is None:
-        return [make_finding("return", end_waypoint, ok=None, reason=unjudged_return_text(setup), check=NO_HOME)]
+    if reason := missing_home_text(setup):
+        return [make_finding("return", end_waypoint, ok=None, reason=reason, check=NO_HOME)]
     ok: bool | None = None
     check, brief, text = "", "the flight did not reach the end of the mission", ""
     if end is not None:
