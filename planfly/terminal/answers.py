@@ -340,6 +340,8 @@ class RunAnswer:
     schema: Literal["planfly.run/1"] = "planfly.run/1"
     exit_code: int
     scenario: str
+    headline: str
+    """The verdict in one line."""
     seed: int
     folder: str
     """Folder of the written files."""
@@ -359,6 +361,8 @@ class FlyAnswer:
     schema: Literal["planfly.fly/1"] = "planfly.fly/1"
     exit_code: int
     mission: str
+    headline: str
+    """The verdict in one line."""
     seed: int
     log: str | None
     """Flight log; null if nothing was flown."""
@@ -516,6 +520,8 @@ class ImportAnswer:
     schema: Literal["planfly.import/1"] = "planfly.import/1"
     exit_code: int
     log: str
+    headline: str
+    """The verdict in one line."""
     rows: int
     verdict: VerdictDocument
 

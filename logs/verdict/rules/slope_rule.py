@@ -130,9 +130,10 @@ def _flown_messages(
     If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error on
     the leg is only reported.
     """
-    performance_faults = _performance_faults(requirements, leg, measure) + _rate_limit_faults(
-        requirements, leg, measure
-    )
+    faults = [*_performance_faults(requirements, leg, measure), *_rate_limit_faults(requirements, leg, measure)]
+    need_text = f"; the leg needs {math.degrees(abs(float(requirements.slopes[leg]))):.1f}°"
+    # Said once, after the last of the faults.
+    performance_faults = [message(fault.brief, need_text if fault is faults[-1] else "") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
     if requirements.envelope:
@@ -481,7 +482,6 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
             f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
             f" it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
-            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]
 
@@ -523,7 +523,6 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
     return [
         message(
             f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s",
-            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]
 

@@ -282,6 +282,11 @@ def test_px4_without_a_capacity_reads_the_charge_from_the_voltage(threshold: flo
     assert of(judge_geometry(replace(setup, battery=needed / 0.5)), "energy").ok is ok
 
 
+def test_a_small_battery_is_said_with_its_digits(setup: FlightSetup) -> None:
+    small = replace(setup, battery=5.55)
+    assert " Wh of 5.55 Wh used" in of(judge(small, fly_path(small)), "energy").reason
+
+
 def test_an_empty_battery_is_said_and_what_is_needed_follows_from_the_prediction(setup: FlightSetup) -> None:
     """At most 1.50871 times the prediction (a logarithm with a deviation of 0.25), not times what the battery had."""
     unsure = replace(load_envelope(AEROSONDE), source="a data sheet", power_sd=0.25)
