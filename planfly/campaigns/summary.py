@@ -320,7 +320,12 @@ def summary_json(summary: CampaignSummary) -> str:
     """
     estimate = summary.estimate
     deciding = [_deciding_data(entry) for entry in summary.deciding]
-    undefined: dict[str, Any] = {"deciding_rule": "", "margin_of_one_in_twenty": None, "margin_unit": "", "sensitivities": []}
+    undefined: dict[str, Any] = {
+        "deciding_rule": "",
+        "margin_of_one_in_twenty": None,
+        "margin_unit": "",
+        "sensitivities": [],
+    }
     data = {
         "schema": SUMMARY_SCHEMA,
         "name": summary.name,
