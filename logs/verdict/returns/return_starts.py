@@ -80,8 +80,9 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     velocity = _ground_velocities(track, start_rows)
     roll = track.attitude[start_rows, ROLL].astype(np.float64)
     energy = track.energy[start_rows].astype(np.float64)
-    records = _start_records(track.position[start_rows], velocity, np.nan_to_num(roll))
-    return ReturnStarts(track.time[start_rows], records, energy, True, is_low_start, int(is_slow.sum()))
+    times = track.time[start_rows]
+    records = _start_records(times, track.position[start_rows], velocity, np.nan_to_num(roll))
+    return ReturnStarts(times, records, energy, True, is_low_start, int(is_slow.sum()))
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
@@ -156,14 +157,14 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
     unknown_energy, is_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _start_records(position, velocity, bank), unknown_energy, False, is_low)
+    return ReturnStarts(times, _start_records(times, position, velocity, bank), unknown_energy, False, is_low)
 
 
 def flown_end(track: Track) -> ReturnStarts:
     """Return the end of a flown track as the start of a return."""
     row = np.array([len(track) - 1], dtype=np.intp)
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
-    records = _start_records(track.position[row], _ground_velocities(track, row), roll)
+    records = _start_records(track.time[row], track.position[row], _ground_velocities(track, row), roll)
     is_low = np.zeros(1, dtype=np.bool_)
     return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low)
 
@@ -173,8 +174,8 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     course, slope = float(requirements.courses[-1]), math.tan(float(requirements.slopes[-1]))
     speed = float(_ground_speeds(requirements.setup)[-1])
     velocity = speed * np.array([[math.sin(course), math.cos(course), slope]])
-    records = _start_records(requirements.points[-1:], velocity, np.zeros(1))
     time, energy = requirements.path.times[-1:], np.array([predicted_energy(requirements)[0]])
+    records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
     return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_))
 
 
@@ -189,9 +190,10 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
     return np.array(speeds)
 
 
-def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
+def _start_records(time: Floats, position: Floats, velocity: Floats, roll: Floats) -> Records:
     """Return n records of dtype `RETURN_START`.
 
+    time: s after take-off, (n,).
     position: m, (n, 3).
     velocity: ground velocity, m/s, (n, 3).
     roll: rad, (n,).
@@ -199,5 +201,5 @@ def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
     rows: Records = np.zeros(len(position), RETURN_START)
     for k, name in enumerate(("east", "north", "up")):
         rows[name], rows[f"velocity_{name}"] = position[:, k], velocity[:, k]
-    rows["roll"] = roll
+    rows["roll"], rows["time"] = roll, time
     return rows
