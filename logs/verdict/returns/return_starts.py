@@ -13,7 +13,7 @@ from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
-from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.route_requirements import RouteRequirements, find_leg_winds
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
@@ -180,12 +180,16 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s."""
+    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
+
+    In a forecast, it is the wind at the leg's middle when the aircraft is there.
+    """
     route, speeds = setup.route, []
-    courses = leg_courses(route.positions)
+    courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)
     for leg, speed in enumerate(route.leg_airspeeds.tolist()):
-        wind = setup.scenario.wind.components_on_course(float(courses[leg]), float(route.positions[leg, 2]))
-        speed_over_ground = ground_speed(speed, *wind)
+        wind = winds[leg] if winds else setup.scenario.wind
+        components = wind.components_on_course(float(courses[leg]), float(route.positions[leg, 2]))
+        speed_over_ground = ground_speed(speed, *components)
         speeds.append(speed_over_ground if speed_over_ground > 0.0 else speed)
     return np.array(speeds)
 
