@@ -324,10 +324,10 @@ def test_no_return_arrives_behind_a_wind_that_is_faster_than_the_aircraft(folder
     eastward = 36.0 * np.clip((8.0075 - longitudes) / 0.005, 0.0, 1.0)
     file = write_netcdf(folder / "a.nc", wind_dataset(eastward, 0.0, longitudes=longitudes))
     setup = fly(forecast=file, at=AT).setup
-    world, starts = make_return_world(setup), planned_starts(setup, 10.0)
+    world, starts = make_return_world(setup), planned_starts(setup, 20.0)
     is_beyond = starts.rows["east"] > 600.0
     assert is_beyond.sum() >= 2
-    kinds = {one.kind for one in judge_returns(world, starts.subset(np.flatnonzero(is_beyond)), 10.0).each}
+    kinds = {one.kind for one in judge_returns(world, starts.subset(np.flatnonzero(is_beyond)), 20.0).each}
     assert kinds == {"lost"}
     # Planned starts have the ground speed of the wind on their leg, which is calm in its middle.
     assert np.hypot(starts.rows["velocity_east"], starts.rows["velocity_north"])[is_beyond].max() < 27.0
