@@ -86,8 +86,6 @@ def finding(rule: str, margin: float | None, *, ok: bool | None = True, **other:
         ("stall", 0.5, None, 0.5),
         # The tolerance counts as margin, too.
         ("slope", -0.25, 0.5, 0.25),
-        # What passes beyond its limit.
-        ("slope", -2.0, 0.5, 0.0),
     ],
 )
 def test_the_margin_is_that_to_the_limit_with_its_tolerance(
