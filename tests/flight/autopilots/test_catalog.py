@@ -128,7 +128,7 @@ def test_the_names_of_the_command_line_are_listed_with_their_releases() -> None:
 @pytest.mark.usefixtures("listed")
 def test_one_without_parameters_takes_no_file_of_them() -> None:
     assert load_autopilot(tight(autopilot="other"), AEROSONDE) == Other()
-    with pytest.raises(ScenarioError, match=r"^tight: flight.params: x.parm: not a key of autopilot = .other.,"):
+    with pytest.raises(ScenarioError, match=r"^tight: flight.params: x.parm: not allowed with autopilot = .other.,"):
         Autopilot.load.__func__(Other, tight(autopilot="other", params="x.parm").flight, AEROSONDE, "tight")
 
 

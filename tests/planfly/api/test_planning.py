@@ -123,7 +123,7 @@ def test_waypoints_of_ones_own_are_certified_as_they_stand(path: planfly.Plan, t
     assert mine.waypoints.tolist() == low.tolist()
     assert not mine.feasible
     assert mine.certificate.clearance <= -10.0 - path.scenario.limits.min_clearance_m
-    assert any("above ground at its lowest" in line for line in planfly.what_blocks(mine))
+    assert any("below ground at its lowest point" in line for line in planfly.what_blocks(mine))
 
 
 def test_a_plan_of_given_waypoints_has_departure_and_landing_and_flies() -> None:

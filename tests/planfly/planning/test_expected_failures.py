@@ -64,7 +64,7 @@ def test_a_strip_whose_height_only_the_map_knows_is_too_short() -> None:
     """5.5 m on a glide of 1 in 10 move the touchdown by 55 m, 8 m more are the flare's; 70 m are 1.26 deviations."""
     (text,) = said_of(landing_plan(length_m=200.0))
     assert math.hypot(55.0, 8.0) == pytest.approx(55.6, abs=0.05)
-    assert "only 0.79 of the landings" in text
+    assert "only 79 % of the landings" in text
     assert "the touchdown within 56 m" in text
     # 2 x (30 m + 1.96 x 55.6 m) = 278 m; with a survey 2 x (30 m + 1.96 x 8 m) = 91.4 m.
     assert "a survey of its height ([landing] height_sd_m; then 100 m suffice), or a strip of 280 m" in text
@@ -79,15 +79,15 @@ def test_a_strip_that_is_long_enough_is_not_said() -> None:
 
 def test_a_strip_that_is_shorter_than_the_error_of_the_touchdown_holds_none() -> None:
     (text,) = said_of(landing_plan(length_m=50.0, height_sd_m=0.5))
-    assert "only 0.00 of the landings" in text
+    assert "only 0 % of the landings" in text
 
 
 def test_gusts_move_the_touchdown_along_a_surveyed_strip() -> None:
     """66 m in light turbulence, 132 m in moderate: 70 m are 1.06 and 0.53 deviations."""
     (light,) = said_of(landing_plan("light", length_m=200.0, height_sd_m=0.0))
     (moderate,) = said_of(landing_plan("moderate", length_m=200.0, height_sd_m=0.0))
-    assert "only 0.71 of the landings" in light
-    assert "only 0.40 of the landings" in moderate
+    assert "only 71 % of the landings" in light
+    assert "only 40 % of the landings" in moderate
     assert light.endswith("a strip of 320 m, or less turbulence")
 
 

@@ -71,7 +71,7 @@ def test_without_a_forecast_there_are_no_departures(tmp_path: Path) -> None:
 def test_a_battery_is_found(few_flights: None, tmp_path: Path) -> None:
     answer = long_worker_tasks.run_battery_task(opened(tmp_path), lambda *_: None)
     assert " Wh (" in answer["headline"]
-    assert any(line.startswith("3 flights") for line in answer["lines"])
+    assert any(line.startswith("3 of 3 flights complete the mission") for line in answer["lines"])
 
 
 def test_the_aircraft_of_a_data_sheet_varies_as_in_the_commands(sheet: Path, tmp_path: Path) -> None:
