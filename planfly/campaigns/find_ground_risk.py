@@ -564,5 +564,5 @@ def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGe
 
 
 def _reach(outer: BaseGeometry, inner: BaseGeometry) -> float:
-    """Return the largest distance of an area's outline beyond another area, m."""
-    return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max())
+    """Return the largest distance of an area's outline beyond another area, m; 0 for an empty area."""
+    return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max(initial=0.0))

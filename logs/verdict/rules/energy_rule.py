@@ -61,9 +61,10 @@ def energy_findings(
     is_measured = setup.source is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
     faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0) + failsafes.faults
-    # A flight that ends with an empty battery does not show the energy that it needs; the prediction does.
+    # A flight that ends early, or with an empty battery, does not show the energy that it needs; the prediction does.
     is_empty = not geometric and not is_measured and energy >= setup.battery
-    needed_energy = float(np.fmax(energy, planned_energy)) if is_empty else energy
+    is_cut_short = not geometric and not is_measured and aligned is not None and not aligned.passed[-1]
+    needed_energy = float(np.fmax(energy, planned_energy)) if is_empty or is_cut_short else energy
     # Power is log-normal; this is the upper end of 95 %.
     max_energy = needed_energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
@@ -76,7 +77,8 @@ def energy_findings(
     else:
         reason = _used_text(requirements, energy, max_current, is_empty=is_empty)
         if geometric or math.isfinite(planned_energy):
-            reason += " by prediction" if geometric else f"; {planned_energy:.1f} Wh by prediction"
+            whole_text = " for the whole mission" if is_cut_short else ""
+            reason += " by prediction" if geometric else f"; {planned_energy:.1f} Wh{whole_text} by prediction"
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:

@@ -294,11 +294,10 @@ def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeas
     tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
     if measure.min_distance >= min_distance - tolerance:
         return None
-    radius = measure.min_distance / min_distance * min_radius
     return message(
-        f"flown with a radius of {radius:.0f} m, passing its waypoint at {measure.min_distance:.1f} m",
-        f"; with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the radius is"
-        f" {min_radius:.0f} m, and the waypoint is passed {min_distance:.1f} m away",
+        f"passes its waypoint at {measure.min_distance:.1f} m, closer than its bank limit permits",
+        f": with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the arc has a radius of"
+        f" {min_radius:.0f} m and passes the waypoint at {min_distance:.1f} m",
     )
 
 
