@@ -114,6 +114,7 @@ LOOKS = {
     "return-low": _SHORT,
     "return-unknown": _NOT_KNOWN,
     "return-power": Look(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 3.0), halo=True),
+    "return-used": Look(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 3.0), halo=True),
     "return-unsure": Look(_GREY, _PALE_GREY, width=4.4, dash=(6.0, 3.0), halo=True),
     "return-way": Look("#1d1d1f", "#f4f4f4", width=1.5, dash=(9.0, 2.0), halo=True),
     "reach-home": _SAFE,

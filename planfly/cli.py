@@ -87,6 +87,10 @@ def _run_command(argv: Sequence[str] | None) -> int:
             except _REPORTED_ERRORS as error:
                 write_error_if_requested(args, *_exit_code_and_text(error, parser.commands[args.command]))
                 raise
+            except Exception as error:
+                # An error of planfly itself; Python prints its traceback and ends with exit code 1.
+                write_error_if_requested(args, FAULT, f"internal error: {type(error).__name__}: {error}")
+                raise
     except PlanflyError as error:
         return _report_error(*_exit_code_and_text(error, parser.commands[args.command]))
 

@@ -38,6 +38,8 @@ from world.wording import count_text
 
 # First line of the file.
 HEADER = "QGC WPL 110"
+# Clause in the warning about a home in a frame of items.
+HOME_LINE_MISSING_TEXT = "the file probably has no home line"
 # Maximum number of lines in a file, comments and empty lines included: ten per item.
 MAX_LINES = 10 * MAX_ITEMS
 
@@ -239,7 +241,8 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
             )
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
-                f"{rows[0].location}: home in frame {first.frame}: its height is taken as above mean sea level"
+                f"{rows[0].location}: home in frame {first.frame}: its height is taken as above mean sea level;"
+                f" {HOME_LINE_MISSING_TEXT}, so ground stations take the first item for home and do not fly it"
             )
     numbering_text = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
     seq_steps = [(following, following.item.seq - previous.item.seq) for previous, following in pairwise(rows)]

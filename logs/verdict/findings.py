@@ -22,6 +22,9 @@ GROUND_PATH = "ground way"
 NOT_FLOWN = "not flown"
 # Returns or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
+# A mission without a home does not state where the return after its last item leads.  The verdict stays flyable, as
+# without elevation data.
+NO_HOME = "no home"
 # Checks on which a flight gives no evidence, so that a flight may pass without them.
 APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN)
 _UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_PATH, NOT_FLOWN, *APART_FROM_FLIGHT)
@@ -53,7 +56,8 @@ class Finding:
     brief: the reason in a few words, for a headline.
     placed: True if the reason begins with the place.
     check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_PATH`, `NOT_FLOWN`,
-        `GROUND_PATH` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
+        `GROUND_PATH` or `UNKNOWN_RETURN` if the finding is undecided for that reason; `NO_HOME` if it is not judged for
+        that reason; "" otherwise.
     facts: other measured numbers, which are not judged.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
@@ -231,12 +235,14 @@ def make_finding(
     facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
     A failed finding whose number is within the limit and the tolerance has no margin, because it fails for another
-    reason.
+    reason; nor has a passed finding whose number is beyond them, because it passes for another reason.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True
+    >>> make_finding("slope", Place("leg", 2), ok=True, reason="a step", tolerance=0.1, margin=-0.2).margin is None
+    True
     """
-    if ok is False and margin is not None and margin >= -(tolerance or 0.0):
+    if ok is not None and margin is not None and bool(ok) != bool(margin >= -(tolerance or 0.0)):
         margin = None
     return Finding(
         rule=rule,

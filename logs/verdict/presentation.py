@@ -47,6 +47,15 @@ class RuleFindings:
         return closest_to_limit(self.findings)
 
     @property
+    def passed_otherwise(self) -> tuple[Finding, ...]:
+        """The findings that pass although their number is beyond the limit, for the reason that they state."""
+        return tuple(
+            finding
+            for finding in self.findings
+            if finding.ok and finding.margin is None and None not in (finding.value, finding.limit)
+        )
+
+    @property
     def count_text(self) -> str:
         """Text such as "3 of 4 ok": the number of findings that pass, and the number that were judged."""
         return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"

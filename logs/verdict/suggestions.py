@@ -14,6 +14,7 @@ from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from flight.mission.altitude_frames import misread_altitudes
 from flight.mission.items import OVER_HOME, Frame
 from flight.mission.itinerary import stated_loiter
+from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
@@ -489,6 +490,9 @@ def suggest_flying_higher(
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     home, depth = requirements.setup.mission.home, -home_height(requirements.setup)
     if home is not None and depth > HOME_ERROR_M and depth >= shortfall - SUGGESTION_LENGTH_MARGIN_M:
+        if any(HOME_LINE_MISSING_TEXT in warning for warning in requirements.setup.mission.warnings):
+            # The first item was probably taken for home: another altitude of it mends nothing.
+            return ()
         return ((Change("home altitude", MISSION, home.alt, round(home.alt + depth, 1), "m"),),)
     setup = requirements.setup
     if misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)[0]:

@@ -12,6 +12,7 @@ from logs.verdict.conditions import Conditions, autopilot_line, condition_lines,
 from logs.verdict.findings import (
     APART_FROM_FLIGHT,
     GROUND_FOLLOWING_ERROR,
+    NO_HOME,
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
     UNKNOWN_PATH,
@@ -45,6 +46,7 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
     source_notes = [f"an aircraft from {source}"] if source else []
     if flyable:
         unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
+        unjudged += ["return not judged"] if any(finding.check == NO_HOME for finding in findings) else []
         notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
         return "; ".join(["flyable", *notes, *source_notes])
     failed_findings = _failed_by_urgency(findings)

@@ -37,7 +37,7 @@ from planfly.campaigns.report import (
     fly_row_again,
     write_winds,
 )
-from planfly.campaigns.statistics.decision import Goal
+from planfly.campaigns.statistics.decision import MAX_DECIDING_FLIGHTS, Estimator, Goal, Tally
 from planfly.campaigns.summary import summarise_campaign
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, read_stored_settings, read_table
 from planfly.campaigns.worker_pool import Workers, check_scheduler_address
@@ -209,6 +209,17 @@ def _report_flight_count(goal: Goal, folder: Path) -> None:
     report_line(f"flies {'at most ' if goal.stops else ''}{count_text(goal.flights, 'flight')}, {origin}")
 
 
+def _warn_of_too_few_flights(goal: Goal) -> None:
+    """Report a target that the flights of a campaign cannot reach, even if all are flyable."""
+    estimator, best = Estimator(goal), Tally(goal.flights, 0)
+    if estimator.estimate(best).answer == "undecided":
+        needed_text = count_text(estimator.deciding_flights(best) or MAX_DECIDING_FLIGHTS, "flight")
+        report_line(
+            f"warning: {count_text(goal.flights, 'flight')} cannot show P >= {goal.target}, even if all are flyable:"
+            f" {needed_text} without a failure are needed"
+        )
+
+
 @requires_extra("campaigns")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
@@ -253,6 +264,7 @@ def campaign(
             goal = continued_goal(directory.folder, *requested)
             if options["flights"] is None:
                 _report_flight_count(goal, directory.folder)
+        _warn_of_too_few_flights(goal)
         base = _open_base(target, options, _read_spread(spread), directory)
         repeated = campaign_command_line(
             _command_line_target(target, directory.folder),

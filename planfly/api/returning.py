@@ -16,7 +16,13 @@ from logs.recording.recorder import Recorder
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
-from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
+from logs.verdict.returns.judge_returns import (
+    Returns,
+    ReturnWorld,
+    judge_returns,
+    make_return_world,
+    unknown_energy_text,
+)
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import (
     describe_causes,
@@ -156,8 +162,8 @@ class ReturnsResult:
             notes.append(
                 f"the return of {self.setup.autopilot.title} is not simulated; ArduPlane's return is used instead"
             )
-        if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
-            notes.append("the battery capacity is guessed, so energy is not judged; state battery_wh in the scenario")
+        if unknown_text := unknown_energy_text(self.setup):
+            notes.append(unknown_text)
         if self.returns.lands:
             notes.append(
                 "a return to a landing sequence has to keep the required height above ground up to the sequence's first"
@@ -174,7 +180,7 @@ class ReturnsResult:
         if self.setup.scenario.external:
             notes.append("the mission was given without a scenario: threats are unknown")
         if not self.returns.flown:
-            notes.append("returns start on the planned path: nothing was flown, and no energy was used before")
+            notes.append("returns start on the planned path: nothing was flown; the energy used before is predicted")
         return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:

@@ -30,7 +30,7 @@ def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
     """
     texts: dict[str, None] = {}
     for failures in sorted(summary.by_rule, key=lambda failures: -failures.flights):
-        low_margin = summary.low_margin if failures.rule == summary.deciding else None
+        low_margin = next((entry.low_margin for entry in summary.deciding if entry.rule == failures.rule), None)
         texts |= dict.fromkeys(_measured_remedies(failures.rule, low_margin, scenario))
     return (*texts, "less wind or turbulence") if summary.by_rule else ()
 

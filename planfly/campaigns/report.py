@@ -131,9 +131,11 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
     figures = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
-    if summary.drivers:
-        bars = [Bar(entry.title, entry.index, entry.slope) for entry in summary.drivers]
-        figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the smallest margin depends on"))
+    for deciding in summary.deciding:
+        if deciding.drivers:
+            bars = [Bar(entry.title, entry.index, entry.slope) for entry in deciding.drivers]
+            tornado = draw_tornado(bars, RULE_WORDS[deciding.rule].title)
+            figures.append((tornado, "What the smallest margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
         figures.append((failures, "Number of flights that failed each rule, by place"))

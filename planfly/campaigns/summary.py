@@ -10,6 +10,7 @@ import numpy as np
 
 from logs.verdict.conditions import Conditions, flown_lines
 from logs.verdict.junit import JunitCase, JunitSuite
+from logs.verdict.measures.mission_ends import missing_home_text
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import margin_text, place_text, quantity_text
 from planfly.campaigns.campaign_base import CampaignBase
@@ -17,14 +18,16 @@ from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import (
     RuleFailures,
     count_failures,
-    deciding_rule,
+    deciding_rules,
     failure_lines,
     failures_document,
 )
 from planfly.campaigns.flight_row import FlightRow, parse_failed_findings, scale_margin
 from planfly.campaigns.statistics.decision import (
+    MAX_DECIDING_FLIGHTS,
     MIN_FLIGHTS_FOR_INDEX,
     Estimate,
+    Estimator,
     Goal,
     Tally,
     chance_probability,
@@ -99,38 +102,22 @@ class RankedRule:
         return not self.failed and self.lowest is not None and scale is not None and self.lowest < scale
 
 
-@dataclass(frozen=True, repr=False)
-class CampaignSummary:
-    """Contents of the summary and the report.
+@dataclass(frozen=True)
+class DecidingRule:
+    """Rule that decides a campaign, and what its margin depends on.
 
-    deciding: the rule that fails most often; if no rule fails, the rule with the smallest reliability index, which is
-    the mean of its margins divided by their standard deviation (Cornell, "A probability-based structural code", ACI
-    Journal 66, 1969); "" if there is no such rule.
-    conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
-    low_margin: 5 % quantile of the margin of the deciding rule, in `unit`; None if unknown, as with so many failures by
-    an unknown margin.
-    ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
+    low_margin: 5 % quantile of its margin, in `unit`; None if unknown, as with so many failures by an unknown margin.
+    sensitivities: dependence of its margin on each varying quantity, the strongest first.
     """
 
-    name: str
-    seed: int
-    goal: Goal
-    estimate: Estimate
-    by_rule: tuple[RuleFailures, ...]
-    lost: tuple[int, ...]
-    deciding: str
+    rule: str
     low_margin: float | None
     unit: str
     sensitivities: tuple[Sensitivity, ...]
-    ranking: tuple[RankedRule, ...]
-    worst: tuple[FlightRow, ...]
-    dispersions: dict[str, dict[str, Any]]
-    made_of: str
-    conditions: Conditions
 
     @property
     def drivers(self) -> tuple[Sensitivity, ...]:
-        """Quantities that are shown to explain the deciding margin, the strongest first.
+        """Quantities that are shown to explain the margin, the strongest first.
 
         The probability that chance alone makes any quantity one of them is at most `_MAX_CHANCE` (Bonferroni).
         """
@@ -140,6 +127,36 @@ class CampaignSummary:
             for sensitivity in self.sensitivities
             if sensitivity.index >= _MIN_NAMED_FRACTION and sensitivity.p_value <= max_p_value
         )
+
+
+@dataclass(frozen=True, repr=False)
+class CampaignSummary:
+    """Contents of the summary and the report.
+
+    deciding: the rules that most flights failed, each the same number, the most urgent first; if no rule fails, the
+    rule with the smallest reliability index, which is the mean of its margins divided by their standard deviation
+    (Cornell, "A probability-based structural code", ACI Journal 66, 1969); () if there is no such rule.
+    conditions: nominal conditions of the flights: aircraft, weather, world and autopilot.
+    deciding_flights: number of flights that would decide the target at this share; None if the target is decided, or
+    for more than `MAX_DECIDING_FLIGHTS`.
+    unjudged_return: reason why the return after the last item is not judged in any flight; "" if it is judged.
+    ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
+    """
+
+    name: str
+    seed: int
+    goal: Goal
+    estimate: Estimate
+    by_rule: tuple[RuleFailures, ...]
+    lost: tuple[int, ...]
+    deciding: tuple[DecidingRule, ...]
+    ranking: tuple[RankedRule, ...]
+    worst: tuple[FlightRow, ...]
+    dispersions: dict[str, dict[str, Any]]
+    made_of: str
+    conditions: Conditions
+    deciding_flights: int | None = None
+    unjudged_return: str = ""
 
     def __repr__(self) -> str:
         tally = self.estimate.tally
@@ -151,7 +168,7 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
     by_rule = _count_failures(store)
     worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
     margins = _read_margins(store)
-    deciding = _deciding_rule(margins, by_rule)
+    is_undecided = estimate.answer == "undecided" and estimate.tally.flown > 0
     return CampaignSummary(
         name=base.name,
         seed=base.seed,
@@ -159,15 +176,22 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         estimate=estimate,
         by_rule=by_rule,
         lost=tuple(index for index, outcome in store.outcomes().items() if outcome == "lost"),
-        deciding=deciding,
-        low_margin=_margin_quantile(margins[deciding]) if deciding else None,
-        unit=_margin_unit(store, deciding) if deciding else "",
-        sensitivities=_rule_sensitivities(base, store, margins[deciding]) if deciding else (),
+        deciding=tuple(
+            DecidingRule(
+                rule,
+                _margin_quantile(margins[rule]),
+                _margin_unit(store, rule),
+                _rule_sensitivities(base, store, margins[rule]),
+            )
+            for rule in _deciding_rules(margins, by_rule)
+        ),
         ranking=_rank_rules(store, margins, by_rule),
         worst=worst_rows,
         dispersions=base.dispersions.to_json(),
         made_of=store.made_of,
         conditions=base.conditions(),
+        deciding_flights=Estimator(goal).deciding_flights(estimate.tally) if is_undecided else None,
+        unjudged_return=missing_home_text(base.nominal_setup()),
     )
 
 
@@ -207,21 +231,21 @@ def _margin_quantile(margins: Floats) -> float | None:
     return quantile if math.isfinite(quantile) else None
 
 
-def _deciding_rule(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]) -> str:
-    """Return the rule that decides the campaign.
+def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]) -> tuple[str, ...]:
+    """Return the rules that decide the campaign: those that most flights failed, each the same number.
 
-    The deciding rule is the rule that most flights failed.  Without failures it is the rule with the smallest ratio of
-    mean margin to its standard deviation.  Returns "" if no margin is known.
+    Without failures it is the rule with the smallest ratio of mean margin to its standard deviation.  Returns () if no
+    margin is known.
     """
     if by_rule:
-        return deciding_rule(by_rule)
+        return deciding_rules(by_rule)
     reliability_indices = {}
     for rule, rule_margins in margins.items():
         known_margins = rule_margins[np.isfinite(rule_margins)]
         if known_margins.size:
             deviation = float(known_margins.std())
             reliability_indices[rule] = float(known_margins.mean()) / deviation if deviation > 0.0 else math.inf
-    return min(reliability_indices, key=lambda name: reliability_indices[name], default="")
+    return tuple(sorted(reliability_indices, key=lambda name: reliability_indices[name])[:1])
 
 
 def _rank_rules(
@@ -295,12 +319,21 @@ def summary_json(summary: CampaignSummary) -> str:
     Computing times and the number of workers are left out, so that the text is the same for any number of workers.
     """
     estimate = summary.estimate
+    deciding = [_deciding_data(entry) for entry in summary.deciding]
+    undefined: dict[str, Any] = {
+        "deciding_rule": "",
+        "margin_of_one_in_twenty": None,
+        "margin_unit": "",
+        "sensitivities": [],
+    }
     data = {
         "schema": SUMMARY_SCHEMA,
         "name": summary.name,
         "seed": summary.seed,
         "target": summary.goal.target,
         "answer": estimate.answer,
+        "deciding_flights": summary.deciding_flights,
+        "unjudged_return": summary.unjudged_return,
         "flights": estimate.tally.flown,
         "flyable": estimate.tally.flyable,
         "not_flyable": estimate.tally.failed,
@@ -312,9 +345,8 @@ def summary_json(summary: CampaignSummary) -> str:
         "interval": [_to_plain_number(estimate.interval.low), _to_plain_number(estimate.interval.high)],
         "method": summary.goal.method,
         "failed_by_rule": failures_document(summary.by_rule),
-        "deciding_rule": summary.deciding,
-        "margin_of_one_in_twenty": _to_plain_number(summary.low_margin),
-        "margin_unit": summary.unit,
+        **(deciding[0] if deciding else undefined),
+        "tied_rules": deciding[1:],
         "closest_rules": [
             {
                 "rule": entry.rule,
@@ -325,16 +357,6 @@ def summary_json(summary: CampaignSummary) -> str:
             }
             for entry in summary.ranking
         ],
-        "sensitivities": [
-            {
-                "quantity": sensitivity.quantity,
-                "first_order": _to_plain_number(sensitivity.index),
-                "rank_slope": _to_plain_number(sensitivity.slope),
-                "p_value": _to_plain_number(sensitivity.p_value),
-                "shown": sensitivity in summary.drivers,
-            }
-            for sensitivity in summary.sensitivities
-        ],
         "worst": [
             _flight_data(row, log) for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True)
         ],
@@ -343,6 +365,25 @@ def summary_json(summary: CampaignSummary) -> str:
         "made_of": summary.made_of,
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _deciding_data(entry: DecidingRule) -> dict[str, Any]:
+    """Return a deciding rule as data for a JSON document."""
+    return {
+        "deciding_rule": entry.rule,
+        "margin_of_one_in_twenty": _to_plain_number(entry.low_margin),
+        "margin_unit": entry.unit,
+        "sensitivities": [
+            {
+                "quantity": sensitivity.quantity,
+                "first_order": _to_plain_number(sensitivity.index),
+                "rank_slope": _to_plain_number(sensitivity.slope),
+                "p_value": _to_plain_number(sensitivity.p_value),
+                "shown": sensitivity in entry.drivers,
+            }
+            for sensitivity in entry.sensitivities
+        ],
+    }
 
 
 def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
@@ -395,10 +436,13 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     estimate, goal = summary.estimate, summary.goal
     tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
     lines = [
-        f"{_answer_text(summary)}: {_flyable_text(tally)}, P = {tally.share:.4f}",
+        f"{_answer_text(summary)}: {_flyable_text(tally)}, P = {tally.share:.4f}"
+        + ("; return not judged" if summary.unjudged_return else ""),
         f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
         f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
+        *_deciding_flights_lines(summary),
         *(f"  {line}" for line in flown_lines(summary.conditions)),
+        *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
     ]
     lines += failure_lines(summary.by_rule)
     lines += [
@@ -414,16 +458,20 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
-    """Return the line on the margin of the deciding rule and on what it depends on; [] if no margin is known."""
-    if not summary.deciding:
-        return []
-    if summary.low_margin is None:
-        failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == summary.deciding)
-        flights_text = count_text(summary.estimate.tally.flown, "flight")
-        text = f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} it, by an unknown margin"
-    else:
-        text = f"5 % of the flights have a margin below {quantity_text(summary.low_margin, summary.unit)}"
-    return [f"  decides {RULE_WORDS[summary.deciding].title}: {text}; {_drivers_text(summary)}"]
+    """Return a line on the margin of each deciding rule and on what it depends on; [] if no margin is known."""
+    return [
+        f"  decides {RULE_WORDS[entry.rule].title}: {_low_margin_text(summary, entry)}; {_drivers_text(entry)}"
+        for entry in summary.deciding
+    ]
+
+
+def _low_margin_text(summary: CampaignSummary, entry: DecidingRule) -> str:
+    """Describe the lowest margins of a deciding rule; if they are unknown, its failures."""
+    if entry.low_margin is not None:
+        return f"5 % of the flights have a margin below {quantity_text(entry.low_margin, entry.unit)}"
+    failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == entry.rule)
+    flights_text = count_text(summary.estimate.tally.flown, "flight")
+    return f"{failed_count} of {flights_text} {'fails' if failed_count == 1 else 'fail'} it, by an unknown margin"
 
 
 def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
@@ -458,16 +506,30 @@ def _answer_text(summary: CampaignSummary) -> str:
     return texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
 
 
-def _drivers_text(summary: CampaignSummary) -> str:
-    """Return a clause on the quantities that explain most of the deciding margin's variance."""
-    if not summary.sensitivities:
+def _drivers_text(entry: DecidingRule) -> str:
+    """Return a clause on the quantities that explain most of the variance of a deciding rule's margin."""
+    if not entry.sensitivities:
         return f"what the margin depends on is known from {MIN_FLIGHTS_FOR_INDEX} flights that this rule judges"
-    if not summary.drivers:
+    if not entry.drivers:
         return "no dispersed quantity significantly explains the margin"
     return "of the margin's variance " + ", ".join(
         f"{sensitivity.title} explains {100.0 * sensitivity.index:.0f} %"
-        for sensitivity in summary.drivers[:_MAX_NAMED_QUANTITIES]
+        for sensitivity in entry.drivers[:_MAX_NAMED_QUANTITIES]
     )
+
+
+def _deciding_flights_lines(summary: CampaignSummary) -> list[str]:
+    """Return a line on the number of flights that would decide an undecided target; [] for any other target."""
+    if summary.estimate.answer != "undecided":
+        return []
+    flights = summary.deciding_flights
+    if flights is None:
+        return [
+            f"  more than {MAX_DECIDING_FLIGHTS:,} flights with this share of flyable ones would be needed to decide it"
+        ]
+    if summary.estimate.tally.share == 1.0:
+        return [f"  a campaign of {flights:,} flights without a failure would decide it"]
+    return [f"  a campaign of about {flights:,} flights with this share of flyable ones would decide it"]
 
 
 def _to_plain_number(value: float | None) -> float | None:

@@ -138,4 +138,4 @@ def _verdict_answer(verdict: "Verdict", returns: "ReturnSummary", code: int) -> 
 
     document = verdict.document()
     values = {field.name: getattr(document, field.name) for field in fields(document)}
-    return CheckAnswer(exit_code=code, returns=count_returns(returns), **values)
+    return CheckAnswer(exit_code=code, headline=verdict.headline, returns=count_returns(returns), **values)

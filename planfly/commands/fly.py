@@ -79,6 +79,7 @@ def _json_answer(mission: str, flight: "FlownMission", code: int) -> object:
     return FlyAnswer(
         exit_code=code,
         mission=mission,
+        headline=flight.verdict.headline,
         seed=flight.setup.seed,
         log=None if flight.log is None else str(flight.log),
         autopilot_log=None if flight.autopilot_log is None else str(flight.autopilot_log),

@@ -96,8 +96,13 @@ def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
     """Return the answer of the command for --json."""
     from planfly.terminal.answers import ImportAnswer
 
-    verdict = flight.verdict.document()
-    return ImportAnswer(exit_code=code, log=str(target), rows=len(flight.track), verdict=verdict)
+    return ImportAnswer(
+        exit_code=code,
+        log=str(target),
+        headline=flight.verdict.headline,
+        rows=len(flight.track),
+        verdict=flight.verdict.document(),
+    )
 
 
 def add_refly_parser(command_line: LineParser) -> None:

@@ -97,6 +97,7 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "D
     return RunAnswer(
         exit_code=code,
         scenario=result.scenario,
+        headline=result.verdict.headline,
         seed=result.seed,
         folder=str(result.folder),
         files=[file.name for file in result.files],

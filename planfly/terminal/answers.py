@@ -194,6 +194,16 @@ class SensitivityEntry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class TiedRule:
+    """Rule that as many flights failed as the deciding rule."""
+
+    deciding_rule: str
+    margin_of_one_in_twenty: float | None
+    margin_unit: str
+    sensitivities: list[SensitivityEntry]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ClosestRule:
     """Rule by how close the flights came to failing it."""
 
@@ -218,6 +228,10 @@ class CampaignDocument:
     """Requested probability."""
     answer: str
     """reached, missed, undecided, or "no target" if no probability was requested."""
+    deciding_flights: int | None
+    """Number of flights that would decide an undecided target at this share of flyable ones."""
+    unjudged_return: str
+    """Reason why the return after the last item is not judged in any flight; empty if it is judged."""
     flights: int
     flyable: int
     not_flyable: int
@@ -233,9 +247,11 @@ class CampaignDocument:
     deciding_rule: str
     margin_of_one_in_twenty: float | None
     margin_unit: str
+    sensitivities: list[SensitivityEntry]
+    tied_rules: list[TiedRule]
+    """Other rules that as many flights failed as the deciding rule."""
     closest_rules: list[ClosestRule]
     """Rules that flights failed, the most flights first, then the others, the closest to their limits first."""
-    sensitivities: list[SensitivityEntry]
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
     conditions: Conditions
@@ -324,6 +340,8 @@ class RunAnswer:
     schema: Literal["planfly.run/1"] = "planfly.run/1"
     exit_code: int
     scenario: str
+    headline: str
+    """The verdict in one line."""
     seed: int
     folder: str
     """Folder of the written files."""
@@ -343,6 +361,8 @@ class FlyAnswer:
     schema: Literal["planfly.fly/1"] = "planfly.fly/1"
     exit_code: int
     mission: str
+    headline: str
+    """The verdict in one line."""
     seed: int
     log: str | None
     """Flight log; null if nothing was flown."""
@@ -500,6 +520,8 @@ class ImportAnswer:
     schema: Literal["planfly.import/1"] = "planfly.import/1"
     exit_code: int
     log: str
+    headline: str
+    """The verdict in one line."""
     rows: int
     verdict: VerdictDocument
 

@@ -56,7 +56,7 @@ def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -
         probability=tally.share,
         interval=list(result.interval),
         holds=result.interval.high >= HOLDING_PROBABILITY,
-        deciding_rule=result.summary.deciding,
+        deciding_rule=next((entry.rule for entry in result.summary.deciding), ""),
         failed_by_rule=failed_by_rule,
         remedies=list(remedy_texts),
     )

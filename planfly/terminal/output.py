@@ -509,14 +509,16 @@ def redirect_output(args: argparse.Namespace) -> Iterator[None]:
     With ``--json -`` the lines are printed on standard error.
 
     Progress is not shown with --quiet.  Raises PlanflyError if another argument, too, names the file of the JSON answer
-    or of the JUnit report, or if it exists and is not to be overwritten.
+    or of the JUnit report, or if it exists and is not to be overwritten.  A resumed command replaces the files that it
+    wrote when it was interrupted.
     """
+    may_replace = getattr(args, "overwrite", False) or getattr(args, "resume", False)
     answer_target, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
     for name in ("json", "junit"):
         target = getattr(args, name, None)
         if target not in (None, STANDARD_OUTPUT):
             _check_named_once(name, Path(target), args)
-            check_output_file(Path(target), getattr(args, "overwrite", False))
+            check_output_file(Path(target), may_replace)
     token = _output.set(sys.stdout)
     try:
         with contextlib.ExitStack() as contexts:

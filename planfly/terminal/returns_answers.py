@@ -36,7 +36,7 @@ class ReturnEntry:
     last_s: float
     count: int
     kind: str
-    """ground, threat, zone, lost, energy, unknown, power, unsure, low or safe."""
+    """ground, threat, zone, lost, energy, unknown, power, used, unsure, low or safe."""
     target: str
     """home, a rally point by its number, or a landing sequence by its first item."""
     reason: str

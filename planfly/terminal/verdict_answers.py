@@ -42,6 +42,8 @@ class CheckAnswer(VerdictDocument):
     """planfly check: the verdict, as in verdict.json, the exit code and the returns."""
 
     exit_code: int
+    headline: str
+    """The verdict in one line."""
     returns: ReturnCounts | None
 
 

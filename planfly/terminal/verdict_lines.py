@@ -58,8 +58,11 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
 
     A failed flight has this text only if the planned route fails, too.
     """
+    # Findings on returns state their own remedy.
     is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
-    has_hint = any(finding.suggestions for finding in verdict.failed) or all(map(_is_required_return, verdict.failed))
+    has_hint = any(finding.suggestions for finding in verdict.failed) or all(
+        finding.rule == "return" for finding in verdict.failed
+    )
     if not is_judged or has_hint:
         return ""
     if verdict.level == "geometric":
@@ -68,11 +71,6 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
         return ""
     further_text = "; planfly check --geometry suggests changes for the planned route" if suggests_by_geometry() else ""
     return f"no change was found by flying{further_text}"
-
-
-def _is_required_return(finding: Finding) -> bool:
-    """Return True for a finding on the returns that a scenario requires."""
-    return finding.rule == "return" and finding.limit_source == "scenario"
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
@@ -91,7 +89,7 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):
         helped_text = f"at {helped_finding.where}: {helped_finding.suggestion}"
         lines.append(colour_text("          would pass: ", "hint") + helped_text)
-    elif _is_required_return(worst_finding):
+    elif worst_finding.rule == "return" and worst_finding.limit_source == "scenario":
         lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
     if other_findings:
         other_places = "; ".join(map(_place_and_value, other_findings[:_MAX_LISTED]))
@@ -118,7 +116,8 @@ def _rule_summary(rule: RuleFindings) -> str:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
-        return rule.count_text
+        # Of several such findings the first stands for all.
+        return "; ".join([rule.count_text, *(f"{one.where}: {one.reason}" for one in rule.passed_otherwise[:1])])
     value, limit = closest.compared_texts()
     if not value or not limit:
         return rule.count_text

@@ -393,7 +393,9 @@ def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggest
             if kinds <= _STEP_KINDS:
                 return _merge_steps(suggestion, needed_suggestion)
             if kinds <= _ENERGY_KINDS:
-                return (_merge_energy_changes(suggestion[0], needed_suggestion[0]),)
+                merged_change = _merge_energy_changes(suggestion[0], needed_suggestion[0])
+                is_whole_flight = merged_change.what == "duration" and merged_change.wanted >= 100.0
+                return None if is_whole_flight else (merged_change,)
     return None
 
 

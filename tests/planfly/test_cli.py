@@ -87,6 +87,22 @@ def test_an_error_is_the_answer_on_standard_output(capsys: pytest.CaptureFixture
     assert json.loads(capsys.readouterr().out)["exit_code"] == 2
 
 
+def test_an_error_of_planfly_itself_is_in_both_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The traceback stays; the exit code of an uncaught exception is 1."""
+
+    def fail(_args: argparse.Namespace) -> int:
+        raise ZeroDivisionError("float division by zero")
+
+    monkeypatch.setattr(cli, "find_command", lambda _: fail)
+    answer, cases = tmp_path / "r.json", tmp_path / "r.xml"
+    with pytest.raises(ZeroDivisionError):
+        main(["fly", "well.waypoints", "--json", str(answer), "--junit", str(cases)])
+    text = "internal error: ZeroDivisionError: float division by zero"
+    assert json.loads(answer.read_text()) == {"schema": "planfly.error/1", "exit_code": 1, "error": text}
+    ((case,),) = ElementTree.parse(cases).getroot()
+    assert [(child.tag, child.get("message")) for child in case] == [("error", text)]
+
+
 def test_an_old_result_that_cannot_be_replaced_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(path: Path, _data: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", str(path))

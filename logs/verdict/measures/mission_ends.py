@@ -9,7 +9,7 @@ from logs.verdict.tolerances import FINAL_WAYPOINT_TOLERANCE_M
 
 
 def judges_return_after_last_item(setup: FlightSetup) -> bool:
-    """Return True if the return to launch that ArduPlane begins by itself after the last item is judged.
+    """Return True if a mission is judged beyond its last item, where ArduPlane returns to launch by itself.
 
     A mission that ends at its scenario's destination is judged only up to the destination.
     """
@@ -20,11 +20,10 @@ def _returns_after_last_item(setup: FlightSetup) -> bool:
     """Return True if ArduPlane returns to launch by itself after the mission's last item.
 
     ArduPlane returns (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a
-    landing, an endless loiter or an endless jump.  Also return False for an imported flight, and for a mission without
-    a home.
+    landing, an endless loiter or an endless jump.  Also return False for an imported flight.
     """
     route, mission = setup.route, setup.mission
-    ends_in_flight = route.rtl_start is None and route.endless_jump is None and mission.home is not None
+    ends_in_flight = route.rtl_start is None and route.endless_jump is None
     if setup.source is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
         return False
     last_seq = _last_seq(setup)
@@ -56,9 +55,18 @@ def _ends_at_destination(setup: FlightSetup) -> bool:
 
 def unjudged_return_text(setup: FlightSetup) -> str:
     """Explain why a return after the last item is not judged; return "" if it is judged or does not occur."""
-    if not _returns_after_last_item(setup) or not _ends_at_destination(setup):
+    if not _returns_after_last_item(setup):
         return ""
-    return f"the mission ends at the scenario's destination; {setup.autopilot.title} then returns to launch"
+    if _ends_at_destination(setup):
+        return f"the mission ends at the scenario's destination; {setup.autopilot.title} then returns to launch"
+    return missing_home_text(setup)
+
+
+def missing_home_text(setup: FlightSetup) -> str:
+    """Explain why a missing home leaves the return after the last item unjudged; return "" if it does not."""
+    if setup.mission.home is not None or not judges_return_after_last_item(setup):
+        return ""
+    return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"
 
 
 def judged_return_text(setup: FlightSetup) -> str:

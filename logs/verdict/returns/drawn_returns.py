@@ -160,7 +160,7 @@ def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> 
     if ret.kind == "threat":
         distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
         return np.asarray(path[int(np.argmin(distances))])
-    if ret.kind in ("ground", "low", "safe", "power", "unsure") and not math.isnan(ret.lowest_position[0]):
+    if ret.kind in ("ground", "low", "safe", "power", "used", "unsure") and not math.isnan(ret.lowest_position[0]):
         return np.array(ret.lowest_position)
     return np.asarray(path[-1])
 

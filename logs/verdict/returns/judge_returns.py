@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -52,11 +52,12 @@ from world.wind import mean_wind_speed
 
 # Outcome of a return, the worst first: it hits the ground, enters a missile's sphere, violates a zone, does not arrive,
 # uses more energy than available, leaves the elevation data, may use more energy than available because the power is
-# uncertain, differs too much between the point mass and JSBSim, goes below the least height above ground; or is safe.
-Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "power", "unsure", "low", "safe"]
-KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "power", "unsure", "low", "safe")
+# uncertain or because the energy used before is unknown, differs too much between the point mass and JSBSim, goes below
+# the least height above ground; or is safe.
+Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "power", "used", "unsure", "low", "safe"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 # Outcomes that are not judged.
-UNJUDGED: tuple[Kind, ...] = ("unknown", "power", "unsure")
+UNJUDGED: tuple[Kind, ...] = ("unknown", "power", "used", "unsure")
 # Outcomes that are failures of the return.
 UNSAFE = frozenset(KINDS[:5])
 
@@ -238,7 +239,7 @@ class Returns:
         """Point of no return by energy, for RTL; returns that do not arrive are ignored."""
         last_time, min_energy_left, skipped_count = math.nan, math.inf, 0
         if not self.each or all(math.isnan(ret.energy_left) for ret in self.each):
-            return PointOfNoReturn("battery")
+            return PointOfNoReturn("used" if any(ret.kind == "used" for ret in self.each) else "battery")
         if any(ret.kind == "power" for ret in self.each) and not any(ret.kind == "energy" for ret in self.each):
             return PointOfNoReturn("power")
         for k, ret in enumerate(self.each):
@@ -340,9 +341,9 @@ class ReturnWorld:
         return "" if limits is None else limits.min_name
 
     @property
-    def is_battery_known(self) -> bool:
-        """True if the battery's energy is stated; otherwise energy is not judged."""
-        return not self.setup.envelope.battery_guessed or self.scenario.flight.battery_wh is not None
+    def is_energy_known(self) -> bool:
+        """True if battery and power are known; otherwise energy is not judged."""
+        return not unknown_energy_text(self.setup)
 
     @property
     def mission(self) -> ReturnMission:
@@ -424,6 +425,16 @@ class ReturnWorld:
     def with_rally(self, rally: Sequence[ReturnPoint]) -> "ReturnWorld":
         """Return a copy with other rally points."""
         return replace(self, rally=tuple(rally))
+
+
+def unknown_energy_text(setup: FlightSetup) -> str:
+    """Explain why the energy of returns is not judged: battery or power are unknown; return "" if it is judged."""
+    is_stated = setup.scenario.flight.battery_wh is not None
+    if setup.source is not None and not setup.source.aircraft_known:
+        return "the log names no aircraft, so energy is not judged"
+    if setup.envelope.battery_guessed and not is_stated:
+        return "the battery capacity is guessed, so energy is not judged; state battery_wh in the scenario"
+    return "" if setup.envelope.power_level.size else "the aircraft's model states no power, so energy is not judged"
 
 
 def returning_title(setup: FlightSetup) -> str:
@@ -722,6 +733,8 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     if result["outcome"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
         return "unknown"
     battery = world.setup.battery
+    if math.isnan(energy_left):
+        return "used" if world.is_energy_known else "safe"
     max_energy_used = (battery - energy_left) * math.exp(UNDECIDED_FRACTION * world.setup.envelope.power_sd)
     return "power" if max_energy_used > (1.0 - ENERGY_RESERVE_FRACTION) * battery else "safe"
 
@@ -740,8 +753,8 @@ def _judge_return(
     path: positions of the return, m, (t, 3); empty without zones.
     """
     zone = most_violated_zone(world, path) if len(path) > 1 else -1
-    energy_used = 0.0 if math.isnan(starts.energy_used[k]) else float(starts.energy_used[k])
-    energy_left = float(world.setup.battery - energy_used - result["energy"]) if world.is_battery_known else math.nan
+    energy_used = float(starts.energy_used[k])
+    energy_left = float(world.setup.battery - energy_used - result["energy"]) if world.is_energy_known else math.nan
     row = starts.rows[k]
     return SimulatedReturn(
         time=float(starts.time[k]),
@@ -761,7 +774,7 @@ def _judge_return(
         energy_left=energy_left,
         time_to_loiter=float(result["arrival_time"]),
         required_height=required_height,
-        energy_used=float(starts.energy_used[k]),
+        energy_used=energy_used,
     )
 
 

@@ -10,10 +10,10 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.simulated_returns import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
-from logs.verdict.measures.energy import predicted_energy
+from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
-from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
@@ -114,7 +114,7 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
-    """Sample the planned path up to its own return to launch; the energy used before is unknown.
+    """Sample the planned path up to its own return to launch, with the predicted energy used before.
 
     interval: time between samples, s.
 
@@ -155,8 +155,12 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     climb_rate = (move["climb"] + 2.0 * move["bend"] * fraction) / np.maximum(1e-9, move["lasts"])
     velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
-    unknown_energy, is_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _start_records(position, velocity, bank), unknown_energy, False, is_low)
+    leg_energy = np.array(leg_energies(route_requirements(setup))[0])
+    leg_duration = np.bincount(moves["leg"], weights=moves["lasts"])
+    move_energy = leg_energy[moves["leg"]] * moves["lasts"] / np.maximum(1e-9, leg_duration[moves["leg"]])
+    energy = np.cumsum(move_energy)[move_numbers] - (1.0 - fraction) * move_energy[move_numbers]
+    is_low = np.zeros(len(times), dtype=np.bool_)
+    return ReturnStarts(times, _start_records(position, velocity, bank), energy, False, is_low)
 
 
 def flown_end(track: Track) -> ReturnStarts:

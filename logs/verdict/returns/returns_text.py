@@ -17,6 +17,7 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
 )
 from logs.verdict.returns.suggest_returns import Remedy
+from logs.verdict.wording import quantity_text
 from world.frames import to_geo
 from world.scenario import Scenario
 from world.wording import count_text
@@ -30,6 +31,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "energy": "takes more energy than may be used",
     "unknown": "flies where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
+    "used": "is not judged by energy, as the energy used before is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "comes lower than {limit:.0f} m above ground",
 }
@@ -41,6 +43,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "energy": "take more energy than may be used",
     "unknown": "fly where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
+    "used": "are not judged by energy, as the energy used before is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
@@ -53,6 +56,7 @@ _SEGMENT_NAMES: dict[Kind, str] = {
     "energy": "a return takes too much energy",
     "unknown": "a return is not judged: terrain unknown",
     "power": "a return is not judged: power uncertain",
+    "used": "a return is not judged: energy used before unknown",
     "unsure": "a return is not judged: the point mass and JSBSim disagree",
     "low": "a return comes lower than required",
     "safe": "a return is safe",
@@ -176,7 +180,9 @@ def _judged_text(returns: Returns) -> str:
     min_energy_left = min(
         (ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)), default=math.nan
     )
-    energy_text = "" if math.isnan(min_energy_left) else f", and at least {min_energy_left:.0f} Wh are left"
+    energy_text = (
+        "" if math.isnan(min_energy_left) else f", and at least {quantity_text(min_energy_left, 'Wh')} are left"
+    )
     landing_suffix = " up to their landing" if returns.lands else ""
     subject = f"all {total} returns are" if total > 1 else "the only return is"
     return f"{subject} safe{landing_suffix}: never lower than {lowest_return.clearance:.0f} m above ground{energy_text}"
@@ -189,7 +195,7 @@ def point_of_no_return_text(returns: Returns) -> str:
     'point of no return by energy: not judged, because the battery energy is unknown'
     """
     point, name = returns.point_of_no_return, "point of no return by energy"
-    reserve = f"the reserve of {returns.reserve:.0f} Wh"
+    reserve = f"the reserve of {quantity_text(returns.reserve, 'Wh')}"
     match point.kind:
         case "battery":
             return f"{name}: not judged, because the battery energy is unknown"
@@ -204,7 +210,7 @@ def point_of_no_return_text(returns: Returns) -> str:
         case "later":
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            left_text = f"at least {point.remaining_energy:.0f} Wh are left"
+            left_text = f"at least {quantity_text(point.remaining_energy, 'Wh')} are left"
             text = f"{name}: none, because every return leaves {reserve} ({left_text})"
     skipped_texts = {0: "", 1: "; 1 return that does not arrive is ignored"}
     return text + skipped_texts.get(
@@ -298,6 +304,17 @@ def _judgement_text(ret: SimulatedReturn) -> str:
     return "safe" if ret.safe else "unsafe" if ret.kind in UNSAFE else "too low"
 
 
+def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
+    """Describe the energy that a return leaves, if its outcome depends on the energy."""
+    if ret.kind == "used":
+        return "the energy used before is unknown"
+    if ret.energy_left < 0.0:
+        return f"ends with an empty battery, as {quantity_text(ret.energy_used, 'Wh')} are used before it"
+    left_text, reserve_text = quantity_text(ret.energy_left, "Wh"), quantity_text(returns.reserve, "Wh")
+    uncertain_text = ", but the power is uncertain" if ret.kind == "power" else ""
+    return f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
+
+
 def _range_outcome_text(
     worst_return: SimulatedReturn, return_range: ReturnRange, returns: Returns, scenario: Scenario
 ) -> str:
@@ -320,12 +337,9 @@ def _range_outcome_text(
         case "lost":
             end_text = "landing sequence" if worst_return.target.landing is not None else "loiter"
             return f"{prefix}does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
-        case "energy":
-            left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
-            return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}"
-        case "power":
-            left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
-            return f"{prefix}takes {worst_return.energy:.0f} Wh and {left_text}, but the power is uncertain"
+        case "energy" | "power" | "used":
+            taken_text = quantity_text(worst_return.energy, "Wh")
+            return f"{prefix}takes {taken_text} and {_energy_outcome_text(worst_return, returns)}"
         case "unknown":
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":
@@ -336,7 +350,9 @@ def _range_outcome_text(
             )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: the return begins below the required height)"
-    energy_text = "" if math.isnan(worst_return.energy_left) else f", {worst_return.energy_left:.0f} Wh left"
+    energy_text = (
+        "" if math.isnan(worst_return.energy_left) else f", {quantity_text(worst_return.energy_left, 'Wh')} left"
+    )
     sphere_text = (
         ""
         if math.isinf(worst_return.sphere_distance)

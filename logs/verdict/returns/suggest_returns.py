@@ -147,7 +147,7 @@ def _meets_criterion(
     is_met = criterion(world, results, limits)
     if criterion is not _meets_all_limits:
         return is_met
-    if world.setup.envelope.power_level.size and world.is_battery_known:
+    if world.is_energy_known:
         energy_left = world.setup.battery - np.nan_to_num(starts.energy_used) - results["energy"]
         is_met &= ~(energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery)
     for k, path in enumerate(paths):

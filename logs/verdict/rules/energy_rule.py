@@ -31,7 +31,7 @@ from logs.verdict.tolerances import (
     NOMINAL_CELL_VOLTAGE_V,
     UNDECIDED_FRACTION,
 )
-from logs.verdict.wording import count_text
+from logs.verdict.wording import count_text, quantity_text
 from world.errors import PlanflyError
 
 _MAH_PER_AH = 1000.0
@@ -293,7 +293,8 @@ def _used_text(requirements: RouteRequirements, energy_used: float, max_current:
             f"{': the tank is empty' if is_empty else ''}; no battery, so no current"
         )
     current_text = f", peak current {max_current:.1f} A" if math.isfinite(max_current) else ""
-    return f"{energy_used:.1f} Wh of {capacity:.0f} Wh used{current_text}{': the battery is empty' if is_empty else ''}"
+    capacity_text = quantity_text(capacity, "Wh")
+    return f"{energy_used:.1f} Wh of {capacity_text} used{current_text}{': the battery is empty' if is_empty else ''}"
 
 
 RULE = Rule(

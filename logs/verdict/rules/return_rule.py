@@ -16,8 +16,12 @@ from flight.mission.items import Command
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
-from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
-from logs.verdict.measures.mission_ends import judged_return_text, judges_return_after_last_item
+from logs.verdict.findings import NO_HOME, UNKNOWN_RETURN, Finding, Message, make_finding, message
+from logs.verdict.measures.mission_ends import (
+    judged_return_text,
+    judges_return_after_last_item,
+    missing_home_text,
+)
 from logs.verdict.measures.route_progress import rtl_arrival_circle
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -101,6 +105,9 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     setup = requirements.setup
     if not judges_return_after_last_item(setup):
         return []
+    end_waypoint = requirements.waypoint(requirements.legs)
+    if reason := missing_home_text(setup):
+        return [make_finding("return", end_waypoint, ok=None, reason=reason, check=NO_HOME)]
     ok: bool | None = None
     check, brief, text = "", "the flight did not reach the end of the mission", ""
     if end is not None:
@@ -113,15 +120,16 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
         else:
             brief = f"the return after the last item {outcome_text(simulated, world.limit)}"
             text = f": {measured_text(simulated, world.limit, setup.scenario)}"
-            is_without_terrain = simulated.kind == "unknown" and setup.scenario.terrain is None
-            ok = simulated.safe or is_without_terrain or (None if simulated.kind in UNJUDGED else False)
+            # The rules of clearance and energy report what is missing.
+            is_reported = simulated.kind == "used" or (simulated.kind == "unknown" and setup.scenario.terrain is None)
+            ok = simulated.safe or is_reported or (None if simulated.kind in UNJUDGED else False)
             text += "" if ok else f"; {judged_return_text(setup)}"
         check = UNKNOWN_RETURN if ok is None else ""
     fault = message(brief, text)
     return [
         make_finding(
             "return",
-            requirements.waypoint(requirements.legs),
+            end_waypoint,
             ok=ok,
             reason=fault.text,
             faults=[] if ok else [fault],

@@ -136,7 +136,10 @@ def _flown_messages(
     the leg is only reported.
     """
     rate_limit_faults = _rate_limit_faults(requirements, leg, measure)
-    performance_faults = [*rate_limit_faults, *_performance_faults(requirements, leg, measure)]
+    faults = [*rate_limit_faults, *_performance_faults(requirements, leg, measure)]
+    need_text = f"; the leg needs {math.degrees(abs(float(requirements.slopes[leg]))):.1f}°"
+    # Said once, after the last of the faults.
+    performance_faults = [message(fault.brief, need_text if fault is faults[-1] else "") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
     if requirements.envelope:
@@ -485,7 +488,6 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
             f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
             f" it can {verb}"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
-            f"; the leg needs {math.degrees(abs(planned_slope)):.1f}°",
         )
     ]
 
@@ -526,8 +528,7 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
     speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
-            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s;"
-            f" the leg needs {math.degrees(abs(planned_slope)):.1f}°"
+            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s",
         )
     ]
 

@@ -243,6 +243,8 @@ Answer = Literal["reached", "missed", "undecided", "no target"]
 
 # Default confidence of a bound.
 DEFAULT_CONFIDENCE = 0.95
+# Largest number of flights that is named as deciding a target.
+MAX_DECIDING_FLIGHTS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -309,6 +311,32 @@ class Estimator:
             return False
         is_reached = bound.excludes(tally.flyable, tally.failed + tally.lost, target, above=True)
         return is_reached or bound.excludes(tally.flyable + tally.lost, tally.failed, target, above=False)
+
+    def deciding_flights(self, tally: Tally) -> int | None:
+        """Return the number of flights that decide the target if the share of flyable flights is that of a tally.
+
+        None if it is larger than `MAX_DECIDING_FLIGHTS`.  tally: at least one flight, which leave the target undecided.
+
+        >>> Estimator(Goal(0.95, False, 20)).deciding_flights(Tally(20, 0))
+        59
+        """
+        target, share = self._goal.target, tally.share
+        too_few, enough = tally.flown, 2 * tally.flown
+
+        def decides(flights: int) -> bool:
+            """Return True if so many flights decide; a fraction of a flight counts against the decision."""
+            is_above = target is not None and share >= target
+            flyable = math.floor(share * flights + 1e-9) if is_above else math.ceil(share * flights - 1e-9)
+            return self.estimate(Tally(flyable, flights - flyable)).answer != "undecided"
+
+        while not decides(enough):
+            too_few, enough = enough, 2 * enough
+            if too_few > MAX_DECIDING_FLIGHTS:
+                return None
+        while enough - too_few > 1:
+            middle = (too_few + enough) // 2
+            too_few, enough = (too_few, middle) if decides(middle) else (middle, enough)
+        return enough
 
     def estimate(self, tally: Tally) -> Estimate:
         """Estimate the probability from a tally."""

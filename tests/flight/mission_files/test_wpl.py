@@ -145,7 +145,11 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
     ("line", "home", "said"),
     [
         ("0 22 15 0 0 0 36.5 -84.2 310", Home(36.5, -84.2, 310.0), []),
-        ("3 22 15 0 0 0 36.5 -84.2 310", Home(36.5, -84.2, 310.0), ["home in frame 3: its height is taken as above"]),
+        (
+            "3 22 15 0 0 0 36.5 -84.2 310",
+            Home(36.5, -84.2, 310.0),
+            ["home in frame 3: its height is taken as above mean sea level; the file probably has no home line"],
+        ),
         ("3 22 15 0 0 0 0 0 100", None, ["home at 0, 0, which is not a position"]),
         ("2 178 0 22 0 0 0 0 0", None, ["home at 0, 0, which is not a position"]),
     ],

@@ -282,6 +282,14 @@ def test_a_finding_that_fails_within_its_tolerance_fails_by_other_evidence(margi
     assert item.margin == kept
 
 
+@pytest.mark.parametrize(("margin", "kept"), [(-1.2, None), (-1.1, -1.1), (0.1, 0.1)])
+def test_a_finding_that_passes_beyond_its_tolerance_passes_by_other_evidence(margin: float, kept: float | None) -> None:
+    item = make_finding("slope", Place("leg", 1), ok=True, reason="a step", margin=margin, tolerance=1.1, unit="deg")
+    assert item.margin == kept
+    # Campaigns rank flights by margins that can fail.
+    assert [least.value for _, least in find_minimum_margins((item,))] == ([] if kept is None else [kept])
+
+
 def test_a_rule_with_a_finding_left_open_is_not_called_ok_in_the_report() -> None:
     passed = make_finding("slope", Place("leg", 0), ok=True, reason="", margin=1.0, unit="deg")
     unsure = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)

@@ -7,7 +7,7 @@ from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import count_failures
 from planfly.campaigns.remedies import remedies
-from planfly.campaigns.summary import CampaignSummary
+from planfly.campaigns.summary import CampaignSummary, DecidingRule
 from tests.planfly.campaigns.made_report import made_report
 from world.airfield import LandingStrip
 from world.scenario import Scenario, load_scenario
@@ -23,7 +23,7 @@ def summary_of(base: CampaignBase, folder: Path, low_margin: float | None, *rule
         pass
     by_rule = count_failures([[(rule, Place("leg", 1)) for rule in failed] for failed in rules])
     deciding = rules[0][0] if rules else "clearance"
-    return replace(summary, by_rule=by_rule, deciding=deciding, low_margin=low_margin)
+    return replace(summary, by_rule=by_rule, deciding=(DecidingRule(deciding, low_margin, "m", ()),))
 
 
 def strip_scenario(height_sd: float | None) -> Scenario:

@@ -16,8 +16,9 @@ from tests.planfly.campaigns.made_report import made_report
 def pages(base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     """Made twice, with a quantity that explains the margin of the made flights, which depends on none."""
     with made_report(base, tmp_path_factory.mktemp("page")) as (store, summary):
-        assert summary.drivers == ()
-        summary = replace(summary, sensitivities=(Sensitivity("mass", 0.5, -0.7, p_value=1e-6),))
+        assert not any(entry.drivers for entry in summary.deciding)
+        explained = replace(summary.deciding[0], sensitivities=(Sensitivity("mass", 0.5, -0.7, p_value=1e-6),))
+        summary = replace(summary, deciding=(explained,))
         return [campaign_page(base, summary, store, "planfly campaign <x>").decode() for _ in range(2)]
 
 

@@ -41,7 +41,7 @@ def test_it_counts_what_failed_and_names_what_was_lost(base: CampaignBase, tmp_p
             ("clearance", failed, ((Place("leg", 1), failed),))
         ]
         assert summary.lost == (59,)
-        assert summary.deciding == "clearance"
+        assert [entry.rule for entry in summary.deciding] == ["clearance"]
         assert summary.worst[0].outcome == "lost"
         assert all(row.outcome == "not flyable" for row in summary.worst[1 : 1 + min(failed, 9)])
         data = json.loads(summary_json(summary))
@@ -85,7 +85,7 @@ def test_a_campaign_without_a_target_says_so_in_its_answer(base: CampaignBase, t
 def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp_path: Path) -> None:
     """The aircraft of 11 kg and its 25 m/s are of the published Aerosonde; the rest the scenario states."""
     with made_report(base, tmp_path) as (store, summary):
-        aircraft, world, pilot = campaign_lines(summary)[3:6]
+        aircraft, world, pilot = campaign_lines(summary)[4:7]
         assert aircraft.startswith("  Aircraft: aerosonde, 11 kg, 25 m/s")
         assert world.startswith("  Conditions: wind 5 m/s from 250 degrees, light turbulence; navigation ")
         assert world.endswith("; terrain flat at 100 m, heights above mean sea level")
@@ -192,7 +192,7 @@ def test_only_what_is_shown_to_explain_the_margin_is_named_also_of_the_aircraft(
     drawn = replace(base, dispersions=base.dispersions.with_draws(draws))
     seeds = [draw_flight(drawn.dispersions, drawn.seed, index).seed for index in range(40)]
     summary = summary_of_margins(drawn, tmp_path, [(5.0 * float(thrust[seed % 64]), False) for seed in seeds])
-    assert [driver.quantity for driver in summary.drivers] == ["ident/thrust"]
+    assert [driver.quantity for driver in summary.deciding[0].drivers] == ["ident/thrust"]
     assert "; of the margin's variance the aircraft's thrust explains " in campaign_lines(summary)[-1]
     sensitivities = {entry["quantity"]: entry for entry in json.loads(summary_json(summary))["sensitivities"]}
     assert {name for name, entry in sensitivities.items() if entry["shown"]} == {"ident/thrust"}
@@ -201,11 +201,47 @@ def test_only_what_is_shown_to_explain_the_margin_is_named_also_of_the_aircraft(
     assert max(entry["first_order"] for name, entry in sensitivities.items() if name != "ident/thrust") > 0.05
 
 
+def test_all_rules_that_most_flights_fail_are_explained(base: CampaignBase, tmp_path: Path) -> None:
+    """Five of 40 flights fail the slope, five others the clearance, whose margin is the drawn height of the terrain."""
+    goal = Goal(None, False, 40)
+    heights = [draw_flight(base.dispersions, base.seed, index).values["terrain_height"] for index in range(40)]
+    highest = sorted(range(40), key=heights.__getitem__)[-5:]
+    steep = [index for index in range(40) if index not in highest][:5]
+    with open_store(base, goal, tmp_path, resume=False) as store:
+        for index, height in enumerate(heights):
+            failed = ("clearance",) if index in highest else ("slope",) if index in steep else ()
+            low = sorted(heights)[-5] - height - 1e-3
+            store.add(with_margins(base, index, ("clearance", low), ("corridor", 9.0), failed=failed))
+        summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+    assert [entry.rule for entry in summary.deciding] == ["slope", "clearance"]
+    slope, clearance = (line for line in campaign_lines(summary) if line.startswith("  decides"))
+    assert "slopes: 5 of 40 flights fail it, by an unknown margin" in slope
+    assert "of the margin's variance terrain height explains " in clearance
+    data = json.loads(summary_json(summary))
+    assert (data["deciding_rule"], [entry["deciding_rule"] for entry in data["tied_rules"]]) == ("slope", ["clearance"])
+
+
+def test_an_undecided_target_names_the_flights_that_would_decide_it(base: CampaignBase, tmp_path: Path) -> None:
+    """0.95 ** 58 is 0.051 and 0.95 ** 59 is 0.0485; and without a home the first line says what is not judged."""
+    goal = Goal(0.95, False, 20)
+    with open_store(base, goal, tmp_path, resume=False) as store:
+        for index in range(20):
+            store.add(with_margins(base, index, ("clearance", 9.0)))
+        summary = summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+    assert summary.estimate.answer == "undecided"
+    assert "  a campaign of 59 flights without a failure would decide it" in campaign_lines(summary)
+    assert json.loads(summary_json(summary))["deciding_flights"] == 59
+    assert summary.unjudged_return == ""
+    lines = campaign_lines(replace(summary, unjudged_return="the mission has no home"))
+    assert lines[0].endswith("; return not judged")
+    assert "  Not judged: return (the mission has no home)" in lines
+
+
 def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Path) -> None:
     """Eight flights cannot say what a margin depends on, and are not drawn as eleven times 0 %."""
     with made_report(base, tmp_path, flights=8) as (store, summary):
-        assert summary.deciding == "clearance"
-        assert summary.sensitivities == ()
+        assert [entry.rule for entry in summary.deciding] == ["clearance"]
+        assert summary.deciding[0].sensitivities == ()
         assert "; at least 30 flights that this rule judges would show" in campaign_lines(summary)[-1]
         assert "What the smallest margin depends on" not in campaign_page(base, summary, store, "").decode()
 

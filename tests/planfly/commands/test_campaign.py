@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from planfly.api import campaigns
 from planfly.campaigns.campaign_base import open_campaign
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
@@ -97,7 +98,9 @@ def test_the_answer_and_the_cases_of_continuous_integration_have_the_exit_code(
     out = tmp_path / "out"
     shutil.copytree(first, out)
     for target, code, answer, result in (("0.5", 0, "reached", None), ("0.9", 3, "undecided", "failure")):
+        # As an interrupted campaign leaves it, which --resume replaces without --overwrite.
         xml = tmp_path / f"{target}.xml"
+        xml.write_text("interrupted", encoding="utf-8")
         goal = ["--resume", "--flights", "5", "--at-least", target, "--junit", str(xml)]
         document = answered(capsys, code, *line[:-1], str(out), *goal)
         assert (document["exit_code"], document["answer"]) == (code, answer)
@@ -107,6 +110,22 @@ def test_the_answer_and_the_cases_of_continuous_integration_have_the_exit_code(
         assert [child.tag for child in case if child.tag != "system-out"] == ([result] if result else [])
         assert output.text is not None
         assert output.text.startswith(f"P >= {target}")
+
+
+@pytest.mark.parametrize(("flights", "said"), [(58, 1), (59, 0)])
+def test_a_target_beyond_the_flights_is_said_before_they_are_flown(
+    flights: int, said: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """0.95 ** 58 is 0.051, more than 1 - 0.95."""
+    lines: list[str] = []
+    monkeypatch.setattr(campaigns, "report_line", lines.append)
+    campaigns._warn_of_too_few_flights(Goal(0.95, False, flights))
+    warning = (
+        "warning: 58 flights cannot show P >= 0.95, even if all are flyable: 59 flights without a failure are needed"
+    )
+    assert lines == [warning] * said
+    campaigns._warn_of_too_few_flights(Goal(None, False, 1))
+    assert len(lines) == said
 
 
 def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -26,7 +26,8 @@ def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pyt
     # The next step is a line that a shell takes as it stands.
     assert capsys.readouterr().out.splitlines()[-1] == f"next      planfly report {shlex.quote(str(log))}"
     for options, message in (
-        (["--aircraft", "boeing"], "flight.aircraft: no aircraft called 'boeing'"),
+        (["--aircraft", "boeing"], "planfly: --aircraft boeing: no aircraft called 'boeing'"),
+        (["--aircraft", "./nothere"], "planfly: --aircraft ./nothere: nothere/nothere.toml: No such file"),
         (["--airspeed", "70"], "airspeed_mps: 70"),
         (["--airspeed", "28"], None),
         (["--airspeed", "-3"], "a number above 0"),
@@ -52,6 +53,8 @@ def test_a_thinner_log_is_judged_as_it_is(flight: Path, tmp_path: Path) -> None:
     assert thin.recorded_verdict is not None
     answer = json.loads((tmp_path / "v.json").read_text(encoding="utf-8"))
     assert answer.pop("returns")["line"]
+    # The first line that the command prints.
+    assert answer.pop("headline") == thin.recorded_verdict["summary"].splitlines()[0]
     assert answer == thin.recorded_verdict | {"exit_code": code}
 
 

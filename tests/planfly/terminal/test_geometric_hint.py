@@ -68,4 +68,9 @@ def test_required_returns_that_fail_refer_to_their_own_suggestions() -> None:
     assert any(line.endswith(hint) for line in verdict_lines(verdict, ()))
     assert texts(verdict, suggests=True) == []
     own_end = replace(unsafe, place=Place("waypoint", 4), limit_source="none")
-    assert not any(line.endswith(hint) for line in verdict_lines(replace(verdict, findings=(own_end,)), ()))
+    verdict = replace(verdict, findings=(own_end,))
+    assert not any(line.endswith(hint) for line in verdict_lines(verdict, ()))
+    # The reason of the return after the last item says what prevents it.
+    assert texts(verdict, suggests=True) == []
+    high = make_finding("clearance", Place("leg", 1), ok=False, reason="low")
+    assert texts(replace(verdict, findings=(high, own_end)), suggests=True) == ["no change was found"]

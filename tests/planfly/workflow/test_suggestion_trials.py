@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from flight.mission.edits import movable_indices, raise_items
+from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
 from logs.verdict.places import FLIGHT, Change, ItemMove, Place, RemainingFinding, Suggestion
@@ -133,6 +134,11 @@ def test_legs_that_are_low_because_home_is_below_the_ground_are_offered_homes_al
     judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 0"))
     texts = {finding.suggestion for finding in judged.failed if finding.rule == "clearance"}
     assert texts == {"set home to 100.0 m AMSL, the ground there, instead of 0.0 m"}
+    # With an item in the place of home there is no altitude of home to set.
+    setup = setup_of(*lines, home="36.5 -84.2 0")
+    mission = replace(setup.mission, warnings=(f"a.waypoints:2: {HOME_LINE_MISSING_TEXT}",))
+    judged = judge_mission_geometry(replace(setup, mission=mission))
+    assert {finding.suggestion for finding in judged.failed if finding.rule == "clearance"} == {""}
     # 60 m below the ground there, home is beyond the errors of heights, and 40 m below it is within them.
     for home, what in ((40.0, "home altitude"), (60.0, "height")):
         lines = [wp(0, 500 + 1000 * k, 50.0) for k in range(3)]
@@ -198,6 +204,18 @@ def test_a_step_that_is_too_small_in_flight_is_enlarged_by_what_is_missing(monke
     [tried] = tried_suggestions(trials.find_passing())
     assert tried.suggestions == (higher(1, 23.0),)
     assert flights.count == 2
+
+
+def test_no_larger_step_shortens_a_flight_to_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """99 %, and half of the remaining 1 %, round up to 100 %."""
+
+    def long(percent: float) -> Finding:
+        change = Change("duration", FLIGHT, None, percent, "%")
+        return replace(make_finding("energy", FLIGHT, ok=False, reason=""), suggestions=((change,),))
+
+    trials, flights = trials_of(monkeypatch, [long(99.0)], lambda _: [long(50.0)])
+    assert trials.find_passing() == []
+    assert flights.count == 1
 
 
 def test_another_leg_that_then_fails_is_raised_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

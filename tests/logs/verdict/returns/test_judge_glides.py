@@ -243,9 +243,9 @@ def no_return(setup: FlightSetup, used: float = 0.0, flown: float = 0.0, **param
 def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> None:
     """10 Wh, 2 of them reserve; a return takes some 7 Wh for its circle, and 4 Wh a kilometre."""
     setup = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
-    each = judge_returns(
-        make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 4.0), 4.0
-    ).each
+    starts = planned_starts(setup, 4.0)
+    starts.energy_used[:] = 0.0
+    each = judge_returns(make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), starts, 4.0).each
     point = no_return(setup, flown=0.02, RTL_ALTITUDE=600.0)
     leaves = [one.energy_left - 0.02 * one.time for one in each]
     last = max(one.time for one, left in zip(each, leaves, strict=True) if left >= 2.0)
@@ -273,7 +273,9 @@ def test_more_wind_against_the_way_back_brings_it_nearer(tmp_path: Path) -> None
 
 def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
-    returns = judge_returns(make_return_world(setup), planned_starts(setup, 20.0), 20.0)
+    unknown = planned_starts(setup, 20.0)
+    unknown.energy_used[:] = math.nan
+    returns = judge_returns(make_return_world(setup), unknown, 20.0)
     assert returns.point_of_no_return.kind == "used"
     assert "the energy used before is unknown" in point_of_no_return_text(returns)
     guessed = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, battery_guessed=True)))

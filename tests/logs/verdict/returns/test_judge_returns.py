@@ -112,14 +112,50 @@ def test_it_goes_to_the_nearest_rally_point_within_the_limit(tmp_path: Path) -> 
 
 
 def test_energy_that_is_not_there_is_told(tmp_path: Path) -> None:
-    # A return of 6 km takes some 9 Wh: of 10 Wh 8 may be used.
+    # A return of 6 km takes some 9 Wh, besides what is used before: of 10 Wh 8 may be used.
     found = judged(hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n"), RTL_ALTITUDE=600.0)
     assert [one.kind for one in found.each][-1] == "energy"
     assert found.each[0].kind == "safe"
     assert found.reserve == pytest.approx(2.0)
     ends = [one for one in found.each if one.kind == "energy"]
     assert all(one.energy_left < 2.0 for one in ends)
-    assert all(one.energy_left == pytest.approx(10.0 - one.energy) for one in found.each)
+    assert all(one.energy_left == pytest.approx(10.0 - one.energy_used - one.energy) for one in found.each)
+
+
+def test_a_return_after_the_battery_is_empty_fails_also_where_nothing_was_flown(tmp_path: Path) -> None:
+    """The battery holds half of the mission's energy, and 80 % of this may be used: 40 % of the mission's."""
+    setup = hill_setup(tmp_path)
+    (needed,) = (one.planned for one in judge_geometry(setup).findings if one.rule == "energy")
+    assert needed is not None
+    found = judged(replace(setup, battery=0.5 * needed), RTL_ALTITUDE=600.0)
+    assert found.each[0].energy_used == 0.0
+    # On one straight leg, energy grows evenly with time, up to the energy of the mission.
+    last = found.each[-1]
+    assert [one.energy_used for one in found.each] == pytest.approx(
+        [last.energy_used * one.time / last.time for one in found.each], rel=0.02
+    )
+    assert last.energy_used == pytest.approx(needed, rel=0.02)
+    late = [one for one in found.each if one.energy_used > 0.4 * needed]
+    assert {one.kind for one in late} == {"energy"}
+    assert "ends with an empty battery" in range_text(found.ranges[0], found, setup.scenario)
+
+
+def test_a_return_after_an_unknown_use_of_energy_is_undecided(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    world, starts = make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
+    known = judge_returns(world, starts, 20.0)
+    assert known.safe
+    assert "Wh are left" in headline(known)
+    starts.energy_used[:] = math.nan
+    found = judge_returns(world, starts, 20.0)
+    assert {one.kind for one in found.each} == {"used"}
+    assert (found.safe, found.undecided, found.point_of_no_return.kind) == (False, True, "used")
+    assert headline(found) == (
+        f"of {len(starts)} returns {len(starts)} are not judged by energy, as the energy used before is unknown;"
+        " 0 are safe"
+    )
+    # With a guessed battery energy is not judged at all.
+    assert judge_returns(replace(world, setup=guessed(setup)), starts, 20.0).safe
 
 
 def test_a_mission_that_returns_is_asked_up_to_there(tmp_path: Path) -> None:
@@ -312,7 +348,7 @@ def guessed(setup: FlightSetup) -> FlightSetup:
 def test_energy_that_may_not_suffice_is_undecided(tmp_path: Path) -> None:
     """Power with a deviation of 0.4: exp(1.645 x 0.4) = 1.931 times as much at the upper end."""
     setup = hill_setup(tmp_path)
-    used = max(one.energy for one in judged(setup, 20.0, RTL_ALTITUDE=600.0).each)
+    used = max(one.energy_used + one.energy for one in judged(setup, 20.0, RTL_ALTITUDE=600.0).each)
     limits = replace(setup.limits, envelope=replace(setup.envelope, power_sd=0.4))
     for battery, worst in (
         (1.02 * 1.931 * used / 0.8, "safe"),

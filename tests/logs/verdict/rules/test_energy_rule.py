@@ -120,6 +120,16 @@ def test_a_suggested_battery_holds_the_energy_that_may_be_needed() -> None:
     assert suggest_using_less_energy(requirements, None, finding) == ()
 
 
+@pytest.mark.parametrize(("energy", "percents"), [(960.0, [99.0]), (970.0, [])])
+def test_no_flight_is_shortened_to_nothing(energy: float, percents: list[float]) -> None:
+    """100 times the limit of 9.6 Wh leave 1 % of the flight; 101 times round up to 100 %."""
+    requirements = route_requirements(replace(real_setup(), battery=12.5))
+    finding = make_finding("energy", FLIGHT, ok=False, reason="", planned=energy, limit=9.6, margin=9.6 - energy)
+    *shorter_flights, [battery] = suggest_using_less_energy(requirements, None, finding)
+    assert [change.wanted for [change] in shorter_flights] == percents
+    assert battery.what == "battery"
+
+
 def test_a_guessed_battery_is_not_judged() -> None:
     guess = replace(load_envelope(AEROSONDE), battery_guessed=True)
     # Neither a battery that would do nor one that would not.
@@ -270,6 +280,11 @@ def test_px4_without_a_capacity_reads_the_charge_from_the_voltage(threshold: flo
     setup = replace(real_setup(), autopilot=made)
     needed, _ = predicted_energy(route_requirements(setup))
     assert of(judge_geometry(replace(setup, battery=needed / 0.5)), "energy").ok is ok
+
+
+def test_a_small_battery_is_said_with_its_digits(setup: FlightSetup) -> None:
+    small = replace(setup, battery=5.55)
+    assert " Wh of 5.55 Wh used" in of(judge(small, fly_path(small)), "energy").reason
 
 
 def test_an_empty_battery_is_said_and_what_is_needed_follows_from_the_prediction(setup: FlightSetup) -> None:

@@ -18,6 +18,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
+from planfly.terminal.verdict_lines import verdict_lines
 from planfly.workflow.airframe import load_airframe, max_turn_bank
 from planfly.workflow.open_flight import make_setup, open_flight
 from tests.logs.verdict.judging import of
@@ -71,6 +72,12 @@ def test_in_open_country_a_circle_that_is_flown_wider_is_flyable() -> None:
     """63 m take 43 degrees of bank."""
     assert judge_geometry(loiter(TIME, OWN)).flyable
     assert judge_geometry(loiter(TIME, OWN)).headline == "flyable"
+    # Its radius of 63 m is beyond the limit, so that it is not the radius that makes it pass.
+    assert of(judge_geometry(loiter(TIME, OWN)), "loiter").margin is None
+    (line,) = (line for line in verdict_lines(judge_geometry(loiter(TIME, OWN)), []) if line.startswith("  loiter"))
+    assert "1 of 1 ok; waypoint 1 (item 2): " in line
+    assert "WP_LOITER_RAD is smaller than the " in line
+    assert line.endswith("flown wider")
 
 
 def sphere(east: float, radius: float) -> dict[str, Any]:

@@ -244,6 +244,22 @@ def test_the_return_after_the_last_item_counts_as_an_items(
         assert ok is not False or "the return after the last item hits the ground" in verdict.headline
 
 
+def test_the_return_of_a_mission_without_home_is_not_judged_and_the_first_line_says_so() -> None:
+    """As without elevation data: flyable, a line that says why, and a skipped case."""
+    setup = behind_a_hill(*BEHIND_THE_HILL)
+    homeless = replace(setup, mission=replace(setup.mission, home=None))
+    reason = "the mission has no home, to which ArduPlane returns by itself after the last item"
+    for verdict in (judge_geometry(homeless), flown(homeless)[0]):
+        assert (verdict.flyable, verdict.undecided) == (True, False)
+        assert verdict.headline.startswith("flyable; return not judged")
+        assert f"Not judged: return ({reason})" in verdict.lines
+        assert (of(verdict, "return").ok, of(verdict, "return").reason) == (None, reason)
+        assert f'<skipped message="not judged: {reason}" />' in verdict.to_junit("a")
+    # Where ArduPlane does not return by itself, there is nothing to say.
+    endless = behind_a_hill(BEHIND_THE_HILL[0], UNLIMITED)
+    assert judge_geometry(replace(endless, mission=replace(endless.mission, home=None))).headline == "flyable"
+
+
 @pytest.mark.parametrize(
     ("east", "above", "judged"),
     [(0.0, 0.0, False), (0.0, 1.0, False), (6.0, -8.0, False), (6.0, 9.0, True), (0.0, 30.0, True)],

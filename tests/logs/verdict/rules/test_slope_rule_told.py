@@ -107,6 +107,19 @@ def test_an_ability_too_small_is_told_with_its_direction(
         assert f"in 20 s at {wanted} 4.0° at 25 m/s here; the leg needs 6.0°" in item.reason
 
 
+def test_what_the_leg_needs_is_said_once_after_all_that_is_too_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = Ability(math.radians(4.0), math.radians(0.05), 20.0)
+    measure = SlopeMeasure(ability=shown, height_error=-20.0, is_finished=True)
+    monkeypatch.setattr(slope_rule, "measure_slope", lambda *_: measure)
+    autopilot = ArduPlane(ArduPilotParameters.defaults()).with_parameters(TECS_CLMB_MAX=2.0, AIRSPEED_MAX=30.0)
+    setup = replace(make_setup(hill(6.0)), autopilot=autopilot)
+    requirements = route_requirements(setup, envelope=True)
+    reason = slope_findings(requirements, align_track(requirements, fly_path(setup, rate=5.0)))[1].reason
+    assert "the aircraft showed that it can climb 4.0°" in reason
+    assert "TECS_CLMB_MAX 2 m/s permits a climb of 4.4° at 26.3 m/s; the leg needs 6.0°" in reason
+    assert reason.count("the leg needs") == 1
+
+
 def test_height_above_and_below_the_leg(monkeypatch: pytest.MonkeyPatch) -> None:
     for error, side in ((12.0, "above"), (-12.0, "below")):
         item = judged(SlopeMeasure(height_error=error, is_finished=True), monkeypatch, 3.0)

@@ -253,3 +253,34 @@ def test_a_lost_flight_counts_against_either_answer() -> None:
     # Twenty failures of a hundred miss it; twenty that were lost may all have flown.
     assert prove.decides(Tally(80, 20))
     assert not prove.decides(Tally(80, 0, 20))
+
+
+@pytest.mark.parametrize(
+    ("goal", "tally"),
+    [
+        (Goal(0.8, False, 40), Tally(36, 4)),
+        (Goal(0.8, False, 20), Tally(14, 6)),
+        (Goal(0.9, True, 20), Tally(20, 0)),
+        (Goal(0.99, False, 40), Tally(40, 0)),
+    ],
+)
+def test_one_flight_less_than_those_that_decide_does_not(goal: Goal, tally: Tally) -> None:
+    estimator = Estimator(goal)
+    assert estimator.estimate(tally).answer == "undecided"
+    flights = estimator.deciding_flights(tally)
+    assert flights is not None
+    assert goal.target is not None
+    to_whole = math.floor if tally.share >= goal.target else math.ceil
+
+    def answer(count: int) -> str:
+        flyable = to_whole(round(tally.share * count, 9))
+        return estimator.estimate(Tally(flyable, count - flyable)).answer
+
+    assert (answer(flights), answer(flights - 1)) == (
+        "reached" if tally.share >= goal.target else "missed",
+        "undecided",
+    )
+
+
+def test_at_the_target_itself_no_number_decides() -> None:
+    assert Estimator(Goal(0.75, False, 4)).deciding_flights(Tally(3, 1)) is None

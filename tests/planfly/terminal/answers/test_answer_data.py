@@ -41,6 +41,8 @@ def test_plan_run_and_fly(capsys: Output) -> None:
     fly = answered(capsys, 0, "fly", "plan.json", "--log", "f.mcap")
     assert (fly["mission"], fly["log"], fly["autopilot_log"]) == ("plan.json", "f.mcap", None)
     assert fly["verdict"]["flyable"] is True
+    assert fly["headline"] == fly["verdict"]["summary"].splitlines()[0]
+    assert run["headline"] == run["verdict"]["summary"].splitlines()[0]
 
 
 @pytest.mark.usefixtures("blank_pictures")
@@ -49,7 +51,8 @@ def test_what_is_asked_of_a_log(capsys: Output) -> None:
     log = read_log(Path("a.mcap"))
     check = answered(capsys, 4, "check", "a.mcap")
     report = answered(capsys, 4, "report", "a.mcap", "--out", "pages")
-    assert report["verdict"] | {"exit_code": 4, "returns": None} == check
+    headline = report["verdict"]["summary"].splitlines()[0]
+    assert report["verdict"] | {"exit_code": 4, "headline": headline, "returns": None} == check
     assert sorted(report["files"]) == sorted(str(path) for path in Path("pages").iterdir())
     replay = answered(capsys, 0, "replay", "a.mcap", "--from", "5")
     assert replay["end_s"] == log.end_time
