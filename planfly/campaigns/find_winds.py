@@ -307,7 +307,7 @@ class _Search:
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * len(rows)
         self.undecided = [(number, row.undecided_text) for number, row in enumerate(rows) if row.undecided_text]
-        failed = [row.failed for row in rows if not row.undecided_text]
+        failed = [row.failures for row in rows if row.outcome != "undecided"]
         calm = CalmFailures(0.0, len(rows), len(failed), count_failures(failed))
         return replace(self.result(), boundaries=boundaries, calm=calm, failures=())
 
@@ -362,13 +362,13 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
     draws, rows = iter(range(count)), dict[int, FlightRow]()
 
     def next_request() -> FlightRequest | None:
-        has_failed_only = all(row.outcome == "not flyable" for row in rows.values())
-        draw = next(draws, None) if has_failed_only else None
+        has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
+        draw = next(draws, None) if has_none_flyable else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
 
     for request, row in pool.fly(next_request):
         rows[request.index] = row
-    if any(row.outcome != "not flyable" for row in rows.values()):
+    if any(row.outcome in ("flyable", "lost") for row in rows.values()):
         return []
     return [rows[draw] for draw in range(count)]
 

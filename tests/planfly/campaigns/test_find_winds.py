@@ -145,7 +145,7 @@ def test_flights_that_are_not_judged_in_full_are_no_failures(wind_base: Campaign
     """From N 6 flights are undecided and 6 fail; from E 150 fly, in 20 m/s, and one is undecided."""
     search = _Search(GOAL, wind_base)
     loiter = (("loiter", Place("waypoint", 4)),)
-    undecided = FlownFlight("not flyable", loiter, undecided="loiters (state the bank limit)")
+    undecided = FlownFlight("undecided", loiter, undecided="loiters (state the bank limit)")
     flown = [(0, 5.0, undecided)] * 6 + [(0, 10.0, FlownFlight("not flyable", loiter))] * 6
     flown += [(1, 20.0, FlownFlight("flyable", ()))] * MIN_FLIGHTS_PER_DIRECTION + [(1, 20.0, undecided)]
     for number, (direction, speed, outcome) in enumerate(flown):
@@ -172,10 +172,9 @@ def undecided_flight(base: CampaignBase, index: int, wind: GivenWind | None = No
     """A flight whose loiter is not judged."""
     return replace(
         made_flight(base, index, wind),
-        outcome="not flyable",
+        outcome="undecided",
         failed=(("loiter", LEG),),
-        undecided=True,
-        unjudged=(("threat", "threats (no scenario)"), ("loiter", "loiters (a guess)")),
+        undecided_text="loiters (a guess)",
     )
 
 

@@ -54,8 +54,8 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
     ("more", "words"),
     [
         (["--refly", "9"], "no such flight"),
-        (["--refly", "2", "--json", "-"], "--json: only with a campaign"),
-        (["--refly", "2", "--junit", "r.xml"], "--junit: only with a campaign"),
+        (["--refly", "2", "--json", "-"], "--json: cannot be combined with --refly"),
+        (["--refly", "2", "--junit", "r.xml"], "--junit: cannot be combined with --refly"),
         ([], "--resume continues it"),
         (["--resume", "--seed", "2"], "belongs to another campaign: seed 2 instead of 1"),
         (["--refly", "1", "--wind", "8,250"], "belongs to another campaign: wind.speed_mps 8.0 instead of 5.0"),
