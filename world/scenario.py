@@ -30,7 +30,7 @@ from world.files import absolute_path, did_you_mean, toml_text, write_atomically
 from world.forecast.forecast import Forecast
 from world.forecast.scenario_wind import ForecastSite, forecast_wind, scenario_forecast
 from world.forecast.wind_field import PROFILE_HEIGHTS_M, fit_profile_line
-from world.frames import GeoOrigin, to_geo
+from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo
 from world.html_table import html_table
 from world.map_positions import check_altitude, check_in_area, make_threats, map_coordinates, map_position
 from world.radio import RadioLink, make_link, station_position
@@ -64,6 +64,8 @@ from world.wording import count_text
 
 # Radius of a threat below which a note asks for its unit, m; no missile or radar has one as small.
 MIN_PLAUSIBLE_RADIUS_M = 10.0
+# Tolerance of positions in a forecast, deg: 1 m.
+_GEO_TOLERANCE_DEG = 1e-5
 # Width of terrain that is kept around the area, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
 
@@ -160,6 +162,19 @@ class Scenario:
             return self.wind.velocities_at(altitudes)
         found = field.interpolate(seconds, *to_geo(self.origin, positions[:, 0], positions[:, 1]), altitudes)
         return self.wind.velocities_at(np.ascontiguousarray(found[:, 2])) + found[:, :2]
+
+    @property
+    def geo_map(self) -> PolyMap | None:
+        """Map from east and north (m) to longitude and latitude (deg), which a forecast needs; None without one."""
+        if self.wind.field is None:
+            return None
+
+        def to_near_geo(east: Floats, north: Floats) -> tuple[Floats, Floats]:
+            """Return longitude and latitude; the longitude does not jump at 180 degrees."""
+            latitudes, longitudes = to_geo(self.origin, east, north)
+            return self.origin.lon_deg + (longitudes - self.origin.lon_deg + 180.0) % 360.0 - 180.0, latitudes
+
+        return fit_polymap(to_near_geo, self.bounds, _GEO_TOLERANCE_DEG)
 
     def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
         """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).

@@ -18,6 +18,8 @@ from flight.dynamics.envelope_tables import read_tables, write_tables
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import trim
 from world.arrays import Floats
+from world.forecast.wind_field import interpolate_field, without_levels_above
+from world.frames import POLYMAP, PolyMap, polymap
 from world.kernels import Record, inner, record_dtype
 from world.least_squares import least_squares
 from world.wind import Wind, mean_wind_speed
@@ -28,6 +30,8 @@ _THROTTLE_COUNT = 21
 _AIRSPEED_COUNT = 7
 # Altitudes of the grid, m AMSL.
 _ALTITUDES_M = (0.0, 2000.0, 4000.0)
+# Height above the start of a mission up to which the strongest wind of a forecast counts, m.
+_MAX_WIND_HEIGHT_M = 2000.0
 
 # The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each
 # altitude of the grid.
@@ -44,7 +48,9 @@ POINT_MASS = record_dtype(
     "wind_north",
     "wind_gradient",
     "wind_reference",
+    "max_wind",  # m/s, strongest wind that a flight may meet
     ("has_power", np.bool_),
+    ("geo_map", POLYMAP),  # from east and north to longitude and latitude, deg; used with a wind field
 )
 
 
@@ -55,24 +61,28 @@ class PointMass(NamedTuple):
     excess: specific excess power, m/s, (t, v, h), with t throttles from 0 to 1.
     power: electric power at idle, in level flight and at full throttle, W, (3, v, h).
     glides: True if the excess power with closed throttle is known from trims.
+    field: packed deviation of a forecast's wind from the mean wind of the record; empty for none.
     """
 
     record: Record
     excess: Floats
     power: Floats
     glides: bool = True
+    field: Floats = np.zeros(0)
 
-    def in_wind(self, wind: Wind) -> "PointMass":
-        """Return the point mass in another wind."""
-        record = self.record.copy()
-        set_wind(record, wind)
-        return self._replace(record=record)
+    @property
+    def tables(self) -> tuple[Record, Floats, Floats, Floats]:
+        """Record, tables and field as compiled functions take them."""
+        return self.record, self.excess, self.power, self.field
 
 
-def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
+def make_point_mass(
+    aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind, geo_map: PolyMap | None = None
+) -> PointMass:
     """Return the point mass of an aircraft from its trims, in a wind.
 
     airspeed: commanded equivalent airspeed, m/s.
+    geo_map: map from east and north to longitude and latitude, deg; without it, only the mean wind is used.
 
     Beyond the grid of trims, the values at the grid's edge apply.
     """
@@ -87,14 +97,17 @@ def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, win
     record.airspeed_step, record.altitude_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
     record.alpha, record.alpha_lift = alpha, lift
     record.induced = _induced_drag_factor(speeds, excess[0, :, 0])
-    set_wind(record, wind)
-    return PointMass(record, excess.copy(), power, glides)
-
-
-def set_wind(record: Record, wind: Wind) -> None:
-    """Set the wind of a `POINT_MASS` record."""
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
     record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
+    record.max_wind = wind.speed
+    point_mass = PointMass(record, excess.copy(), power, glides)
+    if wind.field is None or geo_map is None:
+        return point_mass
+    record.geo_map = geo_map.record
+    low_field = without_levels_above(wind.field, wind.reference_amsl + _MAX_WIND_HEIGHT_M)
+    winds = wind.velocities_at(low_field.altitudes.ravel()) + low_field.velocities.reshape(-1, 2)
+    record.max_wind = np.hypot(winds[:, 0], winds[:, 1]).max()
+    return point_mass._replace(field=wind.field.packed())
 
 
 # Version of the cached tables: increase it with any change of `_compute_trim_tables`.
@@ -223,6 +236,23 @@ def angle_of_attack(state: Record, aircraft: Record) -> float:
 
 
 @inner
+def wind_at(position: Record, seconds: float, aircraft: Record, field: Floats) -> tuple[float, float]:
+    """Return the wind at a position and a time (s after take-off), m/s, east and north.
+
+    position: a record with `east`, `north` and `up`, m.
+    aircraft: a record of `POINT_MASS`.
+    field: as in `PointMass`.
+    """
+    if not field.size:
+        speed = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, position.up)
+        return speed * aircraft.wind_east, speed * aircraft.wind_north
+    longitude, latitude = polymap(aircraft.geo_map, position.east, position.north)
+    east, north, altitude = interpolate_field(field, seconds, latitude, longitude, position.up)
+    speed = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, altitude)
+    return speed * aircraft.wind_east + east, speed * aircraft.wind_north + north
+
+
+@inner
 def advance_point_mass(
     estimated: Record,
     state: Record,
@@ -231,6 +261,7 @@ def advance_point_mass(
     aircraft: Record,
     excess_table: Floats,
     power: Floats,
+    field: Floats,
     dt: float,
 ) -> float:
     """Move a point mass by ``dt`` s, and return the electric power used, W.
@@ -238,6 +269,9 @@ def advance_point_mass(
     path_angle: climb angle relative to the air, rad.
     aircraft: a record of `POINT_MASS`.
     excess_table, power: tables of a `PointMass`.
+    field: as in `PointMass`.
+
+    The state's wind is the wind at its time and position, before and after the movement.
     """
     thrust_power = excess_power(excess_table, throttle, state.airspeed, estimated.up, aircraft)
     tan_bank = math.tan(min(1.2, abs(state.roll)))
@@ -247,14 +281,15 @@ def advance_point_mass(
     state.airspeed = max(
         3.0, state.airspeed + (GRAVITY * net_power / state.airspeed - GRAVITY * math.sin(path_angle)) * dt
     )
-    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, estimated.up)
     horizontal_airspeed = state.airspeed * math.cos(path_angle)
-    estimated.velocity_east = horizontal_airspeed * math.sin(state.yaw) + wind * aircraft.wind_east
-    estimated.velocity_north = horizontal_airspeed * math.cos(state.yaw) + wind * aircraft.wind_north
+    estimated.velocity_east = horizontal_airspeed * math.sin(state.yaw) + state.wind_east
+    estimated.velocity_north = horizontal_airspeed * math.cos(state.yaw) + state.wind_north
     estimated.velocity_up = state.airspeed * math.sin(path_angle)
     estimated.east += estimated.velocity_east * dt
     estimated.north += estimated.velocity_north * dt
     estimated.up += estimated.velocity_up * dt
+    state.time += dt
+    state.wind_east, state.wind_north = wind_at(estimated, state.time, aircraft, field)
     return electric_power
 
 

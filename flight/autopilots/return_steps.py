@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flight.autopilots.point_mass import angle_of_attack, excess_power
+from flight.autopilots.point_mass import angle_of_attack, excess_power, wind_at
 from flight.autopilots.simulated_returns import (
     MAX_IMPACT_DEPTH_M,
     RETURN_GROUND_IMPACT,
@@ -21,7 +21,6 @@ from world.frames import PolyMapRecord
 from world.geometry import wrap
 from world.kernels import Record, inner, record_dtype
 from world.terrain import ground_height
-from world.wind import mean_wind_speed
 
 # Lag of the flight path behind the pitch, s: the time in which lift turns the velocity of a small aircraft.
 PATH_LAG_S = 0.4
@@ -72,11 +71,14 @@ def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, resu
 
 
 @inner
-def initialise_state(start: Record, aircraft: Record, state: Record) -> None:
-    """Set airspeed and attitude of the point mass from the motion over the ground at the start, in the mean wind."""
-    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
-    air_east = start.velocity_east - wind * aircraft.wind_east
-    air_north = start.velocity_north - wind * aircraft.wind_north
+def initialise_state(start: Record, aircraft: Record, field: Floats, state: Record) -> None:
+    """Set time, wind, airspeed and attitude of the point mass from the motion over the ground at the start.
+
+    field: as in `flight.autopilots.point_mass.PointMass`.
+    """
+    state.time = start.time
+    state.wind_east, state.wind_north = wind_at(start, start.time, aircraft, field)
+    air_east, air_north = start.velocity_east - state.wind_east, start.velocity_north - state.wind_north
     climb_rate = start.velocity_up
     state.airspeed = max(1.0, math.hypot(math.hypot(air_east, air_north), climb_rate))
     state.yaw, state.roll = math.atan2(air_east, air_north), start.roll

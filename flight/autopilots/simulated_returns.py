@@ -13,8 +13,8 @@ from world.frames import POLYMAP, PolyMapRecord
 from world.kernels import Records, read_only, record_dtype
 from world.scenario import Scenario
 
-# Start of an RTL: position in map axes, m; velocity over the ground, m/s; bank, rad.
-RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
+# Start of an RTL: position in map axes, m; velocity over the ground, m/s; bank, rad; time after take-off, s.
+RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll", "time")
 
 # End of an RTL: it reached its landing sequence, or flew its loiter at the target altitude once around and for
 # `flight.mission.itinerary.ENDLESS_LOITER_TIME_S` s.

@@ -1,5 +1,7 @@
 """Plan a Pareto front for a scenario, with the default plan of every command and alternatives."""
 
+from dataclasses import replace
+
 from planfly.planning.gust_altitude_margin import limits_for_alternatives
 from planfly.planning.gust_orbits import max_waypoints_in_gusts
 from planfly.workflow.airframe import Airframe
@@ -7,6 +9,7 @@ from planfly.workflow.make_plan import Advance, finish_plan, make_plan
 from planner.plan import Plan
 from planner.search.plan_front import Front, plan_front
 from planner.search.search_state import StopCondition
+from world.errors import ForecastError
 from world.scenario import Scenario
 
 
@@ -30,7 +33,12 @@ def make_pareto_plans(
     default_plan = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
 
     def finish_alternative(plan: Plan) -> Plan:
-        return finish_plan(plan, airframe, continues=continues)
+        try:
+            return finish_plan(plan, airframe, continues=continues)
+        except ForecastError as error:
+            # The default plan is within the forecast; an alternative may take longer, or fly higher.
+            certificate = plan.certificate
+            return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, str(error))))
 
     return plan_front(
         scenario,

@@ -80,7 +80,13 @@ def return_setup(
     landing: the landing sequence that ends the return, or None.
     Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_airframe`.
     """
-    scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
+    wind = replace(world.scenario.wind, turbulence="none")
+    if wind.field is not None:
+        # The flight begins at time 0, and passes the start of the return after the lead-in.
+        lead_in_time = LEAD_IN_LENGTH_M / max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
+        times = wind.field.times - (float(start["time"]) - lead_in_time)
+        wind = replace(wind, field=replace(wind.field, times=times))
+    scenario = replace(world.scenario, wind=wind)
     airframe = replace(load_airframe(scenario), autopilot=world.autopilot)
     return replace(make_setup(scenario, airframe, _return_mission(world, start, landing), 1), nav="perfect"), airframe
 

@@ -9,6 +9,7 @@ from logs.verdict.measures.circle_reach import end_loiter_hazards
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.planning.gust_altitude_margin import ensure_altitude_margin
 from planfly.planning.gust_orbits import limit_waypoint_orbits
+from planfly.planning.local_wind import ensure_local_wind
 from planfly.workflow.airframe import Airframe, with_departure_and_approach
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planner.plan import Plan
@@ -43,8 +44,9 @@ def make_plan(
 
     All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
     waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`).  If gusts change the
-    altitude of the aircraft, the plan has a margin for the change (`planfly.planning.gust_altitude_margin`).  The
-    departure and the approach are added.  If the autopilot loiters at the end of the mission, the certificate names the
+    altitude of the aircraft, the plan has a margin for the change (`planfly.planning.gust_altitude_margin`).  In a
+    forecast, slopes and turns also hold in the local wind (`planfly.planning.local_wind`).  The departure and the
+    approach are added.  If the autopilot loiters at the end of the mission, the certificate names the
     hazards that may be too close to the loiter.
 
     A plan may take several searches, which share the scenario's budget of evaluations.
@@ -52,17 +54,17 @@ def make_plan(
     stop: stop condition of `planner.search.plan_path.plan_path`.
     flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.
     continues: True if the mission continues beyond the destination of the plan.
+
+    Raises ForecastError if the flight of the plan leaves the box, the levels or the times of the forecast.
     """
     limits = airframe.limits.with_margin()
 
     def complete_plan(plan: Plan, search: Search) -> Plan:
-        def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
-            return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, search_limits), search_limits)
+        def search_for(other_airframe: Airframe) -> Plan:
+            other_plan = search(plan.scenario, other_airframe.limits.with_margin())
+            return _complete_in_gusts(other_plan, other_airframe, search)
 
-        def search_within(search_limits: Limits) -> Plan:
-            return limit_orbits(search(plan.scenario, search_limits), search_limits)
-
-        return ensure_altitude_margin(limit_orbits(plan, limits), airframe, search_within)
+        return ensure_local_wind(_complete_in_gusts(plan, airframe, search), airframe, search_for)
 
     if flown_plan_and_leg is not None:
         old_plan, leg = flown_plan_and_leg
@@ -87,6 +89,18 @@ def make_plan(
     return _add_ground_phases(plan, airframe, continues=continues)
 
 
+def _complete_in_gusts(plan: Plan, airframe: Airframe, search: Search) -> Plan:
+    """Return a plan that gusts do not make unsafe, or the given plan as not safe."""
+
+    def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
+        return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, search_limits), search_limits)
+
+    def search_within(search_limits: Limits) -> Plan:
+        return limit_orbits(search(plan.scenario, search_limits), search_limits)
+
+    return ensure_altitude_margin(limit_orbits(plan, airframe.limits.with_margin()), airframe, search_within)
+
+
 def make_given_plan(scenario: Scenario, airframe: Airframe, seed: int, waypoints: Floats) -> Plan:
     """Return the plan of given waypoints (w, 3), m, without a search.
 
@@ -109,11 +123,12 @@ def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keep
 def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
     """Return a plan with departure and approach.
 
-    The certificate of the plan also names the hazards near its final loiter.
+    The certificate of the plan also names the hazards near its final loiter, and slopes and turns that cannot be flown
+    in the local wind.
 
     old_plan: the plan being flown, or None.
     """
-    plan = with_departure_and_approach(plan, airframe, old_plan)
+    plan = ensure_local_wind(with_departure_and_approach(plan, airframe, old_plan), airframe)
     if continues or not airframe.autopilot.loiters.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)

@@ -236,7 +236,7 @@ def _interpolate_points(
 # ----------------------------------------------------------------------
 # The mean profile of a field: what the planner and the limits of the verdict are computed with.
 
-# Heights above the start of a return to which the mean profile around it is fitted, m.
+# Heights above a place to which the mean profile around it is fitted, m.
 PROFILE_HEIGHTS_M = np.linspace(-100.0, 300.0, 9)
 # Number of altitudes of a mission to which its mean profile is fitted.
 _PROFILE_POINTS = 9

@@ -31,7 +31,6 @@ from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.return_path import LandingStart, nearest_landing_sequence
 from world.arrays import Floats
 from world.kernels import Record, Records
-from world.wind import mean_wind_speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,12 @@ def count_climb_rows(positions: Floats, end_altitude: float) -> int:
 
 
 def make_abort_start(
-    position: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass
+    position: Sequence[float],
+    course: float,
+    slope: float,
+    airspeed: float,
+    wind: tuple[float, float] = (0.0, 0.0),
+    time: float = 0.0,
 ) -> Records:
     """Return the start of a go-around at a position on a landing glide, as one `RETURN_START` record, (1,).
 
@@ -70,18 +74,18 @@ def make_abort_start(
     course: course of the glide over the ground, rad.
     slope: slope of the glide, m per m.
     airspeed: true airspeed, m/s.
-    aircraft: point mass, which also holds the wind.
+    wind: m/s, east and north.
+    time: time after take-off, s.
     """
     start: Records = np.zeros(1, RETURN_START)
-    record = aircraft.record
-    wind_speed = mean_wind_speed(record.wind_speed, record.wind_gradient, record.wind_reference, float(position[2]))
-    wind_east, wind_north = wind_speed * record.wind_east, wind_speed * record.wind_north
+    wind_east, wind_north = wind
     sin, cos = math.sin(course), math.cos(course)
     cross_wind = wind_east * cos - wind_north * sin
     speed = max(
         1.0, math.sqrt(max(1.0, airspeed * airspeed - cross_wind * cross_wind)) + wind_east * sin + wind_north * cos
     )
     start["east"], start["north"], start["up"] = position
+    start["time"] = time
     start["velocity_east"], start["velocity_north"], start["velocity_up"] = speed * sin, speed * cos, -speed * slope
     return start
 
@@ -112,7 +116,7 @@ def fly_go_arounds(
     >>> from world.wind import Wind
     >>> aerosonde = load_aircraft("aerosonde")
     >>> aircraft = make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
-    >>> start = make_abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, aircraft)
+    >>> start = make_abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0)
     >>> landings = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
     >>> world, parameters = make_return_environment(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
     >>> (track,) = fly_go_arounds(start, 840.0, 0.17, landings, parameters, aircraft, world).tracks
@@ -135,9 +139,7 @@ def fly_go_arounds(
             record,
             _climb_parameters(parameters, pitch),
             climb,
-            aircraft.record,
-            aircraft.excess,
-            aircraft.power,
+            *aircraft.tables,
             environment.heights,
             environment.to_pixel,
             environment.spheres,

@@ -144,9 +144,7 @@ def fly_returns(
             record,
             record,
             NO_CLIMB,
-            aircraft.record,
-            aircraft.excess,
-            aircraft.power,
+            *aircraft.tables,
             environment.heights,
             environment.to_pixel,
             environment.spheres,
@@ -219,7 +217,7 @@ def waypoint_ahead(start: Record) -> Records:
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
     """Return the timeout of an RTL, s, from the distances and altitude changes between the start and the stages."""
-    min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
+    min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     east, north, altitude, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
         distance = math.hypot(end["east"] - east, end["north"] - north)
@@ -239,6 +237,7 @@ def fly_stages(
     aircraft: Record,
     excesses: Floats,
     power: Floats,
+    field: Floats,
     heights: Heights,
     to_pixel: PolyMapRecord,
     spheres: Floats,
@@ -253,19 +252,18 @@ def fly_stages(
 ) -> None:
     """Simulate the flight from stage to stage for at most ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
-    stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last loiter is flown on.
     climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
     """
-    # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
-    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)
+    spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, LOITER_PROGRESS)  # Spaced as in `waypoint_column`.
     waypoints, loiter = spaced[::2], progress_records[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
     target, estimated, state, memory = waypoints[1], motions[0], states[0], memories[0]
     initialise_outcome(start, estimated, has_terrain, result)
     _load_stage(stages, 0, waypoints, estimated, memory)
-    _initialise_memory(start, parameters, aircraft, excesses, state, memory)
+    _initialise_memory(start, parameters, aircraft, excesses, field, state, memory)
     pitch, path_angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK_S
     roll_fraction, pitch_fraction, path_fraction = _lag_fractions(parameters, dt)
     stage, energy, max_roll_change = 0, 0.0, parameters.roll_rate_max * dt
@@ -302,7 +300,7 @@ def fly_stages(
         pitch += pitch_fraction * (memory.pitch_demand + parameters.pitch_trim - pitch)
         path_angle += path_fraction * (pitch - angle_of_attack(state, aircraft) - path_angle)
         throttle = 0.0 if engine_out else memory.throttle_demand
-        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, dt)
+        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, field, dt)
     if result.clearance <= 0.0:
         result.outcome = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
@@ -466,14 +464,20 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
 
 @inner
 def _initialise_memory(
-    start: Record, parameters: Record, aircraft: Record, excess_table: Floats, state: Record, memory: Record
+    start: Record,
+    parameters: Record,
+    aircraft: Record,
+    excess_table: Floats,
+    field: Floats,
+    state: Record,
+    memory: Record,
 ) -> None:
     """Set the state from the motion over the ground, and the control law's memory as after a long steady flight.
 
     Follows `flight.autopilots.arduplane.law.initialise_memory`, but also for a climb or a descent: the altitude demand
     is ahead of the aircraft by the demand's lag.
     """
-    initialise_state(start, aircraft, state)
+    initialise_state(start, aircraft, field, state)
     climb_rate = start.velocity_up
     memory.is_initialised = True
     memory.altitude_demand, memory.climb_rate_demand = start.up, climb_rate

@@ -52,7 +52,6 @@ from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII
 from world.arrays import Floats, Heights
 from world.frames import PolyMapRecord
 from world.kernels import Record, Records, compiled, inner
-from world.wind import mean_wind_speed
 
 # Duration of a tick, s.
 _TICK_S = 0.1
@@ -130,9 +129,7 @@ def _fly_one(
         route,
         transit_altitude,
         parameters,
-        aircraft.record,
-        aircraft.excess,
-        aircraft.power,
+        *aircraft.tables,
         environment.heights,
         environment.to_pixel,
         environment.spheres,
@@ -178,7 +175,7 @@ def _fill_stop(waypoint: Record, stop: LandingStart, parameters: Px4Parameters) 
 
 def _rtl_timeout(start: Record, target: ReturnTarget, parameters: Px4Parameters, aircraft: PointMass) -> float:
     """Return the timeout of an RTL, s, from its distances and altitude changes."""
-    min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
+    min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     climb_rate = min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"])
     sink_rate = min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"])
     stops = () if target.landing is None else target.landing.next_stops
@@ -201,6 +198,7 @@ def fly_rtl(
     aircraft: Record,
     excesses: Floats,
     power: Floats,
+    field: Floats,
     heights: Heights,
     to_pixel: PolyMapRecord,
     spheres: Floats,
@@ -224,15 +222,15 @@ def fly_rtl(
     estimated, state, memory, loiter = motions[0], states[0], memories[0], progress_records[0]
     target = waypoints[waypoints.shape[0] - 1]
     initialise_outcome(start, estimated, has_terrain, result)
-    _initialise_memory(start, waypoints, parameters, aircraft, excesses, state, memory)
+    _initialise_memory(start, waypoints, parameters, aircraft, excesses, field, state, memory)
     pitch, path_angle, dt, energy = state.pitch, state.pitch - state.alpha, _TICK_S, 0.0
-    lands, has_begun_sequence = not target.is_rtl, False
+    lands, has_begun = not target.is_rtl, False
     for tick in range(int(timeout / dt)):
         time = tick * dt
         if tick % _STORED_EVERY_TICKS == 0:
             store_position(estimated, positions, result)
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas_to_tas_ratio(estimated.up) ** 2
-        has_arrived = _update_arrival(estimated, waypoints, memory, radius, lands, has_begun_sequence, time, result)
+        has_arrived = _update_arrival(estimated, waypoints, memory, radius, lands, has_begun, time, result)
         update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
         if result.outcome == RETURN_TIMEOUT:
             if result.clearance < min_clearance or result.sphere_distance < min_distance:
@@ -242,12 +240,10 @@ def fly_rtl(
         if result.outcome != RETURN_TIMEOUT:
             break
         state.pitch = pitch
-        has_begun_sequence = _steer(
-            state, estimated, waypoints, transit_altitude, parameters, memory, aircraft, lands, has_begun_sequence, dt
-        )
+        has_begun = _steer(state, estimated, waypoints, transit_altitude, parameters, memory, lands, has_begun, dt)
         pitch, path_angle = _follow_setpoints(state, parameters, memory, aircraft, pitch, path_angle, dt)
         throttle = memory.throttle_setpoint
-        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, dt)
+        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, field, dt)
     if result.clearance <= 0.0:
         result.outcome = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
@@ -289,14 +285,12 @@ def _steer(
     transit_altitude: float,
     parameters: Record,
     memory: Record,
-    aircraft: Record,
     lands: bool,
     has_begun_sequence: bool,
     dt: float,
 ) -> bool:
     """Set the setpoints of bank, pitch and throttle; return True once an RTL to a landing flies its sequence."""
-    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, estimated.up)
-    wind_east, wind_north = wind * aircraft.wind_east, wind * aircraft.wind_north
+    wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
     # Guidance gets the true airspeed; from 1.17 on it gets the equivalent airspeed, which it treats as true airspeed.
     airspeed_scale = eas_to_tas if parameters.uses_switch_distance else 1.0
@@ -360,6 +354,7 @@ def _initialise_memory(
     parameters: Record,
     aircraft: Record,
     excesses: Floats,
+    field: Floats,
     state: Record,
     memory: Record,
 ) -> None:
@@ -367,7 +362,7 @@ def _initialise_memory(
 
     In a steady climb the altitude reference is ahead of the aircraft by the lag of TECS.
     """
-    initialise_state(start, aircraft, state)
+    initialise_state(start, aircraft, field, state)
     climb_rate, eas_to_tas = start.velocity_up, eas_to_tas_ratio(start.up)
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up

@@ -15,6 +15,7 @@ straight path, or exceed them: by 1.0 % at the most in still air, and by 1.8 % i
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -272,31 +273,60 @@ _ALTITUDE_STEP_M = 100.0
 _MIN_GROUND_SPEED_MPS = 1.0
 
 
-def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_altitude: float) -> GlideSlopes:
-    """Return the glide slopes between two altitudes (m AMSL) at an equivalent airspeed (m/s)."""
+# Function that returns n possible winds at each of h altitudes (m AMSL), m/s, (n, h, 2).
+PossibleWinds = Callable[[Floats], Floats]
+
+
+def glide_slopes(
+    aircraft: PointMass,
+    airspeed: float,
+    min_altitude: float,
+    max_altitude: float,
+    possible_winds: PossibleWinds | None = None,
+) -> GlideSlopes:
+    """Return the glide slopes between two altitudes (m AMSL) at an equivalent airspeed (m/s).
+
+    possible_winds: winds of a forecast, of which the worst on each course is used; None for the mean wind.
+    """
     courses = np.array(glide_steps()[0]["course"])
-    slopes = np.empty((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
-    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, slopes)
+    slopes = np.zeros((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
+    altitudes: Floats = min_altitude + _ALTITUDE_STEP_M * np.arange(slopes.shape[1], dtype=np.float64)
+    winds = np.zeros((0, 0, 2)) if possible_winds is None else possible_winds(altitudes)
+    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, winds, slopes)
     return GlideSlopes(min_altitude, _ALTITUDE_STEP_M, slopes)
 
 
 @compiled
 def _fill_slopes(
-    aircraft: Record, excess: Floats, airspeed: float, courses: Floats, min_altitude: float, slopes: Floats
+    aircraft: Record,
+    excess: Floats,
+    airspeed: float,
+    courses: Floats,
+    min_altitude: float,
+    winds: Floats,
+    slopes: Floats,
 ) -> None:
-    """Fill the table `slopes`, (c, h), with glide slopes by course and altitude."""
+    """Fill the table `slopes`, (c, h), which is 0, with glide slopes by course and altitude.
+
+    winds: possible winds by altitude, m/s, (n, h, 2), of which the worst is used; none for the mean wind.
+    """
     for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
         true_airspeed = airspeed * eas_to_tas_ratio(altitude)
         sink = max(0.0, -excess_power(excess, 0.0, true_airspeed, altitude, aircraft))
         horizontal_speed = math.sqrt(max(0.0, true_airspeed * true_airspeed - sink * sink))
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, altitude)
-        for c in range(courses.size):
-            east, north = math.sin(courses[c]), math.cos(courses[c])
-            tailwind = wind * (aircraft.wind_east * east + aircraft.wind_north * north)
-            crosswind = wind * (aircraft.wind_east * north - aircraft.wind_north * east)
-            speed_over_ground = ground_speed(horizontal_speed, tailwind, crosswind)
-            slopes[c, h] = sink / speed_over_ground if speed_over_ground > _MIN_GROUND_SPEED_MPS else math.inf
+        wind_east, wind_north = aircraft.wind_east, aircraft.wind_north
+        for k in range(max(1, winds.shape[0])):
+            if winds.shape[0]:
+                wind, wind_east, wind_north = 1.0, winds[k, h, 0], winds[k, h, 1]
+            for c in range(courses.size):
+                east, north = math.sin(courses[c]), math.cos(courses[c])
+                tailwind = wind * (wind_east * east + wind_north * north)
+                crosswind = wind * (wind_east * north - wind_north * east)
+                speed_over_ground = ground_speed(horizontal_speed, tailwind, crosswind)
+                slope = sink / speed_over_ground if speed_over_ground > _MIN_GROUND_SPEED_MPS else math.inf
+                slopes[c, h] = max(slopes[c, h], slope)
 
 
 # ----------------------------------------------------------------------

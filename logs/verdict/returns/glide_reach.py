@@ -2,9 +2,9 @@
 
 The aircraft flies on for a moment, turns to the path to the destination, and glides.  The path comes from a backward
 search (`logs.verdict.returns.glide_map`) that ignores turns.  Therefore the turn is simulated first, to either side, in
-the mean wind: at the bank that the autopilot commands and the airspeed allows, with the higher speed and sink rate that
-the load factor of this bank causes.  Neither the altitude that the excess speed over the glide speed would give back
-nor the altitude needed to reach the speed of the turn is included.
+the wind at the start: at the bank that the autopilot commands and the airspeed allows, with the higher speed and sink
+rate that the load factor of this bank causes.  Neither the altitude that the excess speed over the glide speed would
+give back nor the altitude needed to reach the speed of the turn is included.
 """
 
 import math
@@ -16,7 +16,7 @@ from flight.autopilots.arduplane.tecs import (
     MIN_ROLL_LIMIT_RAD,
     load_factor_roll_limit,
 )
-from flight.autopilots.point_mass import PointMass, excess_power
+from flight.autopilots.point_mass import PointMass, excess_power, wind_at
 from flight.autopilots.simulated_returns import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, glide_steps
@@ -72,6 +72,7 @@ def remaining_glide_altitudes(
         glider,
         aircraft.record,
         aircraft.excess,
+        aircraft.field,
         altitude_left,
         reached_cells,
     )
@@ -97,6 +98,7 @@ def _fill_altitudes_left(
     glider: Record,
     aircraft: Record,
     excess_table: Floats,
+    field: Floats,
     altitude_left: Floats,
     reached_cells: Codes,
 ) -> None:
@@ -106,8 +108,7 @@ def _fill_altitudes_left(
     max_speed = aircraft.first_airspeed + (excess_table.shape[1] - 1) * aircraft.airspeed_step
     for n in range(starts.shape[0]):
         start = starts[n]
-        wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
-        wind_east, wind_north = wind * aircraft.wind_east, wind * aircraft.wind_north
+        wind, wind_east, wind_north = _wind_at_start(start, aircraft, field)
         air_east, air_north = start.velocity_east - wind_east, start.velocity_north - wind_north
         min_speed = glider.airspeed * eas_to_tas_ratio(start.up)
         speed = max(min_speed, math.hypot(air_east, air_north))
@@ -162,6 +163,16 @@ def _fill_altitudes_left(
     # Compiled code frees an array after its last use, and a use of one of its records does not keep it alive.
     if state_array.size != 1:
         altitude_left[:] = math.nan
+
+
+@inner
+def _wind_at_start(start: Record, aircraft: Record, field: Floats) -> tuple[float, float, float]:
+    """Return the wind at a start, m/s: its speed, and its components to the east and to the north."""
+    east, north = wind_at(start, start.time, aircraft, field)
+    if field.size:
+        return math.hypot(east, north), east, north
+    speed = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
+    return speed, east, north
 
 
 @inner

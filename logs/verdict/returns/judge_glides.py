@@ -24,6 +24,7 @@ from logs.verdict.returns.glide_footprint import GlideFootprint
 from logs.verdict.returns.glide_map import (
     Cells,
     GlideMap,
+    PossibleWinds,
     exclude_zones,
     glide_map,
     glide_slopes,
@@ -35,10 +36,15 @@ from logs.verdict.returns.judge_returns import ReturnWorld
 from logs.verdict.returns.return_starts import ReturnStarts
 from world.arrays import Flags, Floats
 from world.kernels import Record
+from world.scenario import Scenario
 
 # Height above ground that a glide keeps until it arrives, m.  The simulated ArduPlane without thrust was at most 13 m
 # too high, and the elevation file has its own error.
 MARGIN = 30.0
+# Longest time of a glide during which the wind of a forecast is looked up, s.
+_MAX_GLIDE_TIME_S = 600.0
+# Number of values of east, north and time at which it is looked up around the flight and its destinations.
+_WIND_SAMPLES = (9, 9, 5)
 
 _NO_POSITION = (math.nan, math.nan, math.nan)
 
@@ -238,7 +244,9 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     own_returns = _simulate_engine_out_returns(world, starts)
     bank, max_altitude = float(world.autopilot.turns.max_bank), float(rows["up"].max())
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
-    slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
+    top_altitude = max(max_altitude, min_ground_altitude + 1.0)
+    winds = None if world.scenario.wind.field is None else _possible_winds(world.scenario, positions, starts.time)
+    slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, top_altitude, winds)
 
     def search_glides_to(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
         """Return the altitude left (m) and the reached cell of each start, and the map of minimum altitudes (m)."""
@@ -333,6 +341,20 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
     outcomes = fly_without_engine(world, starts, targets).results
     return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
+
+
+def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
+    """Return the function that gives the winds of a forecast around positions, m, (n, 2), from times (s) on."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    first, last = float(times.min()), float(times.max()) + _MAX_GLIDE_TIME_S
+    edges = ((low[0], high[0]), (low[1], high[1]), (first, last))
+    axes = [np.linspace(*edge, count) for edge, count in zip(edges, _WIND_SAMPLES, strict=True)]
+
+    def winds_at(altitudes: Floats) -> Floats:
+        east, north, time, amsl = (axis.ravel() for axis in np.meshgrid(*axes, altitudes, indexing="ij"))
+        return scenario.wind_velocities(np.column_stack([east, north, amsl]), time).reshape(-1, len(altitudes), 2)
+
+    return winds_at
 
 
 def fly_without_engine(

@@ -2,7 +2,8 @@
 
 If the RTL, or a battery failsafe, leads to a landing sequence of the mission, the path to the sequence is judged.
 
-A return is simulated with a point mass (`flight.autopilots.parts.ReturnBehaviour.fly`), in the mean wind.  Returns
+A return is simulated with a point mass (`flight.autopilots.parts.ReturnBehaviour.fly`), in the mean wind; in a forecast
+in the wind at each place, height and time of its path.  Returns
 whose simulation could be wrong are flown again in JSBSim if the caller provides a function for it.  The JSBSim result
 replaces the result of the point mass for that return and, if it is worse, for all similar returns.
 """
@@ -48,7 +49,6 @@ from world.arrays import Floats
 from world.errors import MissionError
 from world.kernels import Record, Records
 from world.scenario import Scenario
-from world.wind import mean_wind_speed
 
 # Outcome of a return, the worst first: it hits the ground, enters a missile's sphere, violates a zone, does not arrive,
 # uses more energy than available, leaves the elevation data, may use more energy than available because the power is
@@ -473,7 +473,7 @@ def _make_world(setup: FlightSetup, autopilot: Autopilot) -> ReturnWorld:
         autopilot,
         return_positions[0],
         return_positions[1:],
-        make_point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
+        make_point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind, setup.scenario.geo_map),
         make_return_environment(setup.scenario),
         judged_airspace(setup),
         landings=landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
@@ -623,29 +623,15 @@ def simulate_returns(
     store_paths: True to return the paths even without zones.
     """
     store_paths = store_paths or bool(world.airspace.zones)
-    if world.scenario.wind.field is None or not len(starts):
-        batches = [(slice(None), world.aircraft)]
-    else:
-        # In a forecast, each return flies in the wind of the time and place at which it starts.
-        places = np.column_stack([starts.rows[name] for name in ("east", "north", "up")])
-        batches = [
-            (slice(k, k + 1), world.aircraft.in_wind(world.scenario.local_wind(places[k].tolist(), float(time))))
-            for k, time in enumerate(starts.time)
-        ]
-    flown = [
-        world.fly(
-            starts.rows[batch],
-            targets[batch],
-            aircraft,
-            world.environment,
-            store_positions=store_paths,
-            abort_limits=None if abort_limits is None else (abort_limits[0][batch], abort_limits[1][batch]),
-        )
-        for batch, aircraft in batches
-    ]
-    if len(flown) == 1:
-        return flown[0].results, flown[0].tracks
-    return np.concatenate([part.results for part in flown]), tuple(path for part in flown for path in part.tracks)
+    flown = world.fly(
+        starts.rows,
+        targets,
+        world.aircraft,
+        world.environment,
+        store_positions=store_paths,
+        abort_limits=abort_limits,
+    )
+    return flown.results, flown.tracks
 
 
 def simulate_judged_returns(
@@ -906,10 +892,9 @@ def _with_offsets(
 
 def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
     """Return True if a JSBSim flight can begin at a start: the bank is small, and the airspeed is high enough."""
-    wind = world.scenario.wind
-    wind_speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
-    east = float(row["velocity_east"]) + wind_speed * math.sin(wind.from_course)
-    north = float(row["velocity_north"]) + wind_speed * math.cos(wind.from_course)
+    place = [float(row[name]) for name in ("east", "north", "up")]
+    wind_east, wind_north = world.scenario.wind_velocity(place, float(row["time"]))
+    east, north = float(row["velocity_east"]) - wind_east, float(row["velocity_north"]) - wind_north
     airspeed = math.hypot(east, north, float(row["velocity_up"]))
     return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.first_airspeed)
 

@@ -13,7 +13,7 @@ from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, find_leg_winds, route_requirements
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
@@ -80,8 +80,9 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     velocity = _ground_velocities(track, start_rows)
     roll = track.attitude[start_rows, ROLL].astype(np.float64)
     energy = track.energy[start_rows].astype(np.float64)
-    records = _start_records(track.position[start_rows], velocity, np.nan_to_num(roll))
-    return ReturnStarts(track.time[start_rows], records, energy, True, is_low_start, int(is_slow.sum()))
+    times = track.time[start_rows]
+    records = _start_records(times, track.position[start_rows], velocity, np.nan_to_num(roll))
+    return ReturnStarts(times, records, energy, True, is_low_start, int(is_slow.sum()))
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
@@ -160,14 +161,14 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     move_energy = leg_energy[moves["leg"]] * moves["lasts"] / np.maximum(1e-9, leg_duration[moves["leg"]])
     energy = np.cumsum(move_energy)[move_numbers] - (1.0 - fraction) * move_energy[move_numbers]
     is_low = np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _start_records(position, velocity, bank), energy, False, is_low)
+    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low)
 
 
 def flown_end(track: Track) -> ReturnStarts:
     """Return the end of a flown track as the start of a return."""
     row = np.array([len(track) - 1], dtype=np.intp)
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
-    records = _start_records(track.position[row], _ground_velocities(track, row), roll)
+    records = _start_records(track.time[row], track.position[row], _ground_velocities(track, row), roll)
     is_low = np.zeros(1, dtype=np.bool_)
     return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low)
 
@@ -177,25 +178,30 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     course, slope = float(requirements.courses[-1]), math.tan(float(requirements.slopes[-1]))
     speed = float(_ground_speeds(requirements.setup)[-1])
     velocity = speed * np.array([[math.sin(course), math.cos(course), slope]])
-    records = _start_records(requirements.points[-1:], velocity, np.zeros(1))
     time, energy = requirements.path.times[-1:], np.array([predicted_energy(requirements)[0]])
+    records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
     return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_))
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s."""
+    """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
+
+    In a forecast, it is the wind at the leg's middle when the aircraft is there.
+    """
     route, speeds = setup.route, []
-    courses = leg_courses(route.positions)
+    courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)
     for leg, speed in enumerate(route.leg_airspeeds.tolist()):
-        wind = setup.scenario.wind.components_on_course(float(courses[leg]), float(route.positions[leg, 2]))
-        speed_over_ground = ground_speed(speed, *wind)
+        wind = winds[leg] if winds else setup.scenario.wind
+        components = wind.components_on_course(float(courses[leg]), float(route.positions[leg, 2]))
+        speed_over_ground = ground_speed(speed, *components)
         speeds.append(speed_over_ground if speed_over_ground > 0.0 else speed)
     return np.array(speeds)
 
 
-def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
+def _start_records(time: Floats, position: Floats, velocity: Floats, roll: Floats) -> Records:
     """Return n records of dtype `RETURN_START`.
 
+    time: s after take-off, (n,).
     position: m, (n, 3).
     velocity: ground velocity, m/s, (n, 3).
     roll: rad, (n,).
@@ -203,5 +209,5 @@ def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
     rows: Records = np.zeros(len(position), RETURN_START)
     for k, name in enumerate(("east", "north", "up")):
         rows[name], rows[f"velocity_{name}"] = position[:, k], velocity[:, k]
-    rows["roll"] = roll
+    rows["roll"], rows["time"] = roll, time
     return rows

@@ -348,12 +348,14 @@ def _simulate_go_arounds(
         for start, height_above_ground in zip(starts_on_glide, heights, strict=True)
         if height_above_ground > 0.0
     ]
-    parameters = world.autopilot.parameters
+    parameters, scenario, time = world.autopilot.parameters, world.scenario, float(requirements.path.times[-1])
     if not airborne or not isinstance(parameters, ArduPilotParameters):
         return []
     start_records: Records = np.concatenate(
         [
-            make_abort_start(place, landing.course, landing.glide.slope, landing.airspeed, world.aircraft)
+            make_abort_start(
+                place, landing.course, landing.glide.slope, landing.airspeed, scenario.wind_velocity(place, time), time
+            )
             for _, place, _ in airborne
         ]
     )

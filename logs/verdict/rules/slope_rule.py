@@ -135,11 +135,10 @@ def _flown_messages(
     If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error on
     the leg is only reported.
     """
-    rate_limit_faults = _rate_limit_faults(requirements, leg, measure)
-    faults = [*rate_limit_faults, *_performance_faults(requirements, leg, measure)]
+    faults = [*_rate_limit_faults(requirements, leg, measure), *_performance_faults(requirements, leg, measure)]
     need_text = f"; the leg needs {math.degrees(abs(float(requirements.slopes[leg]))):.1f}°"
-    # Said once, after the last of the faults.
-    performance_faults = [message(fault.brief, need_text if fault is faults[-1] else "") for fault in faults]
+    # Said once, with the first of the faults.
+    performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
     if requirements.envelope:

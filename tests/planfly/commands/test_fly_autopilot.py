@@ -62,6 +62,7 @@ def test_a_flight_is_logged_judged_and_judged_again(
     assert recorded.recorded_verdict is not None
     answer = json.loads(again.read_text(encoding="utf-8"))
     answer.pop("returns")
+    assert answer.pop("headline") == "flyable; terrain not judged"
     assert answer == recorded.recorded_verdict | {"exit_code": code}
     assert recorded.recorded_verdict["flown_by"]["changed"] == {"NAVL1_PERIOD": 17.0, "ROLL_LIMIT_DEG": 35.0}
 

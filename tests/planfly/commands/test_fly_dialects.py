@@ -34,8 +34,6 @@ OPEN = {
     "qgc_takeoff.plan": "the take-off climbs 180 m in 800 m, 12.7°",
     "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position, so that the autopilot takes the aircraft's: not flown",
 }
-# Over the terrain, which does not reach its home, also the return after the last item.
-OPEN_OVER_TERRAIN = OPEN | {"mavproxy.txt": "the return after the last item flies where the terrain is unknown"}
 ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
 # One is flown without terrain, one over it, and in make soak all that can be: their items are flown in tests of
 # missions, too, and all are judged below.
@@ -68,10 +66,10 @@ def over_terrain(tmp_path_factory: pytest.TempPathFactory) -> Flown:
 def test_it_flies_over_terrain(name: str, over_terrain: Flown) -> None:
     code, out, log = over_terrain(name)
     why = NOT_FLYABLE.get(name)
-    assert code == (3 if name in OPEN_OVER_TERRAIN else 0 if why is None else 4), out
+    assert code == (3 if name in OPEN else 0 if why is None else 4), out
     first = "flyable" if why is None else f"not flyable: {why} "
-    if name in OPEN_OVER_TERRAIN:
-        first = f"not judged in full: {OPEN_OVER_TERRAIN[name]}"
+    if name in OPEN:
+        first = f"not judged in full: {OPEN[name]}"
     assert out.splitlines()[0].startswith(first)
     assert "terrain not judged" not in out.splitlines()[0]
     flies_all_legs(log, name)
@@ -114,8 +112,8 @@ def test_the_geometric_level_agrees(name: str, capsys: pytest.CaptureFixture[str
     code = main(["check", "--geometry", str(MISSIONS / name), "--terrain", "jacksboro"])
     out = capsys.readouterr().out
     why = NOT_FLYABLE.get(name)
-    assert code == (3 if name in OPEN_OVER_TERRAIN else 0 if why is None else 4), out
-    assert out.startswith(f"not judged in full: {OPEN_OVER_TERRAIN.get(name)}") is (name in OPEN_OVER_TERRAIN)
+    assert code == (3 if name in OPEN else 0 if why is None else 4), out
+    assert out.startswith(f"not judged in full: {OPEN.get(name)}") is (name in OPEN)
     failed = [line for line in out.splitlines() if line.startswith("  failed")]
     assert all(line.startswith((f"  failed  {why} ", f"  failed  {why},")) for line in failed)
 

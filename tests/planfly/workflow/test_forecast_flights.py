@@ -12,7 +12,10 @@ import xarray
 
 import planfly
 from logs.recording.reader import read_log
+from logs.verdict.returns.judge_returns import judge_returns, make_return_world
+from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
+from planfly.rtl.jsbsim_returns import LEAD_IN_LENGTH_M, return_setup
 from tests.world.made.forecast_files import HEIGHTS, ISSUED, open_meteo_answer, wind_dataset, write_json, write_netcdf
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
@@ -309,3 +312,52 @@ def test_a_mission_outside_the_levels_is_refused(name: str, folder: Path) -> Non
     file = write_netcdf(folder / "a.nc", make())
     with pytest.raises(planfly.ForecastError, match=words):
         fly(forecast=file, at=AT)
+
+
+# ----------------------------------------------------------------------
+# Returns.
+
+
+def test_no_return_arrives_behind_a_wind_that_is_faster_than_the_aircraft(folder: Path) -> None:
+    # 36 m/s around home, and calm from 580 m east on: the wind at its start would let a return arrive.
+    longitudes = np.linspace(7.97, 8.05, 33)
+    eastward = 36.0 * np.clip((8.0075 - longitudes) / 0.005, 0.0, 1.0)
+    file = write_netcdf(folder / "a.nc", wind_dataset(eastward, 0.0, longitudes=longitudes))
+    setup = fly(forecast=file, at=AT).setup
+    world, starts = make_return_world(setup), planned_starts(setup, 20.0)
+    is_beyond = starts.rows["east"] > 600.0
+    assert is_beyond.sum() >= 2
+    kinds = {one.kind for one in judge_returns(world, starts.subset(np.flatnonzero(is_beyond)), 20.0).each}
+    assert kinds == {"lost"}
+    # Planned starts have the ground speed of the wind on their leg, which is calm in its middle.
+    assert np.hypot(starts.rows["velocity_east"], starts.rows["velocity_north"])[is_beyond].max() < 27.0
+
+
+def test_jsbsim_flies_a_return_in_the_wind_of_its_time(folder: Path) -> None:
+    # It rises by 9 m/s an hour.
+    file = write_netcdf(
+        folder / "a.nc", wind_dataset(np.array([0.0, 36.0, 72.0, 108.0])[:, None, None, None] / 4.0, 0.0)
+    )
+    setup = fly(forecast=file, at=AT).setup
+    start = planned_starts(setup, 100.0).rows[1]
+    again, _ = return_setup(make_return_world(setup), start)
+    speed = math.hypot(float(start["velocity_east"]), float(start["velocity_north"]))
+    lead_in_s = LEAD_IN_LENGTH_M / speed
+    found = again.scenario.wind_velocity((0.0, 0.0, 200.0), lead_in_s)
+    assert found == pytest.approx((100.0 * 9.0 / 3600.0, 0.0), abs=1e-3)
+
+
+@pytest.mark.parametrize("longitude", [8.0, 180.0, -179.999])
+def test_the_map_of_a_forecast_does_not_jump_at_180_degrees(longitude: float, folder: Path) -> None:
+    mission = Path("valley.waypoints").read_text(encoding="ascii").replace("8.0\t", f"{longitude}\t")
+    for old in ("8.0194", "8.0065"):
+        mission = mission.replace(old, f"{(longitude + float(old) - 8.0 + 180.0) % 360.0 - 180.0:.6f}")
+    (folder / "edge.waypoints").write_text(mission, encoding="ascii")
+    longitudes = np.sort((longitude + np.linspace(-0.1, 0.1, 5) + 180.0) % 360.0 - 180.0)
+    file = write_netcdf(folder / "a.nc", wind_dataset([2.0, 3.0, 4.0, 5.0, 6.0], 0.0, longitudes=longitudes))
+    scenario = planfly.fly("edge.waypoints", forecast=file, at=AT).setup.scenario
+    geo_map = scenario.geo_map
+    assert geo_map is not None
+    east, north = np.array([-1500.0, 0.0, 1400.0]), np.array([0.0, 900.0, -300.0])
+    for found, expected in zip(geo_map(east, north), to_geo(scenario.origin, east, north)[::-1], strict=True):
+        assert np.abs((found - expected + 180.0) % 360.0 - 180.0).max() < 2e-5

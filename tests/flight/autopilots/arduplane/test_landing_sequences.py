@@ -144,7 +144,8 @@ def test_an_abort_that_has_to_climb_holds_its_course_until_it_is_above_its_heigh
 def test_the_speed_where_it_is_aborted_is_the_glides_in_the_wind() -> None:
     world = make_return_world(kept_setup("abort"))
     real = kept_sequence("abort")
-    start = make_abort_start((8333.66, -4151.17, 392.3), math.radians(240.0), 0.098, 22.9, world.aircraft)
+    place = (8333.66, -4151.17, 392.3)
+    start = make_abort_start(place, math.radians(240.0), 0.098, 22.9, world.scenario.wind_velocity(place))
     for name in ("east", "north"):
         assert float(start[f"velocity_{name}"][0]) == pytest.approx(real[f"velocity_{name}_mps"][0], abs=0.3)
     assert float(start["velocity_up"][0]) == pytest.approx(-1.75, abs=0.1)

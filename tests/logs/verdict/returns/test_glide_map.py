@@ -64,6 +64,26 @@ def test_on_a_plane_it_is_the_straight_way(wind: float, blows_to: float) -> None
     assert compared > 250
 
 
+@pytest.mark.parametrize("course", [0.0, 90.0, 180.0, 270.0])
+def test_of_several_possible_winds_the_worst_on_each_course_counts(course: float) -> None:
+    # 8 m/s to the east, and 5 m/s to the north: by the wind triangle on each course, at 600 m.
+    blowing = [(8.0, 0.0), (0.0, 5.0)]
+    found = glide_slopes(
+        glider(3.0, 180.0),
+        AIRSPEED,
+        0.0,
+        TOP,
+        lambda altitudes: np.repeat(np.array(blowing)[:, None], len(altitudes), 1),
+    )
+    level = math.sqrt(true_airspeed(600.0) ** 2 - SINK**2)
+    sin, cos = math.sin(math.radians(course)), math.cos(math.radians(course))
+    speeds = [
+        math.sqrt(level**2 - (east * cos - north * sin) ** 2) + east * sin + north * cos for east, north in blowing
+    ]
+    row = int(np.argmin(np.abs(np.degrees(glide_steps()[0]["course"]) % 360.0 - course)))
+    assert found.table[row, 6] == pytest.approx(SINK / min(speeds), rel=1e-3)
+
+
 def test_there_are_32_steps_and_each_knows_what_it_crosses() -> None:
     made, between = glide_steps()
     assert len(made) == 32

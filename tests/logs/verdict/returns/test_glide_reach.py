@@ -24,6 +24,8 @@ from tests.logs.verdict.returns.gliders import (
     plane,
     true_airspeed,
 )
+from world.forecast.wind_field import WindField
+from world.frames import fit_polymap
 from world.kernels import Records
 from world.terrain import Terrain
 
@@ -73,6 +75,24 @@ def test_straight_ahead_it_costs_the_way_alone() -> None:
     expected = 800.0 - REACTION * SINK - height_needed(0.0, 3000.0 - REACTION * CRUISE, MARGIN)
     assert left == pytest.approx(expected, abs=8.0)
     assert place[:2] == pytest.approx((0.0, 3000.0), abs=20.0)
+
+
+def test_it_turns_in_the_wind_of_its_start_in_a_forecast() -> None:
+    # 6 m/s from the south at 100 s and none at 0 s: as in that wind, whatever the mean wind is.
+    velocities = np.zeros((2, 1, 1, 1, 2))
+    velocities[1, ..., 1] = 6.0
+    field = WindField(np.array([0.0, 100.0]), np.zeros(1), np.zeros(1), np.zeros((2, 1, 1, 1)), velocities)
+    lefts = []
+    for aircraft, time in ((glider(6.0, 0.0), 0.0), (glider()._replace(field=field.packed()), 100.0)):
+        made = map_of(plane())
+        slopes = glide_slopes(glider(), AIRSPEED, 0.0, TOP)
+        needs = search_glide_altitudes(made, np.array([made.cell_at(0.0, 3000.0)]), slopes, TOP)
+        start: Records = np.zeros(1, RETURN_START)
+        start["up"], start["velocity_north"], start["velocity_east"], start["time"] = 800.0, 6.0, CRUISE, time
+        around = ReturnEnvironment(plane().heights, plane().to_pixel.record, NO_SPHERES, NO_RADII, True)
+        aircraft.record.geo_map = fit_polymap(lambda x, y: (0.0 * x, 0.0 * y), [[-1.0, 1.0]] * 2, 1e-9).record
+        lefts.append(float(remaining_glide_altitudes(start, needs, aircraft, around, AIRSPEED, BANK)[0][0]))
+    assert lefts[1] == pytest.approx(lefts[0], abs=0.01)
 
 
 @pytest.mark.parametrize("course", [90.0, -90.0, 150.0, -150.0])

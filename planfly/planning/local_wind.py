@@ -1,0 +1,163 @@
+"""Plans whose slopes and turns can be flown in the local wind of a forecast.
+
+The planner limits slopes and turns in one mean wind for the whole map.  The wind of a forecast differs from it by
+place, height and time: a stronger tailwind flattens the slopes that the aircraft can fly, and widens its turns.
+Therefore the finished plan is judged in the wind of each leg, as the verdict does.  If a leg or a turn fails, another
+plan is searched for that leaves climb, sink and bank unused, so that it holds at the higher ground speed.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from aircraft.path_limits import Limits
+from logs.verdict.findings import Finding
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import place_text
+from planfly.workflow.airframe import Airframe
+from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planner.plan import Plan
+from world.arrays import Floats
+from world.scenario import Scenario
+
+# Rules that judge what the planner limits in the mean wind.
+_RULES = ("turn", "slope", "climbout", "approach")
+# Number of searches with the ground speeds along the last path, before the highest one on the map is assumed.
+_PATH_SEARCHES = 2
+# Number of values of east, north, altitude and time at which the wind of the map is looked up.
+_MAP_SAMPLES = (9, 9, 9, 5)
+# Number of courses that are compared there.
+_COURSE_COUNT = 36
+# Time during which the wind of the map may matter, as a multiple of the duration of the first path.
+_MAX_DURATION_RATIO = 1.5
+# Lowest ground speed in the mean wind that is compared, m/s.
+_MIN_GROUND_SPEED_MPS = 1.0
+
+
+def ensure_local_wind(plan: Plan, airframe: Airframe, search: Callable[[Airframe], Plan] | None = None) -> Plan:
+    """Return a plan whose slopes and turns can be flown in the local wind of its scenario's forecast.
+
+    This is the given plan, or another plan that `search` finds.  If no such plan is found, the given plan is returned
+    as not safe, with the reasons in its certificate.  Without a forecast, the given plan is returned.
+
+    search: function that plans the same scenario for an airframe with other limits; None to search for no other path.
+
+    Raises ForecastError if the flight of a plan leaves the box, the levels or the times of the forecast.
+
+    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> airframe = load_airframe(scenario)
+    >>> plan = plan_path(scenario, airframe.limits, seed=1)
+    >>> ensure_local_wind(plan, airframe) is plan
+    True
+    """
+    scenario = plan.scenario
+    if scenario.wind.forecast is None:
+        return plan
+    requirements = _plan_requirements(plan, airframe)
+    failures = _wind_failures(plan, requirements)
+    if not plan.safe or not failures:
+        return plan
+    ratio, searches = 1.0, 0
+    map_ratio = max_ground_speed_ratio(scenario, airframe.limits.airspeed, float(requirements.path.times[-1]))
+    while search is not None and ratio < map_ratio:
+        path_ratio = _path_ground_speed_ratio(requirements) if searches < _PATH_SEARCHES else ratio
+        ratio, searches = path_ratio if ratio < path_ratio < map_ratio else map_ratio, searches + 1
+        other_plan = search(replace(airframe, limits=limits_at_ground_speed(airframe.limits, ratio)))
+        if not other_plan.safe:
+            break
+        requirements = _plan_requirements(other_plan, airframe)
+        if not _wind_failures(other_plan, requirements):
+            return other_plan
+    certificate = plan.certificate
+    problems = tuple(f"in the local wind of the forecast: {_failure_text(failure)}" for failure in failures)
+    return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
+
+
+def _plan_requirements(plan: Plan, airframe: Airframe) -> RouteRequirements:
+    """Return the requirements of a plan's mission.  Raises ForecastError as `ensure_local_wind` does."""
+    return route_requirements(
+        make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
+    )
+
+
+def _wind_failures(plan: Plan, requirements: RouteRequirements) -> list[Finding]:
+    """Return the failed findings on a plan's slopes and turns, without those on legs that are already flown."""
+    judges = [judge for name in _RULES if (judge := RULES[name].judge) is not None]
+    findings = [finding for judge in judges for finding in judge(requirements, None, geometric=True)]
+    return [finding for finding in findings if finding.ok is False and (finding.place.index or 0) >= plan.flown_legs]
+
+
+def _failure_text(failure: Finding) -> str:
+    """Return the reason of a failed finding with its place."""
+    return failure.reason if failure.placed else f"{place_text(failure.place)}: {failure.reason}"
+
+
+def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
+    """Return limits whose slopes and turns hold at ground speeds that are higher by a ratio than in the mean wind.
+
+    Slopes over the ground are inversely proportional to the ground speed, and radii to its square.
+    """
+
+    def flatten(angles: Floats) -> Floats:
+        return np.where(angles > 0.0, np.arcsin(np.sin(angles) / ratio), angles)
+
+    envelope, tracking = limits.envelope, limits.tracking
+    if tracking is not None:
+        tracking = replace(tracking, climb_rate=tracking.climb_rate / ratio, sink_rate=tracking.sink_rate / ratio)
+    return replace(
+        limits,
+        envelope=replace(envelope, climb=flatten(envelope.climb), descent=flatten(envelope.descent)),
+        max_bank=math.atan(math.tan(limits.max_bank) / ratio**2),
+        tracking=tracking,
+    )
+
+
+def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float) -> float:
+    """Return the largest ratio of the ground speed in the local wind to that in the mean wind, on any course.
+
+    It is taken anywhere on the map between its floor and its ceiling, during a flight, and is at least 1.
+
+    airspeed: m/s.
+    duration: duration of the flight, s.
+    """
+    (west, east), (south, north) = scenario.bounds.tolist()
+    edges = ((west, east), (south, north), (scenario.floor, scenario.ceiling), (0.0, _MAX_DURATION_RATIO * duration))
+    axes = [np.linspace(*edge, count) for edge, count in zip(edges, _MAP_SAMPLES, strict=True)]
+    samples = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 4)
+    courses = np.linspace(0.0, 2.0 * math.pi, _COURSE_COUNT, endpoint=False)
+    return _ground_speed_ratio(scenario, airspeed, samples, courses[:, np.newaxis])
+
+
+def _path_ground_speed_ratio(requirements: RouteRequirements) -> float:
+    """Return the largest ratio of the ground speed in the local wind to that in the mean wind along a planned path."""
+    path, airspeed = requirements.path, float(requirements.route.leg_airspeeds.min())
+    steps = np.diff(path.points, axis=0)
+    samples = np.column_stack([path.points[:-1] + 0.5 * steps, 0.5 * (path.times[:-1] + path.times[1:])])
+    return _ground_speed_ratio(requirements.setup.scenario, airspeed, samples, np.arctan2(steps[:, 0], steps[:, 1]))
+
+
+def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, courses: Floats) -> float:
+    """Return the largest ratio of the ground speed in the local wind to that in the mean wind, at least 1.
+
+    samples: (n, 4) east, north and altitude, m, and time after take-off, s.
+    courses: (n,) rad, or (c, 1) to combine each of c courses with each sample.
+    """
+    local_winds = scenario.wind_velocities(samples[:, :3], samples[:, 3])
+    mean_winds = scenario.wind.velocities_at(np.ascontiguousarray(samples[:, 2]))
+    local_speeds, mean_speeds = (
+        _ground_speeds(airspeed, winds[:, 0], winds[:, 1], courses) for winds in (local_winds, mean_winds)
+    )
+    return max(1.0, float((local_speeds / np.maximum(mean_speeds, _MIN_GROUND_SPEED_MPS)).max()))
+
+
+def _ground_speeds(airspeed: float, wind_east: Floats, wind_north: Floats, courses: Floats) -> Floats:
+    """Return the ground speeds on courses (rad) in winds, m/s."""
+    sin, cos = np.sin(courses), np.cos(courses)
+    crosswinds = wind_east * cos - wind_north * sin
+    return np.sqrt(np.maximum(0.0, airspeed**2 - crosswinds**2)) + wind_east * sin + wind_north * cos
