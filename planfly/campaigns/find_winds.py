@@ -206,6 +206,7 @@ def find_winds(
                     pool = stack.enter_context(worker_pool(workers, base, fly))
                     calm_rows = [] if stored_flights.flown else _fly_in_calm_air(pool, goal)
                     if calm_rows:
+                        progress.report_calm(len(calm_rows))
                         return search.result_in_calm_air(calm_rows)
                 _fly_round(pool, search, missing_requests, stored_flights, progress)
             for request in requests:
@@ -447,6 +448,12 @@ class _ProgressReport:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
             remark = f"{flight_count} of {count_text(total, 'flight')} at least"
             self._advance(float(flight_count), float(total), remark)
+
+    def report_calm(self, flight_count: int) -> None:
+        """Report the flights in calm air with which a search ends."""
+        if self._advance is not None:
+            text = f"{count_text(flight_count, 'flight')} in calm air, none of them flyable"
+            self._advance(float(flight_count), float(flight_count), text)
 
     def report(self, flight_count: int, is_last: bool = False) -> None:
         """Report the settled directions, the flights, the flights per minute, and the least remaining time.

@@ -179,6 +179,14 @@ def undecided_flight(base: CampaignBase, index: int, wind: GivenWind | None = No
 
 
 @pytest.mark.usefixtures("here")
+def test_a_search_that_ends_in_calm_air_reports_the_flights_flown(wind_base: CampaignBase, tmp_path: Path) -> None:
+    """Three flights show a target of 0.9: 0.1 ** 2 is below 5 %, and three are flown at least."""
+    reports: list[tuple[float, float, str]] = []
+    searched(wind_base, tmp_path, fly=undecided_flight, advance=lambda *report: reports.append(report))
+    assert reports[-1] == (3.0, 3.0, "3 flights in calm air, none of them flyable")
+
+
+@pytest.mark.usefixtures("here")
 def test_a_mission_that_is_not_judged_in_calm_air_is_not_searched(wind_base: CampaignBase, tmp_path: Path) -> None:
     found = searched(wind_base, tmp_path, fly=undecided_flight)
     assert winds_answer(found) == "not judged"
