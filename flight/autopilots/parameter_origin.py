@@ -42,9 +42,9 @@ _PX4_NAMES = _compile_names(
     "ASPD_ BAT[0-9]?_ CAL_ CA_ CBRK_ COM_ CYPHAL_ EKF2_ FD_ FW_ GF_ GPS_[12]_ GND_L1_ GND_SPEED_ GND_THR_ IMU_ LNDFW_ "
     "LNDMC_ LPE_ MAN_ MAV_COMP_ID MAV_SYS_ID MAV_TYPE MAV_[0-9]_ MC_ MIS_COMMAND_TOUT MIS_DIST_ MIS_LTRMIN_ALT "
     "MIS_MNT_ MIS_TAKEOFF_ MIS_TKOFF_ MIS_TKO_ MIS_YAW MPC_ NAV_[A-BD-Z].* NPFG_ PWM_AUX_ PWM_MAIN_ PWM_MAX PWM_MIN "
-    "RA_ RC_MAP_ RD_ RO_ RTL_CONE_ RTL_DESCEND_ALT RTL_LAND_DELAY RTL_LOITER_RAD RTL_MIN_DIST RTL_RETURN_ALT RTL_TYPE "
-    "RWTO_ SDLOG_ SENS_ SEP_ SER_ SIM_GZ_ SYS_ THR_MDL_FAC TRIG_ TRIM_PITCH TRIM_ROLL TRIM_YAW UAVCAN_ UUV_ VT_ "
-    "WEIGHT_BASE WEIGHT_GROSS WV_"
+    "RA_ RC_MAP_ RD_ RO_ RTL_CONE_ RTL_DESCEND_ALT RTL_LAND_DELAY RTL_LOITER_RAD RTL_MIN_DIST RTL_RETURN_ALT "
+    "RTL_TIME_ RTL_TYPE RWTO_ SDLOG_ SENS_ SEP_ SER_ SIM_GZ_ SYS_ THR_MDL_FAC TRIG_ TRIM_PITCH TRIM_ROLL TRIM_YAW "
+    "UAVCAN_ UUV_ VT_ WEIGHT_BASE WEIGHT_GROSS WV_"
 )
 # Names that only ArduPilot's aeroplanes have; ArduPlane's VTOL parameters begin with Q_.
 _ARDUPLANE_NAMES = _compile_names(
@@ -203,11 +203,16 @@ def _vehicle_by_majority(
 
 
 def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
-    """Return the vehicle of a PX4 file, from its type parameters, its header or its names; "" for an aeroplane."""
+    """Return the vehicle of a PX4 file, from its type parameters, its header or its names; "" for an aeroplane.
+
+    A header that states another vehicle than an aeroplane decides: QGroundControl writes the vehicle that PX4 reports.
+    """
     for name, kinds in _PX4_TYPES.items():
         if name in entries and (kind := kinds.get(round(entries[name].value))):
             return kind
-    if _header_vehicle(text) == _VTOL or _select_names(entries, _PX4_VTOL.fullmatch):
+    if header_vehicle := _header_vehicle(text):
+        return header_vehicle
+    if _select_names(entries, _PX4_VTOL.fullmatch):
         return _VTOL
     return _vehicle_by_majority(text, entries, _PX4_PLANE, _PX4_VEHICLES)
 

@@ -482,6 +482,34 @@ class BatteryFailsafe(NamedTuple):
     capacity: float = math.nan
 
 
+class ReturnTimeFailsafe(NamedTuple):
+    """A failsafe that returns when the battery lasts hardly longer than the return, as the autopilot estimates both.
+
+    parameter: name and value of the parameter that enables it.
+    remedy: text on the value with which it does not act.
+    capacity: capacity of the battery, mAh.
+    initial_current: current with which the autopilot's average of the current in level flight begins, A.
+    time_factor, time_margin: the failsafe acts at the time of the return times this factor, plus this margin, s.
+    airspeed, climb_rate, sink_rate: speeds of the return, m/s.
+    altitude: transit altitude of the return above its destination, m.
+    delay: time that the return waits before it lands, s.
+    follows_mission: True if a return may follow the whole mission.
+    """
+
+    parameter: str
+    remedy: str
+    capacity: float
+    initial_current: float
+    time_factor: float
+    time_margin: float
+    airspeed: float
+    climb_rate: float
+    sink_rate: float
+    altitude: float
+    delay: float
+    follows_mission: bool
+
+
 class MissionParts(NamedTuple):
     """Properties of a mission that decide which settings of an autopilot affect the flight.
 
@@ -548,6 +576,7 @@ class MissionChecks:
     unites_inclusions: True if a position inside any inclusion of the mission's fence is inside the fence; False if a
         position must be inside all of them.
     battery_failsafes: failsafes that leave the mission at a state of the battery.
+    return_time_failsafe: failsafe that returns when the battery lasts only for the return; None without it.
     describe_unsimulated_settings: function that returns a sentence, without a full stop, for each setting that changes
         the flight path of a mission but is not simulated.
     parameter_notes: notes on the parameter file, for the verdict.
@@ -559,6 +588,7 @@ class MissionChecks:
     follows_terrain: bool = True
     unites_inclusions: bool = False
     battery_failsafes: tuple[BatteryFailsafe, ...] = ()
+    return_time_failsafe: ReturnTimeFailsafe | None = None
     describe_unsimulated_settings: Callable[[MissionParts], list[str]] = _no_unsimulated_settings
     parameter_notes: tuple[str, ...] = ()
 

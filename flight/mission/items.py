@@ -235,6 +235,7 @@ class Camera:
     front, side: required overlap with the next photo and with the photos of the next line, as a fraction of the
         footprint; None for no requirement.
     interval: minimum time between photos, s; 0 if unknown.
+    pixels_across: pixels of a photo across the track; 0 if unknown.
     """
 
     across: float
@@ -242,6 +243,7 @@ class Camera:
     front: float | None = None
     side: float | None = None
     interval: float = 0.0
+    pixels_across: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,11 +254,13 @@ class SurveyPlan:
         any survey.
     turn_around: extension of its lines beyond their photos, m.
     camera: camera, or None if only distances are known.
+    stated_photo: distance between photos by the settings of the camera, m; 0 if they state none.
     """
 
     photo: float | None
     turn_around: float = 0.0
     camera: Camera | None = None
+    stated_photo: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

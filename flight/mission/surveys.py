@@ -9,7 +9,7 @@ straight, or bends like its neighbors, as in QGroundControl's corridor scan.
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -57,6 +57,8 @@ _MIN_LINES = 3
 _MIN_LINES_WITH_PHOTOS = 2
 # A gap that is smaller than this fraction of both neighboring gaps separates two flights along one line.
 _DUPLICATE_LINE_FRACTION = 0.2
+# Ratio up to which a trigger distance may differ from the camera's settings without a note.
+_STATED_SPACING_TOLERANCE = 0.02
 # Tolerance for equal distances between photos, m: ground stations write this distance in single precision.
 _PHOTO_SPACING_TOLERANCE_M = 0.01
 
@@ -229,6 +231,48 @@ def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
     if len(matching_plans) == 1:
         return matching_plans.pop()
     return next((plan for plan in mission.survey_plans if plan.photo is None), None)
+
+
+def camera_notes(mission: Mission, route: Route) -> tuple[str, ...]:
+    """Return notes on trigger distances that the settings of their camera contradict, or that it cannot follow."""
+    notes, spacings = [], camera_spacing(mission, route)[:-1]
+    for plan in dict.fromkeys(mission.survey_plans):
+        photo_spacing = plan.photo or 0.0
+        speeds = route.leg_airspeeds[np.abs(spacings - photo_spacing) <= _PHOTO_SPACING_TOLERANCE_M]
+        if photo_spacing <= 0.0 or not speeds.size:
+            continue
+        text = f"a survey triggers the camera every {photo_spacing:.4g} m"
+        if plan.stated_photo and abs(plan.stated_photo / photo_spacing - 1.0) > _STATED_SPACING_TOLERANCE:
+            stated_text = f"{plan.stated_photo:.4g} m (AdjustedFootprintFrontal)"
+            notes.append(f"{text}, but the settings of its camera in the file state {stated_text}")
+        seconds = photo_spacing / float(speeds.max())
+        if plan.camera is not None and seconds < plan.camera.interval:
+            notes.append(
+                f"the camera takes one photo per {plan.camera.interval:g} s; the trigger distance of"
+                f" {photo_spacing:.4g} m asks for one every {seconds:.2f} s at {float(speeds.max()):.1f} m/s"
+            )
+    return tuple(notes)
+
+
+def with_photo_spacing(mission: Mission, survey: Survey, spacing: float) -> Mission:
+    """Return the mission with another distance between the photos of a survey, m, in its items and its settings."""
+
+    def has_spacing(value: float | None) -> bool:
+        return value is not None and abs(value - survey.lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M
+
+    return replace(
+        mission,
+        items=tuple(
+            replace(item, params=(spacing, *item.params[1:]))
+            if item.command == Command.DO_SET_CAM_TRIGG_DIST and has_spacing(item.params[0])
+            else item
+            for item in mission.items
+        ),
+        survey_plans=tuple(
+            replace(plan, photo=spacing, stated_photo=0.0) if has_spacing(plan.photo) else plan
+            for plan in mission.survey_plans
+        ),
+    )
 
 
 def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[float, float]] = ()) -> tuple[Survey, ...]:

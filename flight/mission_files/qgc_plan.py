@@ -152,7 +152,8 @@ class _CameraCalc(BaseModel):
         front_overlap, side_overlap = (
             None if percent is None else percent / 100.0 for percent in (self.FrontalOverlap, self.SideOverlap)
         )
-        return Camera(across, along, front_overlap, side_overlap, self.MinTriggerInterval or 0.0)
+        pixels = self.ImageWidth if self.Landscape else self.ImageHeight
+        return Camera(across, along, front_overlap, side_overlap, self.MinTriggerInterval or 0.0, pixels or 0.0)
 
 
 def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warnings: list[str]) -> SurveyPlan:
@@ -173,7 +174,10 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warn
             field = ".".join(map(str, fault["loc"]))
             shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
             warnings.append(f"{location}: CameraCalc.{field}: {shown}: its camera is ignored, and no overlap is judged")
-    return SurveyPlan(_trigger_distance(items), float(turn_around), camera)
+    stated_photo = calc.get("AdjustedFootprintFrontal") if isinstance(calc, dict) else 0.0
+    if isinstance(stated_photo, bool) or not isinstance(stated_photo, int | float) or not 0.0 < stated_photo <= 1e6:
+        stated_photo = 0.0
+    return SurveyPlan(_trigger_distance(items), float(turn_around), camera, float(stated_photo))
 
 
 def _trigger_distance(items: list[Any]) -> float:

@@ -101,6 +101,7 @@ class _Camera(SetupModel):
     front: Annotated[Finite, Field(ge=0.0, lt=1.0)] | None
     side: Annotated[Finite, Field(ge=0.0, lt=1.0)] | None
     interval: Annotated[Finite, Field(ge=0.0, alias="interval_s")]
+    pixels_across: Annotated[Finite, Field(ge=0.0)] = 0.0
 
 
 class _SurveyPlan(SetupModel):
@@ -109,6 +110,7 @@ class _SurveyPlan(SetupModel):
     photo: Annotated[Annotated[Finite, Field(ge=0.0)] | None, Field(alias="photo_m")]
     turn_around: Annotated[Finite, Field(ge=0.0, alias="turn_around_m")]
     camera: _Camera | None
+    stated_photo: Annotated[Finite, Field(ge=0.0, alias="stated_photo_m")] = 0.0
 
     def plan(self) -> SurveyPlan:
         """Return the survey plan of the table."""

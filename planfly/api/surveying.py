@@ -1,7 +1,7 @@
 """Judge which part of each photo line of a survey is usable, and suggest remedies for lost lines."""
 
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, starmap
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -11,7 +11,7 @@ from flight.autopilots.parameter_origin import PX4
 from flight.autopilots.parameter_set import ParameterSet
 from flight.mission.items import Camera, Command, SurveyPlan
 from flight.mission.itinerary import GATES_ARE_NO_WAYPOINTS
-from flight.mission.surveys import Survey
+from flight.mission.surveys import Survey, camera_notes
 from flight.mission_files.formats import FileKind, mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -32,11 +32,12 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
-    has_required_overlap,
+    count_taken_photos,
     is_line_usable,
     line_text,
     lines_headline,
     near_miss_text,
+    overlap_faults,
     overlap_lines,
     remedy_text,
     survey_text,
@@ -50,6 +51,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from world.errors import ArgumentError, LogError, MissionError, ParameterError
 from world.files import read_small_file, utf8_text, write_atomically
 from world.scenario import Scenario
+from world.wording import count_text
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -83,21 +85,30 @@ class SurveyResult:
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
         return all(is_line_usable(line) for lines in self.lines for line in lines) and all(
-            map(has_required_overlap, self.overlaps)
+            not overlap_faults(overlap) for overlap in self.overlaps
         )
 
     @property
     def headline(self) -> str:
-        """Summary of all photo lines, in one line."""
-        return lines_headline([line for lines in self.lines for line in lines])
+        """Summary of all photo lines and of overlaps that are too small, in one line."""
+        faults = [fault for overlap in self.overlaps for fault in overlap_faults(overlap).values()]
+        return "; ".join([lines_headline([line for lines in self.lines for line in lines]), *dict.fromkeys(faults)])
+
+    @property
+    def photos(self) -> int:
+        """Number of photos taken on all lines; 0 if no item states the distance between photos."""
+        return sum(starmap(count_taken_photos, zip(self.surveys, self.lines, self.overlaps, strict=True)))
 
     @property
     def survey_lines(self) -> tuple[str, ...]:
         """Lines that describe each survey and its photo lines."""
         texts = []
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
-            texts += [survey_text(survey), *overlap_lines(overlap)]
+            photos = count_taken_photos(survey, lines, overlap)
+            photos_text = f", {count_text(photos, 'photo')}" if photos else ""
+            texts += [f"{survey_text(survey)}{photos_text}", *overlap_lines(overlap)]
             texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
+        texts += [f"note: {note}" for note in camera_notes(self.setup.mission, self.setup.route)]
         return (*texts, self.circles) if self.circles else tuple(texts)
 
     @property
@@ -109,8 +120,8 @@ class SurveyResult:
     def no_remedy_lines(self) -> tuple[str, ...]:
         """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
         texts = [
-            "nothing was found that would help: no turn-around, gates, order, course, parameter or airspeed alone, and"
-            " no longer turn-arounds combined with a parameter or a lower airspeed"
+            "nothing was found that would help: no distance between photos, turn-around, gates, order, course,"
+            " parameter or airspeed alone, and no longer turn-arounds combined with a parameter or a lower airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.campaign_inputs import difference_texts
 from planfly.campaigns.dispersions import NAMES
-from planfly.campaigns.flight_row import parse_failed_findings
+from planfly.campaigns.flight_row import OUTCOMES, parse_failed_findings
 from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Estimator, Goal, Interval, Tally
 from planfly.campaigns.statistics.proportions import ProportionDifference, independent_difference, paired_difference
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, read_stored_settings, read_table
@@ -123,12 +123,16 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
 def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> ComparedCampaign:
     """Return the counts of a campaign."""
     outcomes = table["outcome"].tolist()
-    tally = Tally(*(outcomes.count(outcome) for outcome in ("flyable", "not flyable", "lost")))
+    tally = Tally(*map(outcomes.count, OUTCOMES))
     goal = Goal(
         **{field.name: settings[field.name] for field in fields(Goal) if field.name in settings}
         | {"confidence": DEFAULT_CONFIDENCE}
     )
-    failed_rules = [{rule for rule, _ in parse_failed_findings(text)} for text in table["failed"].tolist()]
+    failed_rules = [
+        {rule for rule, _ in parse_failed_findings(text)}
+        for text, outcome in zip(table["failed"].tolist(), outcomes, strict=True)
+        if outcome != "undecided"
+    ]
     failed_by_rule = {name: count for name in RULE_WORDS if (count := sum(name in rules for rules in failed_rules))}
     return ComparedCampaign(str(path.parent), tally, Estimator(goal).estimate(tally).interval, failed_by_rule)
 
@@ -151,6 +155,10 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
     counts = [len(table["flight"]) for table in tables]
     if pairs and pairs < max(counts):
         notes.append(f"the difference is that of the {count_text(pairs, 'flight')} that both campaigns have")
+    if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
+        notes.append(
+            f"{count_text(undecided_count, 'flight')} not judged in full: the difference counts them as not flyable"
+        )
     if any(setting.get("stops") or setting.get("changed") for setting in settings):
         notes.append("a number of flights was not fixed beforehand: the interval of the difference is only approximate")
     return notes

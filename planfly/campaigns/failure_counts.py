@@ -75,10 +75,18 @@ def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:
     ]
 
 
-def failure_lines(by_rule: Iterable[RuleFailures]) -> list[str]:
-    """Return a line for each failed rule: number of failed flights, and the three most frequent places."""
+def failure_lines(by_rule: Iterable[RuleFailures], mission_fault: str = "") -> list[str]:
+    """Return a line for each failed rule: number of failed flights, and the three most frequent places.
+
+    mission_fault: reason why the mission fails as a whole, which has no place; "" if it is not known.
+    """
     lines = []
     for failures in by_rule:
-        places_text = ", ".join(f"{place_text(place)} in {count}" for place, count in failures.places[:3])
-        lines.append(f"  failed  {RULE_WORDS[failures.rule].title} in {failures.flights}: {places_text}")
+        texts = [
+            mission_fault if place.kind == "mission" and place.item is None else f"{place_text(place)} in {count}"
+            for place, count in failures.places[:3]
+        ]
+        places_text = ", ".join(filter(None, texts))
+        line = f"  failed  {RULE_WORDS[failures.rule].title} in {failures.flights}"
+        lines.append(f"{line}: {places_text}" if places_text else line)
     return lines

@@ -206,6 +206,7 @@ def find_winds(
                     pool = stack.enter_context(worker_pool(workers, base, fly))
                     calm_rows = [] if stored_flights.flown else _fly_in_calm_air(pool, goal)
                     if calm_rows:
+                        progress.report_calm(len(calm_rows))
                         return search.result_in_calm_air(calm_rows)
                 _fly_round(pool, search, missing_requests, stored_flights, progress)
             for request in requests:
@@ -307,7 +308,7 @@ class _Search:
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * len(rows)
         self.undecided = [(number, row.undecided_text) for number, row in enumerate(rows) if row.undecided_text]
-        failed = [row.failed for row in rows if not row.undecided_text]
+        failed = [row.failures for row in rows if row.outcome != "undecided"]
         calm = CalmFailures(0.0, len(rows), len(failed), count_failures(failed))
         return replace(self.result(), boundaries=boundaries, calm=calm, failures=())
 
@@ -362,13 +363,13 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
     draws, rows = iter(range(count)), dict[int, FlightRow]()
 
     def next_request() -> FlightRequest | None:
-        has_failed_only = all(row.outcome == "not flyable" for row in rows.values())
-        draw = next(draws, None) if has_failed_only else None
+        has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
+        draw = next(draws, None) if has_none_flyable else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
 
     for request, row in pool.fly(next_request):
         rows[request.index] = row
-    if any(row.outcome != "not flyable" for row in rows.values()):
+    if any(row.outcome in ("flyable", "lost") for row in rows.values()):
         return []
     return [rows[draw] for draw in range(count)]
 
@@ -447,6 +448,12 @@ class _ProgressReport:
             total = max(len(self._search.flown) + self._search.min_remaining_flights(), flight_count + 1)
             remark = f"{flight_count} of {count_text(total, 'flight')} at least"
             self._advance(float(flight_count), float(total), remark)
+
+    def report_calm(self, flight_count: int) -> None:
+        """Report the flights in calm air with which a search ends."""
+        if self._advance is not None:
+            text = f"{count_text(flight_count, 'flight')} in calm air, none of them flyable"
+            self._advance(float(flight_count), float(flight_count), text)
 
     def report(self, flight_count: int, is_last: bool = False) -> None:
         """Report the settled directions, the flights, the flights per minute, and the least remaining time.

@@ -45,8 +45,8 @@ MarginalPass = tuple[str, Place, float]
 def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
     """Return the marginal passes of a flight: findings that passed by less than their rule's scale.
 
-    Each is given by rule, place and margin.  The margin is a fraction of the scale, 0 to 1; it is 0 if a rule accepts a
-    value beyond its limit for another reason.  Passes close to a missile's sphere follow at the end.
+    Each is given by rule, place and margin.  The margin is a fraction of the scale, 0 to 1.
+    Passes close to a missile's sphere follow at the end.
     """
     fractions: dict[tuple[str, Place], float] = {}
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
@@ -135,8 +135,10 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
 # ----------------------------------------------------------------------
 # Define the row of a flight, which also defines the columns of every table of flights.
 
-# Outcomes of a flight; a lost flight could not be flown, because its workers died on it.
-Outcome = Literal["flyable", "not flyable", "lost"]
+# Outcomes of a flight, in the order of `planfly.campaigns.statistics.decision.Tally`; a lost flight could not be flown,
+# because its workers died on it, and an undecided one is not judged in full.
+Outcome = Literal["flyable", "not flyable", "lost", "undecided"]
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +205,9 @@ class FlightRow:
     The tables of `planfly.campaigns.tables` are derived from this class.
 
     ended: "completed", or the reason why the flight ended early.
-    failed: rule and place of each failed finding, in the verdict's order.
+    failed: rule and place of each failed finding, in the verdict's order; of an undecided flight, those of the findings
+    that leave it undecided.
+    undecided_text: rules that leave an undecided flight undecided, with their reasons; "" for any other.
     margins: minimum margin of each judged rule whose margin has a scale.
     missile_distance: smallest distance outside a missile's sphere, m, negative inside; None if nothing was flown or
     there are no missiles.
@@ -215,7 +219,7 @@ class FlightRow:
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
     marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
-    undecided: True if the flight is not judged in full; the table of a campaign does not store it.
+    undecided: True if the flight is not judged in full, also if it flies; the tables do not store it.
     unjudged: rules that are not judged in a flight without failures, with places and reason as in the verdict's
     summary; the tables do not store them.
     """
@@ -224,6 +228,7 @@ class FlightRow:
     outcome: Annotated[Outcome, _TEXT]
     ended: Annotated[str, _TEXT]
     failed: Annotated[tuple[tuple[str, Place], ...], _FAILED_FINDINGS] = ()
+    undecided_text: Annotated[str, _TEXT] = ""
     margins: tuple[tuple[str, MinimumMargin], ...] = ()
     missile_distance: Annotated[float | None, Column("REAL")] = None
     energy_left: Annotated[float | None, Column("REAL")] = None
@@ -244,12 +249,9 @@ class FlightRow:
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 
     @property
-    def undecided_text(self) -> str:
-        """Rules that leave a flight undecided, with their reasons; "" if it counts as flyable or as failed."""
-        if self.outcome == "flyable" or not self.undecided:
-            return ""
-        rules = {rule for rule, _ in self.failed}
-        return "; ".join(text for rule, text in self.unjudged if rule in rules)
+    def failures(self) -> tuple[tuple[str, Place], ...]:
+        """Rule and place of each failed finding; () for an undecided flight."""
+        return () if self.outcome == "undecided" else self.failed
 
 
 def scale_margin(rule: str, margin: MinimumMargin) -> float | None:
@@ -291,12 +293,16 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         findings_only=log is None,
     )
     track, route, verdict = flight.track, varied_flight.setup.route, flight.verdict
-    has_rows = len(track) > 0
+    has_rows, failed = len(track) > 0, list_failed_findings(verdict)
+    unjudged = find_unjudged_rules(verdict, varied_flight.setup)
+    open_rules = {rule for rule, _ in failed} if verdict.undecided and not verdict.flies else set()
+    undecided_text = "; ".join(text for rule, text in unjudged if rule in open_rules)
     return FlightRow(
         draw=draw,
-        outcome="flyable" if verdict.flies else "not flyable",
+        outcome="flyable" if verdict.flies else "undecided" if undecided_text else "not flyable",
         ended=flight.ended,
-        failed=list_failed_findings(verdict),
+        failed=failed,
+        undecided_text=undecided_text,
         margins=find_minimum_margins(verdict.findings),
         missile_distance=_missile_distance(verdict.findings),
         energy_left=max(0.0, varied_flight.setup.battery - float(track.energy[-1])) if has_rows else None,
@@ -305,7 +311,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
         marginal_passes=find_marginal_passes(verdict.findings, varied_flight.setup.scenario, track),
         undecided=verdict.undecided,
-        unjudged=find_unjudged_rules(verdict, varied_flight.setup),
+        unjudged=unjudged,
         seconds=time.perf_counter() - start_time,
     )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
-from planfly.campaigns.flight_row import FlightRow, fly_one
+from planfly.campaigns.flight_row import OUTCOMES, FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, Store, StoreError, read_stored_settings
 from planfly.campaigns.worker_pool import FlightRate, WorkerPool, Workers, worker_pool
@@ -58,8 +58,7 @@ class _FlightTally:
 
 def _add_outcome(tally: Tally, outcome: str) -> Tally:
     """Return a tally with one more flight of an outcome."""
-    flyable, not_flyable, lost = tally
-    return Tally(flyable + (outcome == "flyable"), not_flyable + (outcome == "not flyable"), lost + (outcome == "lost"))
+    return Tally(*(count + (outcome == name) for count, name in zip(tally, OUTCOMES, strict=True)))
 
 
 def resumed_goal(

@@ -89,7 +89,8 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
             (
                 row.draw.index,
                 row.outcome,
-                "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failed[:4])
+                "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failures[:4])
+                or row.undecided_text
                 or row.ended,
                 closest_text(row),
                 log,
@@ -120,17 +121,18 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
 def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
     """Draw the figures of a campaign's report; return each with its caption."""
-    flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
-    speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
-    bins = group_by_speed(speed, flyable, summary.goal.confidence)
+    outcomes = np.array(list(store.outcomes().values()))
+    speed, is_decided = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed")), outcomes != "undecided"
+    bins = group_by_speed(speed[is_decided], (outcomes == "flyable")[is_decided], summary.goal.confidence)
     counts = [
         (RULE_WORDS[entry.rule].title, place_text(place), count)
         for entry in summary.by_rule
         for place, count in entry.places
     ]
-    figures = [
-        (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
-    ]
+    caption = "Share of flyable flights against the mean wind's speed"
+    if summary.estimate.tally.undecided:
+        caption += f", without the {summary.estimate.tally.undecided} that are not judged in full"
+    figures = [(draw_probability(bins, summary.goal.target), caption)] if bins else []
     for deciding in summary.deciding:
         if deciding.drivers:
             bars = [Bar(entry.title, entry.index, entry.slope) for entry in deciding.drivers]
@@ -150,7 +152,7 @@ def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
     if not clearances:
         return []
     outcomes = [
-        outcome != "flyable"
+        outcome in ("not flyable", "lost")
         for outcome, has_track in zip(store.texts("outcome"), store.has_track(), strict=True)
         if has_track
     ]

@@ -12,6 +12,7 @@ from logs.verdict.conditions import Conditions, flown_lines
 from logs.verdict.junit import JunitCase, JunitSuite
 from logs.verdict.measures.mission_ends import missing_home_text
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.rules.mission_rule import mission_findings
 from logs.verdict.wording import margin_text, place_text, quantity_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
@@ -22,7 +23,7 @@ from planfly.campaigns.failure_counts import (
     failure_lines,
     failures_document,
 )
-from planfly.campaigns.flight_row import FlightRow, parse_failed_findings, scale_margin
+from planfly.campaigns.flight_row import FlightRow, scale_margin
 from planfly.campaigns.statistics.decision import (
     MAX_DECIDING_FLIGHTS,
     MIN_FLIGHTS_FOR_INDEX,
@@ -141,6 +142,8 @@ class CampaignSummary:
     for more than `MAX_DECIDING_FLIGHTS`.
     unjudged_return: reason why the return after the last item is not judged in any flight; "" if it is judged.
     ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
+    undecided_text: rules that leave the first undecided flight undecided, with their reasons; "" without such a flight.
+    mission_fault: reason why the mission fails as a whole; "" if no flight fails so, or only with varied conditions.
     """
 
     name: str
@@ -157,6 +160,8 @@ class CampaignSummary:
     conditions: Conditions
     deciding_flights: int | None = None
     unjudged_return: str = ""
+    undecided_text: str = ""
+    mission_fault: str = ""
 
     def __repr__(self) -> str:
         tally = self.estimate.tally
@@ -165,7 +170,7 @@ class CampaignSummary:
 
 def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
     """Summarise a campaign in one pass through its table."""
-    by_rule = _count_failures(store)
+    by_rule = count_failures(store.failures())
     worst_rows = tuple(store.worst_flights(WORST_FLIGHT_COUNT))
     margins = _read_margins(store)
     is_undecided = estimate.answer == "undecided" and estimate.tally.flown > 0
@@ -192,12 +197,15 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         conditions=base.conditions(),
         deciding_flights=Estimator(goal).deciding_flights(estimate.tally) if is_undecided else None,
         unjudged_return=missing_home_text(base.nominal_setup()),
+        undecided_text=next(filter(None, store.texts("undecided_text")), ""),
+        mission_fault=_mission_fault(base) if any(failures.rule == "mission" for failures in by_rule) else "",
     )
 
 
-def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
-    """Count the flights in a table by failed rule and place."""
-    return count_failures(parse_failed_findings(text) for text in store.texts("failed"))
+def _mission_fault(base: CampaignBase) -> str:
+    """Return the reason why a mission fails as a whole in nominal conditions; "" if it does not."""
+    findings = mission_findings(base.nominal_setup())
+    return next((finding.reason for finding in findings if finding.ok is False and finding.place.item is None), "")
 
 
 def _read_margins(store: Store) -> dict[str, Floats]:
@@ -205,7 +213,7 @@ def _read_margins(store: Store) -> dict[str, Floats]:
 
     NaN if the rule was not judged, -inf if the flight failed the rule by an unknown margin.
     """
-    failed_rules = [{rule for rule, _ in parse_failed_findings(text)} for text in store.texts("failed")]
+    failed_rules = [{rule for rule, _ in failures} for failures in store.failures()]
     margins = {}
     for rule, words in RULE_WORDS.items():
         has_failed = np.array([rule in failed for failed in failed_rules], dtype=bool)
@@ -337,6 +345,8 @@ def summary_json(summary: CampaignSummary) -> str:
         "flights": estimate.tally.flown,
         "flyable": estimate.tally.flyable,
         "not_flyable": estimate.tally.failed,
+        "undecided": estimate.tally.undecided,
+        "not_judged": summary.undecided_text,
         "lost": list(summary.lost),
         "probability": _to_plain_number(estimate.tally.share),
         "confidence": summary.goal.confidence,
@@ -395,7 +405,8 @@ def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
         "flight": row.draw.index,
         "outcome": row.outcome,
         "ended": row.ended,
-        "failed": [{"rule": rule, "where": place_text(place)} for rule, place in row.failed],
+        "failed": [{"rule": rule, "where": place_text(place)} for rule, place in row.failures],
+        "not_judged": row.undecided_text,
         "closest": closest_text(row),
         "drawn": {name: _to_plain_number(value) for name, value in row.draw.values.items() if name in QUANTITY_BY_NAME},
         "seed": row.draw.seed,
@@ -411,8 +422,8 @@ def closest_text(row: FlightRow) -> str:
     scaled_margins = [
         (fraction, rule, margin) for rule, margin in row.margins if (fraction := scale_margin(rule, margin)) is not None
     ]
-    failed_rules = {rule for rule, _ in row.failed}
-    for rule, place in row.failed:
+    failed_rules = {rule for rule, _ in row.failures}
+    for rule, place in row.failures:
         if rule not in {known_rule for _, known_rule, _ in scaled_margins}:
             return f"{RULE_WORDS[rule].title} failed at {place_text(place)}, not by a margin"
     if not scaled_margins:
@@ -436,15 +447,16 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     estimate, goal = summary.estimate, summary.goal
     tally, confidence_text = estimate.tally, f"{100.0 * goal.confidence:g} %"
     lines = [
-        f"{_answer_text(summary)}: {_flyable_text(tally)}, P = {tally.share:.4f}"
+        f"{_answer_text(summary)}: {_flyable_text(tally)}, {_share_text(tally)}"
         + ("; return not judged" if summary.unjudged_return else ""),
         f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
         f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
         *_deciding_flights_lines(summary),
         *(f"  {line}" for line in flown_lines(summary.conditions)),
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
+        *undecided_lines(summary),
     ]
-    lines += failure_lines(summary.by_rule)
+    lines += failure_lines(summary.by_rule, summary.mission_fault)
     lines += [
         f"  narrow  {RULE_WORDS[entry.rule].title}: the smallest margin of all flights is"
         f" {margin_text(entry.lowest or 0.0, entry.unit, passed=True)}"
@@ -455,6 +467,15 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         lost_text = ", ".join(map(str, summary.lost[:10]))
         lines.append(f"  lost    {len(summary.lost)} could not be flown because their workers died: {lost_text}")
     return lines + deciding_lines(summary)
+
+
+def undecided_lines(summary: CampaignSummary) -> list[str]:
+    """Return a line on the flights that are not judged in full, with the reason of the first; [] if there are none."""
+    tally = summary.estimate.tally
+    if not tally.undecided:
+        return []
+    flights_text = f"{tally.undecided} of {count_text(tally.flown, 'flight')}"
+    return [f"  Not judged: {flights_text}, the first of them because of {summary.undecided_text}"]
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
@@ -489,14 +510,22 @@ def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
     cases = [JunitCase("planfly", "verdict", result, lines[0])]
     for failures in summary.by_rule:
         text = f"{failures.flights} of {count_text(summary.estimate.tally.flown, 'flight')} failed"
-        (line,) = failure_lines([failures])
+        (line,) = failure_lines([failures], summary.mission_fault)
         cases.append(JunitCase(f"planfly.{failures.rule}", "flights", result, text, line.strip()))
     return JunitSuite(name, cases, "\n".join(lines))
 
 
 def _flyable_text(tally: Tally) -> str:
     """Return the number of flyable flights as text, such as "1 of 4 flights is flyable"."""
-    return f"{tally.flyable} of {count_text(tally.flown, 'flight')} {'is' if tally.flyable == 1 else 'are'} flyable"
+    text = f"{tally.flyable} of {count_text(tally.flown, 'flight')} {'is' if tally.flyable == 1 else 'are'} flyable"
+    return f"{text}, {tally.undecided} not judged in full" if tally.undecided else text
+
+
+def _share_text(tally: Tally) -> str:
+    """Return the fraction of flyable flights as text; with undecided flights both ends of its range."""
+    if not tally.undecided:
+        return f"P = {tally.share:.4f}"
+    return f"P from {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
 
 
 def _answer_text(summary: CampaignSummary) -> str:
@@ -523,13 +552,14 @@ def _deciding_flights_lines(summary: CampaignSummary) -> list[str]:
     if summary.estimate.answer != "undecided":
         return []
     flights = summary.deciding_flights
+    shares_text = (
+        "these shares of flyable and unjudged" if summary.estimate.tally.undecided else "this share of flyable"
+    )
     if flights is None:
-        return [
-            f"  more than {MAX_DECIDING_FLIGHTS:,} flights with this share of flyable ones would be needed to decide it"
-        ]
+        return [f"  more than {MAX_DECIDING_FLIGHTS:,} flights with {shares_text} ones would be needed to decide it"]
     if summary.estimate.tally.share == 1.0:
         return [f"  a campaign of {flights:,} flights without a failure would decide it"]
-    return [f"  a campaign of about {flights:,} flights with this share of flyable ones would decide it"]
+    return [f"  a campaign of about {flights:,} flights with {shares_text} ones would decide it"]
 
 
 def _to_plain_number(value: float | None) -> float | None:

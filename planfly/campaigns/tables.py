@@ -27,6 +27,7 @@ from planfly.campaigns.campaign_inputs import describe_differences
 from planfly.campaigns.dispersions import NAMES, Draw
 from planfly.campaigns.flight_row import (
     COLUMN_FIELDS,
+    OUTCOMES,
     FlightRow,
     MarginalPass,
     MinimumMargin,
@@ -332,7 +333,7 @@ class LockedTable:
     def tally(self) -> Tally:
         """Return the number of flights with each outcome."""
         counts = dict(self._connection.execute("SELECT outcome, COUNT(*) FROM flights GROUP BY outcome"))
-        return Tally(counts.get("flyable", 0), counts.get("not flyable", 0), counts.get("lost", 0))
+        return Tally(*(counts.get(outcome, 0) for outcome in OUTCOMES))
 
 
 def read_stored_settings(path: Path) -> dict[str, Any]:
@@ -462,6 +463,13 @@ class Store(LockedTable):
             for (value,) in self._connection.execute(f"SELECT {_check_column(name)} FROM flights ORDER BY flight")
         ]
 
+    def failures(self) -> list[tuple[tuple[str, Place], ...]]:
+        """Return rule and place of the failed findings of each flight, in order; () for an undecided flight."""
+        return [
+            () if outcome == "undecided" else parse_failed_findings(text)
+            for outcome, text in zip(self.texts("outcome"), self.texts("failed"), strict=True)
+        ]
+
     def first_text(self, name: str) -> str | None:
         """Return the first text in a column that is not empty, in the order of flights; None if there is none."""
         query = f"SELECT {_check_column(name)} FROM flights WHERE {name} IS NOT NULL ORDER BY flight LIMIT 1"
@@ -480,8 +488,9 @@ class Store(LockedTable):
         ]
 
     def worst_flights(self, max_count: int) -> list[FlightRow]:
-        """Return the worst flights: first lost flights, then failed flights, then the closest calls by margin."""
-        order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
+        """Return the worst flights: lost, then failed, then undecided flights, then the closest calls by margin."""
+        ranks = "WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 WHEN 'undecided' THEN 2 ELSE 3"
+        order = f"CASE outcome {ranks} END, closeness IS NULL, closeness"
         rows = self._connection.execute(f"{_SELECT_ROWS} ORDER BY {order}, flight LIMIT ?", (max_count,))
         return [_make_row(values) for values in rows]
 
@@ -525,7 +534,6 @@ WINDS_KIND = TableKind(
         "asked_speed": "REAL NOT NULL",
         "draw": "INTEGER NOT NULL",
         "narrow": "TEXT NOT NULL",
-        "undecided": "TEXT NOT NULL",
         **ROW_COLUMNS,
     },
     FIXED_SETTINGS,
@@ -581,14 +589,13 @@ class WindsStore(LockedTable):
             "narrow": json.dumps(
                 [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.marginal_passes]
             ),
-            "undecided": row.undecided_text,
         }
         self.insert({**request_values, **row_values(replace(row, made_of=self.made_of))})
 
     def stored_flights(self) -> dict[int, tuple[RequestedFlight, FlownFlight]]:
         """Return the request and the outcome of each flight, keyed by number."""
         rows = self._connection.execute(
-            "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow, undecided FROM flights"
+            "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow, undecided_text FROM flights"
             " ORDER BY flight"
         )
         return {

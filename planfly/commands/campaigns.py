@@ -176,7 +176,8 @@ def campaign(args: argparse.Namespace) -> int:
 
     print("\n".join(campaign_lines(result.summary)))
     print(f"results   {folder}/ (report.html, summary.json, campaign.sqlite, worst/)")
-    code = _EXIT_CODES[result.answer]
+    is_open = result.answer == "no target" and result.summary.estimate.tally.undecided > 0
+    code = INCOMPLETE if is_open else _EXIT_CODES[result.answer]
     write_json_if_requested(args, lambda: _with_exit_code(folder / "summary.json", code))
     write_suite_if_requested(args, lambda: campaign_suite(args.target, result.summary))
     return code
@@ -211,7 +212,7 @@ def _result_folder(args: argparse.Namespace, kind: str) -> Path:
 
 
 def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
-    """Repeat one flight of the campaign in a folder, with a log; return 4 if the flight was not flyable."""
+    """Repeat one flight of the campaign in a folder, with a log; return the exit code of its outcome."""
     from logs.verdict.wording import place_text
 
     for option, target in (("--json", args.json), ("--junit", args.junit)):
@@ -221,10 +222,12 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
             )
     flight = call_api(planfly.campaign_flight, args, index=args.refly, out=folder)
     print(f"flight {args.refly}: {flight.row.outcome}, ended: {flight.row.ended}, as in the table")
-    for rule, place in flight.row.failed:
+    if flight.row.undecided_text:
+        print(f"  Not judged: {flight.row.undecided_text}")
+    for rule, place in flight.row.failures:
         print(f"  failed  {rule} at {place_text(place)}")
     print(f"log       {flight.log}")
-    return FLYABLE if flight.row.outcome == "flyable" else NOT_FLYABLE
+    return {"flyable": FLYABLE, "undecided": INCOMPLETE}.get(flight.row.outcome, NOT_FLYABLE)
 
 
 @contextmanager

@@ -49,8 +49,8 @@ def add_survey_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed that makes "
-        "all lines usable; each is flown",
+        help="look for a distance between photos, turn-arounds, an order or a course of the lines, a parameter or an "
+        "airspeed that makes all lines usable; each is flown",
     )
     add_world_options(parser)
     add_aircraft_and_wind_options(parser)
@@ -137,6 +137,7 @@ def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
             [photo_line_entry(result.setup, line, measure) for line, measure in zip(survey.lines, lines, strict=True)]
             for survey, lines in zip(result.surveys, result.lines, strict=True)
         ],
+        photos=result.photos,
         overlaps=[None if overlap is None else overlap_entry(overlap) for overlap in result.overlaps],
         remedies=[survey_remedy_entry(remedy) for remedy in result.remedies],
         nearest=None if result.nearest is None else near_miss_entry(result.nearest),

@@ -85,17 +85,20 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
     from planfly.campaigns.statistics.decision import wilson
 
     base = _campaign_base(*payload)
-    flyable, failure_counts = 0, Counter[str]()
+    flyable, undecided, failure_counts = 0, 0, Counter[str]()
     for index in range(FLIGHT_COUNT):
         advance(index, FLIGHT_COUNT, f"{flyable} of {index} flyable")
         row = fly_one(base, index)
         flyable += row.outcome == "flyable"
-        failure_counts.update({rule for rule, _ in row.failed})
-    lower, upper = wilson(flyable, FLIGHT_COUNT)
+        undecided += row.outcome == "undecided"
+        failure_counts.update({rule for rule, _ in row.failures})
+    lower, upper = wilson(flyable, FLIGHT_COUNT).low, wilson(flyable + undecided, FLIGHT_COUNT).high
+    headline = f"{flyable} of {FLIGHT_COUNT} flights are flyable"
+    headline += f", {undecided} not judged in full" if undecided else ""
     common = [f"{rule} fails in {count}" for rule, count in failure_counts.most_common(5)]
     return {
-        "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable else "fail",
-        "headline": f"{flyable} of {FLIGHT_COUNT} flights are flyable: {lower:.0%} to {upper:.0%} at 95 %",
+        "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable or undecided else "fail",
+        "headline": f"{headline}: {lower:.0%} to {upper:.0%} at 95 %",
         "lines": [*common, f"planfly campaign flies more: {FLIGHT_COUNT} flights show little about rare failures"],
     }
 

@@ -12,9 +12,11 @@ from flight.autopilots.parts import Candidate
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
+from flight.mission.surveys import with_photo_spacing
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import judged_surveys
-from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.measures.photo_lines import measure_overlap
+from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
+from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.airframe import Airframe, load_airframe
@@ -24,7 +26,7 @@ from planfly.workflow.trial_flight import Trial
 from world.errors import PlanflyError
 from world.scenario import with_flight
 
-RemedyKind = Literal["side", "turn-around", "gates", "every", "course", "parameter", "airspeed"]
+RemedyKind = Literal["trigger", "side", "turn-around", "gates", "every", "course", "parameter", "airspeed"]
 
 # Turn-around distances that are tried, m.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
@@ -41,8 +43,8 @@ class SurveyRemedy:
     """Change with which a survey was flown and passed.
 
     kind: kind of the change.  name: name of the changed parameter; "" for other kinds.
-    current, value: turn-around distance in m, interleave stride (fly every n-th line), course in degrees, value of the
-    parameter, or airspeed in m/s.
+    current, value: distance between photos or turn-around distance in m, interleave stride (fly every n-th line),
+    course in degrees, value of the parameter, or airspeed in m/s.
     unit: unit of `current` and `value`.
     verdict: verdict on the flight.
     mission: the mission as it was flown.
@@ -116,6 +118,7 @@ def find_survey_remedies(
     trials = _Trials(setup, airframe, verdict, on_trial)
     longer_turn_around = trials.find_turn_around()
     candidates = [
+        trials.try_photo_spacing(),
         trials.try_other_side(),
         longer_turn_around,
         trials.try_gates(),
@@ -265,6 +268,26 @@ class _Trials:
 
     # ------------------------------------------------------------------
     # The remedies, one change each.
+
+    def try_photo_spacing(self) -> SurveyRemedy | None:
+        """Try the longest whole distance between photos with the required front overlap at the lowest planned place.
+
+        Returns None if the front overlap does not fail, or if the flight does not pass.
+        """
+        if not any(finding.check == FRONT_OVERLAP for finding in self._verdict.failed):
+            return None
+        mission, requirements, distances = self._setup.mission, route_requirements(self._setup), []
+        for survey in self._surveys:
+            measure = measure_overlap(requirements, None, survey)
+            distance = math.floor((None if measure is None else measure.needed_photo_spacing) or 0.0)
+            if 1.0 <= distance < survey.lines[0].photo:
+                mission = with_photo_spacing(mission, survey, float(distance))
+                distances.append((survey.lines[0].photo, float(distance)))
+        if not distances:
+            return None
+        current, shortest = min(distances, key=lambda pair: pair[1])
+        flight = self._fly_trial(mission, self._airframe, f"photos every {shortest:g} m")
+        return SurveyRemedy("trigger", "", current, shortest, "m", *flight) if self._is_remedy(flight) else None
 
     def find_turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes, or None.

@@ -73,22 +73,56 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
         texts[0] = "front overlap not judged: the distance between photos is not stated, or no photo can be used"
     if measure.side is None:
         texts[1] = "side overlap not judged: no usable photos lie side by side"
+    faults = overlap_faults(measure)
+    needs = (
+        ("photos at most {:.0f} m apart", measure.needed_photo_spacing),
+        (
+            "lines at most {:.0f} m apart",
+            measure.needed_line_spacing,
+        ),
+    )
+    for number, (check, (text, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
+        if check in faults and spacing:
+            texts[number] += f": that needs {text.format(spacing)} there"
+    if measure.ground_sampling is not None:
+        sampling_text = " to ".join(dict.fromkeys(f"{100.0 * distance:.1f}" for distance in measure.ground_sampling))
+        heights_text = f"{measure.min_height:.0f} m to {measure.max_height:.0f} m above ground"
+        texts.append(f"ground sampling distance {sampling_text} cm per pixel ({heights_text})")
     return tuple(texts)
 
 
-def has_required_overlap(measure: OverlapMeasure | None) -> bool:
-    """Return True if the photos overlap as required; an unknown overlap passes.
+def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
+    """Return a text on each overlap that is smaller than required, by `FRONT_OVERLAP` or `SIDE_OVERLAP`.
 
-    >>> has_required_overlap(None)
-    True
+    An unknown overlap passes.
+
+    >>> overlap_faults(None)
+    {}
     """
     if measure is None:
-        return True
-    pairs = ((measure.front, measure.camera.front), (measure.side, measure.camera.side))
-    return all(
-        fraction is None or required is None or fraction >= required - PHOTO_OVERLAP_FRACTION
-        for fraction, required in pairs
+        return {}
+    overlaps = (
+        (FRONT_OVERLAP, measure.front, measure.camera.front),
+        (SIDE_OVERLAP, measure.side, measure.camera.side),
     )
+    return {
+        check: f"{check} {100.0 * fraction:.1f} % < {100.0 * (required - PHOTO_OVERLAP_FRACTION):.0f} %"
+        for check, fraction, required in overlaps
+        if fraction is not None and required is not None and fraction < required - PHOTO_OVERLAP_FRACTION
+    }
+
+
+def count_taken_photos(survey: Survey, lines: Sequence[LineMeasure | None], overlap: OverlapMeasure | None) -> int:
+    """Return the number of photos taken on the lines of a survey; 0 if the distance between photos is not stated.
+
+    A camera that cannot follow the trigger distance takes photos in its shortest interval.
+    """
+    count = 0.0
+    for line, measure in zip(survey.lines, lines, strict=True):
+        taken = 0 if measure is None else measure.photos - measure.missed_photos
+        is_limited = overlap is not None and overlap.is_camera_limited
+        count += taken * line.photo / overlap.photo_spacing if overlap is not None and is_limited else taken
+    return round(count)
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
@@ -136,6 +170,8 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             change = (
                 "gates (CONDITION_GATE, a setting of QGroundControl) instead of waypoints where the camera is switched"
             )
+        case "trigger":
+            change = f"photos every {remedy.value:g} m instead of {remedy.current:.4g} m"
         case "every":
             first_line_text = (
                 f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""

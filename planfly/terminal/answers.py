@@ -235,6 +235,10 @@ class CampaignDocument:
     flights: int
     flyable: int
     not_flyable: int
+    undecided: int
+    """Flights that are not judged in full; the bounds count them as not flyable and as flyable."""
+    not_judged: str
+    """Why the first of them is not judged in full; empty if there is none."""
     lost: list[int]
     """Flights without an outcome."""
     probability: float | None

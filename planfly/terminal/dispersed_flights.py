@@ -65,14 +65,15 @@ def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -
 def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> list[str]:
     """Return the lines for a terminal."""
     from planfly.campaigns.failure_counts import failure_lines
-    from planfly.campaigns.summary import deciding_lines
+    from planfly.campaigns.summary import deciding_lines, undecided_lines
 
     low, high = answer.interval
     state = "" if answer.holds else ": less than 0.95"
     lines = [
         f"flights   holds in {answer.flyable} of {answer.flights} flights with the default dispersions"
         f" (P between {low:.2f} and {high:.2f} at 95 %){state}",
-        *failure_lines(result.summary.by_rule),
+        *undecided_lines(result.summary),
+        *failure_lines(result.summary.by_rule, result.summary.mission_fault),
         *deciding_lines(result.summary),
     ]
     if answer.remedies:

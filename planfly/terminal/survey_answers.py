@@ -41,7 +41,7 @@ class SurveyRemedyEntry:
     """A change with which the survey was flown so that all lines can be used."""
 
     kind: str
-    """Kind of the change: side, turn-around, gates, every, course, parameter or airspeed."""
+    """Kind of the change: trigger, side, turn-around, gates, every, course, parameter or airspeed."""
     name: str
     """Name of the parameter."""
     current: float
@@ -68,6 +68,8 @@ class OverlapEntry:
     """Overlap of photos on neighbouring lines."""
     side_asked: float | None
     side_lines: tuple[int, int] | None
+    ground_sampling_cm: tuple[float, float] | None
+    """Smallest and largest distance on the ground between two pixels; null if the pixels are not known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -92,6 +94,8 @@ class SurveyAnswer:
     usable: bool
     conditions: Conditions
     surveys: list[list[PhotoLineEntry]]
+    photos: int
+    """Number of photos taken on all lines; 0 if no item states the distance between photos."""
     overlaps: list[OverlapEntry | None]
     """Overlaps of each survey; null if its camera is not known."""
     remedies: list[SurveyRemedyEntry]
@@ -129,6 +133,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
 def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
     """Return the JSON entry of the photo overlap of a survey."""
     first_line, second_line = sorted(overlap.line_pair)
+    sampling = overlap.ground_sampling
     return OverlapEntry(
         front=None if overlap.front is None else round(overlap.front, 4),
         front_asked=overlap.camera.front,
@@ -136,6 +141,7 @@ def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
         side=None if overlap.side is None else round(overlap.side, 4),
         side_asked=overlap.camera.side,
         side_lines=None if overlap.side is None else (first_line + 1, second_line + 1),
+        ground_sampling_cm=None if sampling is None else (round(100.0 * sampling[0], 2), round(100.0 * sampling[1], 2)),
     )
 
 

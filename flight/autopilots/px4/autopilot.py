@@ -24,6 +24,7 @@ from flight.autopilots.parts import (
     RateLimit,
     ReturnBehaviour,
     ReturnMission,
+    ReturnTimeFailsafe,
     ReturnTrials,
     RtlSettings,
     SpeedLimits,
@@ -239,6 +240,7 @@ class Px4(Autopilot):
             dialect="px4",
             feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
             battery_failsafes=self._battery_failsafes(),
+            return_time_failsafe=self._return_time_failsafe(),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
             parameter_notes=parameters.notes,
         )
@@ -314,10 +316,6 @@ class Px4(Autopilot):
             yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming at home, which is {mission.fence_at_home}"
         if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
             yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
-        time_action = _RETURN_IN_TIME_DEFAULT[self.parameters.version]
-        time_action = parameters.by_origin("file").get("COM_FLTT_LOW_ACT", time_action)
-        if time_action == _RETURN_IN_TIME and parameters["BAT1_CAPACITY"] > 0.0:
-            yield "COM_FLTT_LOW_ACT 3 returns when the battery lasts only for the return, which is not simulated"
         if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
             limits = {"FD_FAIL_R": "FW_R_LIM", "FD_FAIL_P": "FW_P_LIM_MAX"}
             for name, limit in limits.items():
@@ -344,6 +342,31 @@ class Px4(Autopilot):
             return (failsafe._replace(capacity_parameter="BAT1_CAPACITY", capacity=capacity),)
         # Without a capacity the charge is estimated from the voltage.
         return (BatteryFailsafe(name, threshold, remaining_fraction=threshold),)
+
+    def _return_time_failsafe(self) -> ReturnTimeFailsafe | None:
+        """Return the failsafe of `rtlEstimateCheck`, or None if it does not act.
+
+        The remaining time is known only with a capacity.
+        """
+        parameters = self.parameters
+        default = _RETURN_IN_TIME_DEFAULT[parameters.version]
+        action = parameters.by_origin("file").get("COM_FLTT_LOW_ACT", default)
+        if action != _RETURN_IN_TIME or not parameters["BAT1_CAPACITY"] > 0.0:
+            return None
+        return ReturnTimeFailsafe(
+            f"COM_FLTT_LOW_ACT {action:g}",
+            remedy="COM_FLTT_LOW_ACT 0, or a larger battery (BAT1_CAPACITY), avoids it",
+            capacity=parameters["BAT1_CAPACITY"],
+            initial_current=parameters["BAT_AVRG_CURRENT"],
+            time_factor=parameters["RTL_TIME_FACTOR"],
+            time_margin=parameters["RTL_TIME_MARGIN"],
+            airspeed=parameters["FW_AIRSPD_TRIM"],
+            climb_rate=parameters["FW_T_CLMB_R_SP"],
+            sink_rate=parameters["FW_T_SINK_R_SP"],
+            altitude=parameters["RTL_RETURN_ALT"],
+            delay=max(0.0, parameters["RTL_LAND_DELAY"]),
+            follows_mission=parameters["RTL_TYPE"] in _ALONG_THE_MISSION,
+        )
 
     @property
     def turns(self) -> TurnRules:

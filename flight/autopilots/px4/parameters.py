@@ -172,6 +172,7 @@ OUTPUT_FUNCTION_NAMES = tuple(
 # or that state the reaction to a lost link (`flight.autopilots.px4.failsafes`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
+    "BAT_AVRG_CURRENT": 15.0,
     "BAT_CRIT_THR": 0.07,
     "BAT_EMERGEN_THR": 0.05,
     "BAT1_CAPACITY": -1.0,
@@ -197,6 +198,8 @@ _WHEN_STATED = {
     "FW_T_THR_LOW_HGT": -1.0,
     "GF_PREDICT": 0.0,
     "MIS_COMMAND_TOUT": 0.0,
+    "RTL_TIME_FACTOR": 1.1,
+    "RTL_TIME_MARGIN": 100.0,
     "FW_Y_RMAX": 50.0,
     # Gains of the rate controllers.
     **dict.fromkeys(("FW_RR_FF", "FW_PR_FF"), 0.5),

@@ -83,9 +83,8 @@ def _ground_hazards(
         hazards.append("the terrain is unknown")
     min_clearance = float(np.nanmin(clearances, initial=math.inf))
     if min_clearance < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
-        hazards.append(
-            f"the ground is only {min_clearance:.0f} m below ({requirements.limits.min_clearance:.0f} m are required)"
-        )
+        ground_text = f"only {min_clearance:.0f} m below" if min_clearance >= 0.0 else f"{-min_clearance:.0f} m above"
+        hazards.append(f"the ground is {ground_text} ({requirements.limits.min_clearance:.0f} m are required)")
     if limits.max_height_m is not None:
         # The greatest height above ground is the least height above ground of the same world upside down.
         inverted_clearances, _ = path_clearance(

@@ -253,6 +253,7 @@ class OverlapMeasure:
         is lost is compared only if no two others are neighbours. None if no two usable lines are next to each other.
     line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
         and height above ground, m.
+    min_height, max_height: heights above ground of the usable photos, m; NaN if none is usable.
     """
 
     camera: Camera
@@ -265,6 +266,30 @@ class OverlapMeasure:
     line_pair: tuple[int, int] = (-1, -1)
     line_spacing: float = math.nan
     side_height: float = math.nan
+    min_height: float = math.nan
+    max_height: float = math.nan
+
+    @property
+    def needed_photo_spacing(self) -> float | None:
+        """Longest distance between photos with the required front overlap at the lowest place, m; None if unknown."""
+        if self.front is None or self.camera.front is None:
+            return None
+        return (1.0 - self.camera.front) * self.camera.along * self.height
+
+    @property
+    def needed_line_spacing(self) -> float | None:
+        """Longest distance of lines with the required side overlap at the lowest place, m; None if unknown."""
+        if self.side is None or self.camera.side is None:
+            return None
+        return (1.0 - self.camera.side) * self.camera.across * self.side_height
+
+    @property
+    def ground_sampling(self) -> tuple[float, float] | None:
+        """Smallest and largest distance on the ground between two pixels of a photo, m; None if unknown."""
+        if not self.camera.pixels_across or not math.isfinite(self.min_height):
+            return None
+        scale = self.camera.across / self.camera.pixels_across
+        return scale * self.min_height, scale * self.max_height
 
 
 # Maximum distance of neighbouring lines, in spacings of the survey: one line may be missing between them.
@@ -299,7 +324,12 @@ def measure_overlap(
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
     kept_strips = [None if strip is None or strip.is_lost else strip for strip in strips]
-    measure = _with_side_overlap(OverlapMeasure(plan.camera), requirements, survey, kept_strips)
+    used_heights = [strip.heights[strip.is_usable] for strip in strips if strip is not None]
+    heights = np.concatenate(used_heights) if used_heights else np.empty(0)
+    measure = OverlapMeasure(plan.camera)
+    if heights.size:
+        measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()))
+    measure = _with_side_overlap(measure, requirements, survey, kept_strips)
     if measure.side is None:
         # No two lines that are not lost are neighbours: the usable parts of lost lines tell more than nothing.
         measure = _with_side_overlap(measure, requirements, survey, strips)

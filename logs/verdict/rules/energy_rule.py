@@ -19,6 +19,7 @@ from logs.verdict.findings import (
     message,
 )
 from logs.verdict.measures.energy import leg_energies, predicted_energy
+from logs.verdict.measures.return_time import longest_return_time, remaining_time
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -234,8 +235,34 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
                 messages.undecided.append(message(f"{name} {limit_text}{share_text}"))
             else:
                 messages.faults.append(message(f"{name} {limit_text}, and the flight needs {charge_used:.0f} mAh"))
+    if return_time_fault := _return_time_fault(requirements, energy_used):
+        messages.undecided.append(return_time_fault)
     clause = f"; whether the battery falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
     return messages._replace(unjudged_text=clause if unjudged else "")
+
+
+def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> Message | None:
+    """Return a message if the battery may last only for the return before the mission ends; None if it lasts longer.
+
+    The remaining time is that at the end of the mission, and the return the longest: both are bounds for all times.
+    """
+    failsafe = requirements.setup.autopilot.checks.return_time_failsafe
+    if failsafe is None:
+        return None
+    factor = math.exp(UNDECIDED_FRACTION * requirements.setup.envelope.power_sd)
+    remaining = remaining_time(requirements, failsafe, factor * energy_used, factor)
+    return_time = longest_return_time(requirements, failsafe)
+    needed = failsafe.time_factor * return_time + failsafe.time_margin
+    if remaining > needed:
+        return None
+    if math.isnan(remaining) or math.isinf(return_time):
+        reason = "how long the battery or a return lasts is not known"
+    else:
+        reason = (
+            f"at the mission's end the battery lasts for {max(0.0, remaining) / 60.0:.1f} min by PX4's estimate, and"
+            f" a return of up to {return_time / 60.0:.1f} min needs {needed / 60.0:.1f} min"
+        )
+    return message(f"{failsafe.parameter} may return before the mission ends", f": {reason}; {failsafe.remedy}")
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:

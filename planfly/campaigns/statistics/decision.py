@@ -26,21 +26,28 @@ class Interval(NamedTuple):
 class Tally(NamedTuple):
     """Number of flights with each outcome.
 
-    lost: flights that could not be simulated; treated as failures in lower bounds and as successes in upper bounds.
+    lost: flights that could not be simulated.
+    undecided: flights that are not judged in full.
     """
 
     flyable: int
     failed: int
     lost: int = 0
+    undecided: int = 0
+
+    @property
+    def unknown(self) -> int:
+        """Number of lost and undecided flights: failures in lower bounds, and successes in upper bounds."""
+        return self.lost + self.undecided
 
     @property
     def flown(self) -> int:
         """Number of all flights, including lost flights."""
-        return self.flyable + self.failed + self.lost
+        return self.flyable + self.failed + self.unknown
 
     @property
     def share(self) -> float:
-        """Fraction of flyable flights, with lost flights as not flyable; NaN without a flight."""
+        """Fraction of flyable flights, with lost and undecided flights as not flyable; NaN without a flight."""
         return self.flyable / self.flown if self.flown else math.nan
 
 
@@ -87,7 +94,7 @@ def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
     """
     if not tally.flown:
         return 1.0
-    return clopper_pearson(tally.flyable + tally.lost, tally.flown, 2.0 * confidence - 1.0).high
+    return clopper_pearson(tally.flyable + tally.unknown, tally.flown, 2.0 * confidence - 1.0).high
 
 
 def _binomial_interval(successes: int, trials: int, confidence: float, method: str) -> Interval:
@@ -212,12 +219,12 @@ class StoppingBound:
         return excluded
 
     def bounds(self, tally: Tally) -> Interval:
-        """Return the interval for a tally, in which lost flights count against either bound.
+        """Return the interval for a tally, in which lost and undecided flights count against either bound.
 
-        Lost flights are failures for the lower bound, and successes for the upper bound.
+        They are failures for the lower bound, and successes for the upper bound.
         """
-        lower = self.interval(tally.flyable, tally.failed + tally.lost).low
-        upper = self.interval(tally.flyable + tally.lost, tally.failed).high
+        lower = self.interval(tally.flyable, tally.failed + tally.unknown).low
+        upper = self.interval(tally.flyable + tally.unknown, tally.failed).high
         return Interval(lower, upper)
 
 
@@ -309,11 +316,11 @@ class Estimator:
         target, bound = self._goal.target, self._bound
         if bound is None or target is None:
             return False
-        is_reached = bound.excludes(tally.flyable, tally.failed + tally.lost, target, above=True)
-        return is_reached or bound.excludes(tally.flyable + tally.lost, tally.failed, target, above=False)
+        is_reached = bound.excludes(tally.flyable, tally.failed + tally.unknown, target, above=True)
+        return is_reached or bound.excludes(tally.flyable + tally.unknown, tally.failed, target, above=False)
 
     def deciding_flights(self, tally: Tally) -> int | None:
-        """Return the number of flights that decide the target if the share of flyable flights is that of a tally.
+        """Return the number of flights that decide the target if flyable and undecided ones keep their shares.
 
         None if it is larger than `MAX_DECIDING_FLIGHTS`.  tally: at least one flight, which leave the target undecided.
 
@@ -327,7 +334,9 @@ class Estimator:
             """Return True if so many flights decide; a fraction of a flight counts against the decision."""
             is_above = target is not None and share >= target
             flyable = math.floor(share * flights + 1e-9) if is_above else math.ceil(share * flights - 1e-9)
-            return self.estimate(Tally(flyable, flights - flyable)).answer != "undecided"
+            undecided = min(flights - flyable, math.ceil(flights * tally.undecided / tally.flown))
+            scaled_tally = Tally(flyable, flights - flyable - undecided, undecided=undecided)
+            return self.estimate(scaled_tally).answer != "undecided"
 
         while not decides(enough):
             too_few, enough = enough, 2 * enough
@@ -347,7 +356,9 @@ class Estimator:
         else:
             lower, upper = lower_bound(tally, confidence), upper_bound(tally, confidence)
             interval_low = clopper_pearson(tally.flyable, tally.flown, confidence).low
-            interval = Interval(interval_low, clopper_pearson(tally.flyable + tally.lost, tally.flown, confidence).high)
+            interval = Interval(
+                interval_low, clopper_pearson(tally.flyable + tally.unknown, tally.flown, confidence).high
+            )
         return Estimate(tally, lower, upper, interval, self._goal_status(lower, upper))
 
     def _goal_status(self, lower: float, upper: float) -> Answer:

@@ -17,6 +17,7 @@ from world.errors import ParameterError
 
 COPTER = "a multicopter or helicopter"
 QGC_HEAD = "# Onboard parameters for Vehicle 1\n#\n# Stack: {}\n# Vehicle: {}\n# Version: 1.12.3\n#\n"
+FIXED_WING_NAMES = "".join(f"1\t1\tFW_{name}\t1\t9\n" for name in ("R_LIM", "P_LIM_MAX", "THR_TRIM", "T_ALT_TC"))
 
 
 def origin(text: str) -> ParameterOrigin:
@@ -43,6 +44,16 @@ def origin(text: str) -> ParameterOrigin:
         (QGC_HEAD.format("PX4 Pro", "Multi-Rotor") + "1\t1\tNAV_ACC_RAD\t2\t9\n", "px4", COPTER),
         (QGC_HEAD.format("PX4 Pro", "VTOL Standard") + "1\t1\tFW_AIRSPD_TRIM\t15\t9\n", "px4", "a VTOL aircraft"),
         (QGC_HEAD.format("ArduPilot", "Rover") + "1\t1\tWP_RADIUS\t2\t9\n", "ardupilot", "a rover or boat"),
+        # The header of PX4's own type decides, whatever number of fixed-wing parameters follows.
+        *(
+            (QGC_HEAD.format("PX4 Pro", name) + FIXED_WING_NAMES, "px4", vehicle)
+            for name, vehicle in (
+                ("Quadrotor", COPTER),
+                ("Hexarotor", COPTER),
+                ("Ground rover", "a rover or boat"),
+                ("Fixed Wing", ""),
+            )
+        ),
         ("MC_ROLLRATE_P 0.1\nMPC_XY_VEL_MAX 12\nNAV_ACC_RAD 2\n", "px4", COPTER),
         ("FW_AIRSPD_TRIM 15\nVT_TYPE 2\nMC_ROLL_P 6\n", "px4", "a VTOL aircraft"),
         ("MAV_TYPE 2\nNAV_ACC_RAD 2\n", "px4", COPTER),

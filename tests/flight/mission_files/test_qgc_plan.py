@@ -80,7 +80,9 @@ def test_the_camera_of_a_survey_is_read() -> None:
     assert 0.3 * 50.0 * plan.camera.across == pytest.approx(CALC["AdjustedFootprintSide"])
     assert (plan.camera.front, plan.camera.side, plan.camera.interval) == (0.7, 0.7, 0.0)
     [turned] = plan_of_survey(CALC | {"Landscape": False, "MinTriggerInterval": 1.5}).survey_plans
-    assert turned.camera == Camera(plan.camera.along, plan.camera.across, 0.7, 0.7, 1.5)
+    pixels = CALC["ImageWidth"], CALC["ImageHeight"]
+    assert (plan.camera.pixels_across, plan.stated_photo) == (pixels[0], CALC["AdjustedFootprintFrontal"])
+    assert turned.camera == Camera(plan.camera.along, plan.camera.across, 0.7, 0.7, 1.5, pixels[1])
     # Without pixels the sensor's own sides.
     [plain] = plan_of_survey({key: value for key, value in CALC.items() if not key.startswith("Image")}).survey_plans
     assert plain.camera == Camera(6.17 / 4.5, 4.55 / 4.5, 0.7, 0.7)
@@ -88,9 +90,9 @@ def test_the_camera_of_a_survey_is_read() -> None:
 
 def test_a_camera_of_distances_alone_is_none() -> None:
     manual = {"AdjustedFootprintFrontal": 25, "AdjustedFootprintSide": 25, "CameraName": "Manual (no camera specs)"}
-    assert plan_of_survey(manual, metres=25.0).survey_plans == (SurveyPlan(25.0, 30.0),)
+    assert plan_of_survey(manual, metres=25.0).survey_plans == (SurveyPlan(25.0, 30.0, stated_photo=25.0),)
     # Nor is one that takes no photos known by a way between them.
-    assert plan_of_survey(manual, metres=0.0).survey_plans == (SurveyPlan(0.0, 30.0),)
+    assert plan_of_survey(manual, metres=0.0).survey_plans == (SurveyPlan(0.0, 30.0, stated_photo=25.0),)
     assert parse_mission(plan_with(simple(1, 36.4), simple(2, 36.5)), "a.plan").survey_plans == ()
 
 

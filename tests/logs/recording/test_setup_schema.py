@@ -44,13 +44,21 @@ def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
 
 
 def test_what_is_kept_of_surveys_comes_back() -> None:
-    plans = (SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0)), SurveyPlan(None), SurveyPlan(0.0, 10.0))
+    plans = (
+        SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0, 6000.0), 24.0),
+        SurveyPlan(None),
+        SurveyPlan(0.0, 10.0),
+    )
     with_surveys = replace(SETUP.mission, survey_plans=plans)
     table = through_json(MissionTable.from_dataclass(with_surveys))
     assert table["survey_plans"][0] == {
         "photo_m": 25.5,
         "turn_around_m": 30.0,
-        "camera": {"across_m_per_m": 1.5, "along_m_per_m": 1.0, "front": 0.7, "side": None, "interval_s": 2.0},
+        "camera": {
+            **{"across_m_per_m": 1.5, "along_m_per_m": 1.0, "front": 0.7, "side": None, "interval_s": 2.0},
+            "pixels_across": 6000.0,
+        },
+        "stated_photo_m": 24.0,
     }
     same(MissionTable.model_validate(table).mission(), with_surveys)
     # A log of before there were any, and of a mission without a survey, says nothing of them.

@@ -11,6 +11,7 @@ from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal, WindsResult, find_winds, open_winds_store
 from planfly.campaigns.flight_requests import FinishedFlight, FlightRequest, FlyOne
+from planfly.campaigns.fly_campaign import Advance
 from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, RequestedFlight, make_flight_row, parse_marginal_passes
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import made_flight, table
@@ -49,13 +50,18 @@ def flying_here() -> Iterator[None]:
 
 
 def searched(
-    base: CampaignBase, folder: Path, goal: WindsGoal = GOAL, workers: int = 2, fly: FlyOne = made_flight
+    base: CampaignBase,
+    folder: Path,
+    goal: WindsGoal = GOAL,
+    workers: int = 2,
+    fly: FlyOne = made_flight,
+    advance: Advance | None = None,
 ) -> WindsResult:
     """Search in a folder, or go on there."""
     folder.mkdir(exist_ok=True)
     resume = (folder / WINDS_DATABASE).exists()
     with open_winds_store(base, goal, folder, resume=resume) as store:
-        return find_winds(base, goal, Workers(workers), store, fly=fly)
+        return find_winds(base, goal, Workers(workers), store, advance, fly)
 
 
 def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], goal: WindsGoal = GOAL) -> None:

@@ -11,7 +11,7 @@ from planfly.campaigns.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.compare_campaigns import comparison_lines
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.fly_campaign import open_store
-from planfly.campaigns.statistics.decision import Goal
+from planfly.campaigns.statistics.decision import Goal, Tally
 from planfly.cli import main
 from planfly.flight_options import MissionOptions
 from tests.planfly.campaigns.made_campaigns import all_fly, write_short
@@ -104,3 +104,21 @@ def test_a_campaign_is_compared_with_a_campaign_only(
     ):
         assert main(["compare", *argv]) == 2
         assert words in capsys.readouterr().err
+
+
+def test_undecided_flights_fail_no_rule_and_are_noted(base: CampaignBase, tmp_path: Path) -> None:
+    first = fly(base, tmp_path / "a", 20, {})
+    with open_store(base, Goal(None, False, 20), _made(tmp_path / "b"), resume=False) as store:
+        for index in range(20):
+            row = all_fly(base, index)
+            open_row = replace(row, outcome="undecided", failed=(("slope", Place("leg", 1)),), undecided_text="slopes")
+            store.add(open_row if index < 3 else row)
+    found = planfly.compare_campaigns(first, tmp_path / "b")
+    assert found.second.tally == Tally(17, 0, 0, 3)
+    assert found.rules == []
+    assert "3 flights not judged in full: the difference counts them as not flyable" in found.notes
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir()
+    return folder

@@ -145,7 +145,7 @@ def test_flights_that_are_not_judged_in_full_are_no_failures(wind_base: Campaign
     """From N 6 flights are undecided and 6 fail; from E 150 fly, in 20 m/s, and one is undecided."""
     search = _Search(GOAL, wind_base)
     loiter = (("loiter", Place("waypoint", 4)),)
-    undecided = FlownFlight("not flyable", loiter, undecided="loiters (state the bank limit)")
+    undecided = FlownFlight("undecided", loiter, undecided="loiters (state the bank limit)")
     flown = [(0, 5.0, undecided)] * 6 + [(0, 10.0, FlownFlight("not flyable", loiter))] * 6
     flown += [(1, 20.0, FlownFlight("flyable", ()))] * MIN_FLIGHTS_PER_DIRECTION + [(1, 20.0, undecided)]
     for number, (direction, speed, outcome) in enumerate(flown):
@@ -172,11 +172,18 @@ def undecided_flight(base: CampaignBase, index: int, wind: GivenWind | None = No
     """A flight whose loiter is not judged."""
     return replace(
         made_flight(base, index, wind),
-        outcome="not flyable",
+        outcome="undecided",
         failed=(("loiter", LEG),),
-        undecided=True,
-        unjudged=(("threat", "threats (no scenario)"), ("loiter", "loiters (a guess)")),
+        undecided_text="loiters (a guess)",
     )
+
+
+@pytest.mark.usefixtures("here")
+def test_a_search_that_ends_in_calm_air_reports_the_flights_flown(wind_base: CampaignBase, tmp_path: Path) -> None:
+    """Three flights show a target of 0.9: 0.1 ** 2 is below 5 %, and three are flown at least."""
+    reports: list[tuple[float, float, str]] = []
+    searched(wind_base, tmp_path, fly=undecided_flight, advance=lambda *report: reports.append(report))
+    assert reports[-1] == (3.0, 3.0, "3 flights in calm air, none of them flyable")
 
 
 @pytest.mark.usefixtures("here")

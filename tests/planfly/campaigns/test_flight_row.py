@@ -14,8 +14,8 @@ from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, UNKNOWN_PATH, F
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.dispersions import parse_dispersions
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.dispersions import default_dispersions, parse_dispersions
 from planfly.campaigns.flight_row import (
     STATION_COUNT,
     MarginalPass,
@@ -100,6 +100,8 @@ def test_the_margin_is_that_to_the_limit_with_its_tolerance(
     [
         finding("slope", 1.0),
         finding("slope", 0.9, tolerance=0.1),
+        # What passes beyond its limit passes by other evidence.
+        finding("slope", -2.0, tolerance=0.5),
         finding("clearance", 10.0),
         finding("slope", None),
         finding("slope", 0.2, ok=None),
@@ -278,6 +280,20 @@ def test_a_flight_names_what_it_does_not_judge_unless_it_fails() -> None:
     assert find_unjudged_rules(flyable, setup) == titles[:1]
     failed = make_finding("turn", Place("waypoint", 1), ok=False, reason="x")
     assert find_unjudged_rules(replace(verdict, findings=(takeoff, failed)), setup) == ()
+
+
+def test_a_flight_that_only_an_open_setting_leaves_undecided_is_no_failure(tmp_path: Path) -> None:
+    """COM_FLT_TIME_MAX ends a mission and is not judged."""
+    mission, scenario = write_short(tmp_path)
+    params = tmp_path / "a.params"
+    params.write_text("# Stack: PX4 Pro\n1\t1\tCOM_FLT_TIME_MAX\t500\t6\n1\t1\tMIS_TKO_LAND_REQ\t0\t6\n")
+    scenario.write_text(
+        scenario.read_text().replace('autopilot = "planfly"', f'autopilot = "px4"\nparams = "{params}"')
+    )
+    px4_base = open_campaign(str(mission), default_dispersions(), {"scenario": scenario, "seed": 1})
+    row = fly_one(px4_base, 0)
+    assert (row.outcome, row.failures) == ("undecided", ())
+    assert row.undecided_text == "mission (COM_FLT_TIME_MAX 500 ends a mission and is not judged)"
 
 
 def test_an_empty_battery_has_nothing_left(base: CampaignBase) -> None:

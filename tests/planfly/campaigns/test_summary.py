@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
+import pytest
 
 from aircraft.uncertainty import Draws
 from logs.verdict.junit import suites_text
@@ -242,7 +243,7 @@ def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Pat
     with made_report(base, tmp_path, flights=8) as (store, summary):
         assert [entry.rule for entry in summary.deciding] == ["clearance"]
         assert summary.deciding[0].sensitivities == ()
-        assert "; at least 30 flights that this rule judges would show" in campaign_lines(summary)[-1]
+        assert "; what the margin depends on is known from 30 flights" in campaign_lines(summary)[-1]
         assert "What the smallest margin depends on" not in campaign_page(base, summary, store, "").decode()
 
 
@@ -258,3 +259,61 @@ def test_corners_of_one_loiter_are_one_place() -> None:
     flights = [[("clearance", Place("leg", index, to_item=4, number=2))] for index in (2, 5, 9)]
     (clearance,) = count_failures(flights)
     assert [(place.number, count) for place, count in clearance.places] == [(2, 3)]
+
+
+def summary_of_outcomes(
+    base: CampaignBase, folder: Path, goal: Goal, flyable: int, failed: int, undecided: int
+) -> CampaignSummary:
+    """A campaign of flights that fly, flights that fail the mission, and flights that leave it open."""
+    whole = (("mission", Place("mission")),)
+    with open_store(base, goal, folder, resume=False) as store:
+        for index in range(flyable + failed + undecided):
+            row = with_margins(base, index, ("clearance", 9.0))
+            if index >= flyable + failed:
+                row = replace(row, outcome="undecided", failed=whole, undecided_text=f"mission (open {index})")
+            elif index >= flyable:
+                row = replace(row, outcome="not flyable", failed=whole)
+            store.add(row)
+        return summarise_campaign(base, goal, Estimator(goal).estimate(store.tally()), store)
+
+
+@pytest.mark.parametrize(
+    ("counts", "answer"),
+    [
+        # 0.95 ** 59 is 0.0485: 59 flights without a failure show 0.95.
+        ((59, 0, 0), "reached"),
+        ((59, 0, 1), "undecided"),
+        ((0, 0, 20), "undecided"),
+        ((1, 19, 0), "missed"),
+        # Even if both were flyable.
+        ((1, 17, 2), "missed"),
+    ],
+)
+def test_undecided_flights_leave_a_target_open_unless_it_holds_either_way(
+    base: CampaignBase, tmp_path: Path, counts: tuple[int, int, int], answer: str
+) -> None:
+    summary = summary_of_outcomes(base, tmp_path, Goal(0.95, False, sum(counts)), *counts)
+    assert summary.estimate.answer == answer
+
+
+def test_undecided_flights_are_no_failures_and_name_the_reason_of_the_first(base: CampaignBase, tmp_path: Path) -> None:
+    summary = summary_of_outcomes(base, tmp_path, Goal(0.9, False, 20), 1, 0, 19)
+    lines = campaign_lines(summary)
+    assert lines[0] == (
+        "P >= 0.9 is undecided: 1 of 20 flights is flyable, 19 not judged in full, P from 0.0500 to 1.0000"
+    )
+    assert "  Not judged: 19 of 20 flights, the first of them because of mission (open 1)" in lines
+    assert not any(line.startswith("  failed") for line in lines)
+    assert not any("decides mission" in line for line in lines)
+    data = json.loads(summary_json(summary))
+    assert (data["flyable"], data["not_flyable"], data["undecided"]) == (1, 0, 19)
+    assert data["not_judged"] == "mission (open 1)"
+    assert (data["failed_by_rule"], data["worst"][0]["failed"]) == ([], [])
+    assert data["deciding_flights"] is None
+
+
+def test_a_mission_that_fails_as_a_whole_is_named_once(base: CampaignBase, tmp_path: Path) -> None:
+    summary = summary_of_outcomes(base, tmp_path, Goal(None, False, 4), 1, 3, 0)
+    assert [line for line in campaign_lines(summary) if line.startswith("  failed")] == ["  failed  mission in 3"]
+    named = replace(summary, mission_fault="starts with landing")
+    assert "  failed  mission in 3: starts with landing" in campaign_lines(named)

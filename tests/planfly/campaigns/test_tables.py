@@ -85,10 +85,9 @@ def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Pa
     with opened(tmp_path / "w.sqlite", resume=False) as store:
         open_row = replace(
             all_fly(base, 2),
-            outcome="not flyable",
+            outcome="undecided",
             failed=(("loiter", Place("waypoint", 1)),),
-            undecided=True,
-            unjudged=(("threat", "threats"), ("loiter", "loiters (a guess)")),
+            undecided_text="loiters (a guess)",
         )
         store.add(later, open_row)
         store.add(RequestedFlight(8, 3, 15.0, 3), bad)
@@ -96,7 +95,7 @@ def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Pa
         store.add(first, make_lost_row(base, 2, "lost: x"))
         assert list(store.stored_flights().items()) == [
             (2, (first, FlownFlight("lost", ()))),
-            (7, (later, FlownFlight("not flyable", open_row.failed, undecided="loiters (a guess)"))),
+            (7, (later, FlownFlight("undecided", open_row.failed, undecided="loiters (a guess)"))),
             (
                 8,
                 (RequestedFlight(8, 3, 15.0, 3), FlownFlight("not flyable", (("clearance", Place("leg", 1)),), narrow)),

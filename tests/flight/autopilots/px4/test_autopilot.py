@@ -193,6 +193,26 @@ def test_a_critical_charge_leaves_the_mission_by_com_low_bat_act(values: dict[st
     assert [one.used_charge for one in found] == pytest.approx([] if used is None else [used], nan_ok=True)
 
 
+@pytest.mark.parametrize(
+    ("version", "values", "acts"),
+    [
+        ("1.16", {"BAT1_CAPACITY": 5000.0}, True),
+        ("1.17", {"BAT1_CAPACITY": 5000.0}, False),
+        ("1.17", {"BAT1_CAPACITY": 5000.0, "COM_FLTT_LOW_ACT": 3.0}, True),
+        ("1.16", {"BAT1_CAPACITY": 5000.0, "COM_FLTT_LOW_ACT": 1.0}, False),
+        ("1.17", {"COM_FLTT_LOW_ACT": 3.0}, False),
+    ],
+)
+def test_a_low_remaining_time_returns_by_default_in_1_16(
+    version: Px4Version, values: dict[str, float], acts: bool
+) -> None:
+    """COM_FLTT_LOW_ACT is 3 by default in 1.16 and 0 in 1.17; without a capacity no remaining time is known."""
+    failsafe = Px4(Px4Parameters.defaults(version).changed(**values)).checks.return_time_failsafe
+    assert (failsafe is not None) is acts
+    if failsafe is not None:
+        assert (failsafe.time_factor, failsafe.time_margin, failsafe.initial_current) == (1.1, 100.0, 15.0)
+
+
 def test_a_return_of_type_3_may_be_to_the_missions_landing() -> None:
     """`RTL::findRtlDestination` counts it for types 1 and 3."""
     for kind, may in ((0, False), (1, True), (3, True), (5, False)):

@@ -63,7 +63,12 @@ def test_the_highest_height_counts_against_the_greatest_above_ground() -> None:
 
 
 @pytest.mark.parametrize(
-    ("up", "what"), [(490.0, "the ground is only 10 m below (30 m are required)"), (np.nan, "the terrain is unknown")]
+    ("up", "what"),
+    [
+        (490.0, "the ground is only 10 m below (30 m are required)"),
+        (510.0, "the ground is 10 m above (30 m are required)"),
+        (np.nan, "the terrain is unknown"),
+    ],
 )
 def test_a_hill_counts_within_its_reach_only(up: float, what: str) -> None:
     ground = route_requirements(loiter(TIME, {})).setup.scenario.terrain

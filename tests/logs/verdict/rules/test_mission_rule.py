@@ -467,10 +467,8 @@ def test_settings_leave_the_verdict_open_where_an_item_makes_them_matter(lines: 
         ({"FD_FAIL_R": 45.0, "CBRK_FLIGHTTERM": 0.0}, ("FD_FAIL_R 45",)),
         ({"FD_FAIL_P": 30.0, "CBRK_FLIGHTTERM": 0.0}, ("FD_FAIL_P 30",)),
         ({"FD_FAIL_R": 51.0, "FD_FAIL_P": 0.0, "CBRK_FLIGHTTERM": 0.0}, ()),
-        # 1.17 returns at a low remaining time only where that is stated, and knows it only with a capacity.
-        ({"BAT1_CAPACITY": 5000.0}, ()),
-        ({"BAT1_CAPACITY": 5000.0, "COM_FLTT_LOW_ACT": 3.0}, ("COM_FLTT_LOW_ACT 3",)),
-        ({"COM_FLTT_LOW_ACT": 3.0}, ()),
+        # The rule energy judges a return at a low remaining time.
+        ({"BAT1_CAPACITY": 5000.0, "COM_FLTT_LOW_ACT": 3.0}, ()),
         # These matter in a return, and with a payload.
         ({"RTL_DESCEND_ALT": 50.0, "RTL_LAND_DELAY": 0.0, "RTL_TYPE": 2.0, "MIS_COMMAND_TOUT": 5.0}, ()),
         # 1.17 has no such parameter.
@@ -523,12 +521,6 @@ def test_settings_of_px4_leave_the_verdict_open_where_an_item_makes_them_matter(
 
 def test_px4_1_16_may_keep_no_minimum_ground_speed() -> None:
     assert unflown_by_px4({"NPFG_EN_MIN_GSP": 0.0}, *RETURN[:2], version="1.16") == ["NPFG_EN_MIN_GSP 0"]
-
-
-@pytest.mark.parametrize(("values", "said"), [({}, ["COM_FLTT_LOW_ACT 3"]), ({"COM_FLTT_LOW_ACT": 1.0}, [])])
-def test_px4_1_16_returns_at_a_low_remaining_time_by_default(values: dict[str, float], said: list[str]) -> None:
-    """COM_FLTT_LOW_ACT is 3 by default in 1.16 and 0 in 1.17."""
-    assert unflown_by_px4({"BAT1_CAPACITY": 5000.0} | values, *RETURN[:2], version="1.16") == said
 
 
 @pytest.mark.parametrize(

@@ -284,3 +284,14 @@ def test_one_flight_less_than_those_that_decide_does_not(goal: Goal, tally: Tall
 
 def test_at_the_target_itself_no_number_decides() -> None:
     assert Estimator(Goal(0.75, False, 4)).deciding_flights(Tally(3, 1)) is None
+
+
+def test_undecided_flights_count_against_either_bound() -> None:
+    """As lost ones do: 30 flyable and 2 failed of 40, the other 8 failed for one bound and flyable for the other."""
+    estimate = Estimator(Goal(0.9, False, 40)).estimate(Tally(30, 2, undecided=8))
+    assert estimate.lower == lower_bound(Tally(30, 10))
+    assert estimate.upper == upper_bound(Tally(38, 2))
+    assert estimate.answer == "undecided"
+    assert Tally(30, 2, 1, 7).share == 0.75
+    # The share of flyable flights is 0.75 or 0.95, however many are flown.
+    assert Estimator(Goal(0.9, False, 40)).deciding_flights(Tally(30, 2, undecided=8)) is None

@@ -1,0 +1,121 @@
+"""Photos of a survey by their numbers: too far apart, too fast for the camera, their pixels, and their count."""
+
+import itertools
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import planfly
+from flight.mission.items import Camera, Command, Mission, SurveyPlan
+from flight.mission.surveys import camera_notes
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.measures.photo_lines import OverlapMeasure
+from logs.verdict.measures.route_requirements import judged_surveys
+from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
+from planfly.surveys import survey_remedies as remedies
+from planfly.surveys.survey_text import count_taken_photos, overlap_lines, remedy_text
+from planfly.workflow.airframe import airframe_for_setup
+from planfly.workflow.open_flight import open_flight
+from tests.mission_lines import mission, wp
+
+# 23.5 mm by 15.6 mm behind 16 mm, 75 % and 65 % required, one photo per second, 6000 pixels across.
+CAMERA = Camera(23.5 / 16.0, 15.6 / 16.0, 0.75, 0.65, 1.0, 6000.0)
+
+
+def survey_of(metres: float, **plan: Any) -> Mission:
+    """Three lines of 1 km, 50 m apart and 100 m above home, with a photo each so many metres."""
+    items = []
+    for k in range(3):
+        north = [-300.0, 0.0, 1000.0, 1300.0][:: 1 if k % 2 == 0 else -1]
+        points = [wp(50.0 * k, value, 100.0) for value in north]
+        items += [*points[:2], f"2 206 {metres} 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
+    made = mission(*items)
+    object.__setattr__(made, "survey_plans", (SurveyPlan(metres, 300.0, CAMERA, **plan),))
+    return made
+
+
+def setup_with(tmp_path: Path, made: Mission) -> FlightSetup:
+    from flight.mission_files.formats import mission_text
+
+    file = tmp_path / "a.waypoints"
+    file.write_text(mission_text(made, "waypoints"), encoding="ascii")
+    setup = open_flight(file, {"aircraft": "x8", "autopilot": "px4"})
+    object.__setattr__(setup.mission, "survey_plans", made.survey_plans)
+    return setup
+
+
+def test_a_trigger_distance_for_the_required_overlap_is_tried(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A quarter of 100 m x 15.6 / 16 are 24.4 m: 24 m in the items and in the settings that name the camera."""
+    setup = setup_with(tmp_path, survey_of(75.0))
+
+    def verdict_of(flown: FlightSetup) -> Verdict:
+        [survey] = judged_surveys(flown)
+        ok = survey.lines[0].photo == 24.0 and flown.mission.survey_plans[0].photo == 24.0
+        findings: list[Finding] = [
+            make_finding("survey", Place("leg", line.first), ok=True, reason="", flown=99.0) for line in survey.lines
+        ]
+        place = Place("leg", survey.first)
+        findings.append(make_finding("survey", place, ok=ok, reason="", margin=-30.0, check="front overlap"))
+        return Verdict(tuple(findings), flyable=ok, complete=True, lines=("",), level="flown")
+
+    def fly(flown: FlightSetup, *_: Any) -> Any:
+        return SimpleNamespace(setup=flown, flight_verdict=verdict_of(flown))
+
+    monkeypatch.setattr(remedies, "Trial", fly)
+    [remedy] = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict_of(setup)).remedies
+    assert (remedy.kind, remedy.current, remedy.value, remedy.unit) == ("trigger", 75.0, 24.0, "m")
+    assert remedy_text(remedy, 5000.0).startswith("photos every 24 m instead of 75 m: flown, ")
+    distances = [item.params[0] for item in remedy.mission.items if item.command == Command.DO_SET_CAM_TRIGG_DIST]
+    assert distances == [24.0, 0.0] * 3
+
+
+def test_a_camera_that_cannot_follow_and_settings_that_contradict_the_items_are_noted(tmp_path: Path) -> None:
+    """10 m at 18 m/s, the cruise of an x8, are 0.56 s."""
+    setup = setup_with(tmp_path, survey_of(10.0, stated_photo=29.25))
+    assert camera_notes(setup.mission, setup.route) == (
+        "a survey triggers the camera every 10 m, but the settings of its camera in the file state 29.25 m"
+        " (AdjustedFootprintFrontal)",
+        "the camera takes one photo per 1 s; the trigger distance of 10 m asks for one every 0.56 s at 18.0 m/s",
+    )
+    # One percent is rounding, and 20 m take more than a second.
+    setup = setup_with(tmp_path, survey_of(20.0, stated_photo=20.2))
+    assert camera_notes(setup.mission, setup.route) == ()
+
+
+def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
+    """A quarter of 120 m x 15.6 / 16, and 35 % of 120 m x 23.5 / 16; 120 m x 23.5 / 16 / 6000 are 2.9375 cm."""
+    photos = {"front": 0.35, "photo_spacing": 75.0, "height": 120.0, "min_height": 120.0, "max_height": 160.0}
+    sides = {"side": 0.3, "line_pair": (0, 1), "line_spacing": 124.0, "side_height": 120.0}
+    front, side, pixels = overlap_lines(OverlapMeasure(CAMERA, **photos, **sides))  # type: ignore[arg-type]
+    assert front.endswith("75 % required: that needs photos at most 29 m apart there")
+    assert side.endswith("65 % required: that needs lines at most 62 m apart there")
+    assert pixels == "ground sampling distance 2.9 to 3.9 cm per pixel (120 m to 160 m above ground)"
+    unknown = Camera(CAMERA.across, CAMERA.along, 0.3, 0.2)
+    assert not any("sampling" in text for text in overlap_lines(OverlapMeasure(unknown, **photos)))  # type: ignore[arg-type]
+
+
+def test_a_camera_that_is_too_slow_takes_fewer_photos(tmp_path: Path) -> None:
+    """Of 101 triggers 10 m apart one photo each 20 m."""
+    [survey] = judged_surveys(setup_with(tmp_path, survey_of(10.0)))
+    line: Any = SimpleNamespace(photos=101, missed_photos=1)
+    assert count_taken_photos(survey, [line, None, line], None) == 200
+    limited = OverlapMeasure(CAMERA, 0.8, photo_spacing=20.0, is_camera_limited=True)
+    assert count_taken_photos(survey, [line, None, line], limited) == 100
+
+
+def test_the_first_line_names_an_overlap_that_is_too_small(tmp_path: Path) -> None:
+    setup = setup_with(tmp_path, survey_of(75.0))
+    [survey] = judged_surveys(setup)
+    usable: Any = SimpleNamespace(usable=1.0, photos=14, missed_photos=0)
+    lines = tuple(itertools.repeat(usable, len(survey.lines)))
+    overlap = OverlapMeasure(CAMERA, 0.348, photo_spacing=75.0)
+    verdict: Any = None
+    track: Any = None
+    result = planfly.SurveyResult(setup, track, verdict, (survey,), (lines,), (overlap,))
+    assert result.headline == "3 of 3 photo lines can be used; front overlap 34.8 % < 65 %"
+    assert not result.usable
+    assert result.photos == 42
