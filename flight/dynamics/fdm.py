@@ -13,6 +13,7 @@ import os
 import struct
 import sys
 import tempfile
+import threading
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -62,6 +63,8 @@ from world.kernels import Record, field_names
 
 # Maximum size of JSBSim's output that is read, bytes.
 _MAX_PRINTED_BYTES = 2**20
+# Held while standard output is suppressed: two threads would each keep the other's replacement.
+_SILENCE_LOCK = threading.RLock()
 
 
 @contextmanager
@@ -69,8 +72,14 @@ def silence() -> Iterator[Callable[[], str]]:
     """Suppress standard output, because JSBSim prints its banner at every debug level.
 
     JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. Yield a function that returns the
-    output of both.
+    output of both.  Both belong to the process, so one thread at a time suppresses them.
     """
+    with _SILENCE_LOCK:
+        yield from _suppressed_output()
+
+
+def _suppressed_output() -> Iterator[Callable[[], str]]:
+    """Suppress standard output, and yield a function that returns it; see `silence`."""
     sys.stdout.flush()
     saved_descriptor = os.dup(1)
     try:

@@ -155,14 +155,19 @@ class Optimiser:
 
         objective: maps points, (n, d), to values, (n,).
         generations: number of generations.
-        evaluations: total number of evaluations at which to stop, instead of `generations`.
+        evaluations: total number of evaluations at which to stop, instead of `generations`; of the last generation only
+        the first points are evaluated, so that the number is exact.
         """
         if evaluations is None:
             for _ in range(generations):
                 self.tell(objective(self.ask()))
-        else:
-            while self.evaluations < evaluations:
-                self.tell(objective(self.ask()))
+            return self.best
+        while (remaining := evaluations - self.evaluations) > 0:
+            points = self.ask()
+            values = np.asarray(objective(points[:remaining]), dtype=np.float64)
+            omitted = max(0, len(points) - remaining)
+            self.tell(np.concatenate([values, np.full((omitted, *values.shape[1:]), np.nan)]) if omitted else values)
+            self.evaluations -= omitted
         return self.best
 
     def __repr__(self) -> str:

@@ -114,6 +114,8 @@ class CalmFailures:
 class WindsResult:
     """Result of a search: the boundary of each direction, and the flights from which the boundaries are estimated.
 
+    boundaries: boundary of each direction; one from fewer than `MIN_FLIGHTS_PER_DIRECTION` flights, or with undecided
+        flights, is an estimate that the verdict does not judge.
     flights: direction, wind speed, m/s, and True if flyable, of each flight.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights, without the wind, which depends on the direction.
@@ -155,7 +157,9 @@ class WindsResult:
             if count >= MIN_FLIGHTS_PER_DIRECTION
         ]
         speed_text = f", {min(speeds):.1f} m/s the lowest" if speeds else ""
-        return f"<WindsResult {count_text(len(counts), 'direction')}{speed_text}; {count_text(sum(counts), 'flight')}>"
+        unjudged_text = f", {len(counts) - len(speeds)} of them not judged" if len(speeds) < len(counts) else ""
+        subject = f"{count_text(len(counts), 'direction')}{unjudged_text}{speed_text}"
+        return f"<WindsResult {subject}; {count_text(sum(counts), 'flight')}>"
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -393,3 +394,14 @@ def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
 def test_bad_rate_is_refused(rate_hz: float) -> None:
     with pytest.raises(FlightError, match="rate_hz"):
         Fdm(AEROSONDE, rate_hz=rate_hz)
+
+
+def test_threads_that_fly_leave_standard_output_in_place() -> None:
+    """Each of them suppresses the output of the whole process while it loads a model."""
+    code = (
+        "from concurrent.futures import ThreadPoolExecutor; from aircraft.catalog import load_aircraft;"
+        "from flight.dynamics.fdm import Fdm; aircraft = load_aircraft('aerosonde');"
+        "list(ThreadPoolExecutor(4).map(lambda _: Fdm(aircraft), range(12))); print('still here')"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert ended.stdout == "still here\n"
