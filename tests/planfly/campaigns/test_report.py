@@ -142,7 +142,7 @@ def test_flights_are_counted_by_wind() -> None:
 def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: Path) -> None:
     """Of 4 directions with a flight or two, and of one of 149 flights beside three of 150."""
     assert not any("by the best estimate" in line or "interval" in line for line in wind_lines(FOUND)[1:])
-    assert repr(FOUND) == "<WindsResult 4 directions; 5 flights>"
+    assert repr(FOUND) == "<WindsResult 4 directions, 4 of them not judged; 5 flights>"
     assert all(case.text == "" for case in winds_suite("m", FOUND).cases)
     write_winds(tmp_path, base, FOUND, "planfly winds x")
     page = (tmp_path / "winds.html").read_text()
@@ -150,7 +150,7 @@ def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: 
     assert "not judged, 1 to 2 flights" in page
     assert "no limit found" not in page
     partly = replace(ESTIMATED, flights=ESTIMATED.flights[:-1])
-    assert repr(partly) == "<WindsResult 4 directions, 7.0 m/s the lowest; 599 flights>"
+    assert repr(partly) == "<WindsResult 4 directions, 1 of them not judged, 7.0 m/s the lowest; 599 flights>"
     assert wind_lines(partly)[1].endswith("(the lowest; 6.5 to 7.5 m/s at 95 %), 9.0 m/s from 180°")
 
 
