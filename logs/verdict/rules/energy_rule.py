@@ -49,9 +49,8 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    The energy at which a battery failsafe leaves the mission is the limit if it is smaller.  An endless jump fails, and
-    a guessed battery is not judged.  If the power of the aircraft's model is uncertain, an energy that may exceed the
-    limit is undecided, except in an imported log, which has measured energy.
+    The energy at which a battery failsafe leaves the mission is the limit if it is smaller.  An endless jump fails.  A
+    guessed battery is not judged, and neither is an energy that may exceed the limit if the model's power is uncertain.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -69,8 +68,7 @@ def energy_findings(
     # Power is log-normal; this is the upper end of 95 %.
     max_energy = needed_energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
-    # A model without power data gives 0 W.
-    if energy == planned_energy == 0.0:
+    if energy == planned_energy == 0.0:  # the model has no power data
         energy = planned_energy = math.nan
         reason = "the aircraft's model states no power, so the energy is unknown"
     elif math.isnan(energy):
@@ -78,8 +76,8 @@ def energy_findings(
     else:
         reason = _used_text(requirements, energy, max_current, is_empty=is_empty)
         if geometric or math.isfinite(planned_energy):
-            whole_text = " for the whole mission" if is_cut_short else ""
-            reason += " by prediction" if geometric else f"; {planned_energy:.1f} Wh{whole_text} by prediction"
+            flown_text = f"; {planned_energy:.1f} Wh{' for the whole mission' if is_cut_short else ''}"
+            reason += f"{'' if geometric else flown_text} by prediction"
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:
