@@ -480,7 +480,7 @@ def suggest_flying_higher(
     """Suggest flying a leg higher above the ground.
 
     If home's altitude is that far below the ground, or if items are below the ground that are above it as heights above
-    home, suggest another altitude of home, or heights above home, instead.
+    home, suggest another altitude of home, or heights above home, first.
     """
     if finding.limit is None or finding.margin is None:
         return ()
@@ -494,15 +494,13 @@ def suggest_flying_higher(
             # The first item was probably taken for home: another altitude of it mends nothing.
             return ()
         return ((Change("home altitude", MISSION, home.alt, round(home.alt + depth, 1), "m"),),)
-    setup = requirements.setup
+    setup, suggestions = requirements.setup, list[Suggestion]()
     if misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)[0]:
         frames = float(Frame.GLOBAL), float(Frame.GLOBAL_RELATIVE_ALT)
-        return ((Change("altitude frame", MISSION, *frames, ""),),)
-    return (
-        ((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),),)
-        if shortfall > SUGGESTION_LENGTH_MARGIN_M
-        else ()
-    )
+        suggestions.append((Change("altitude frame", MISSION, *frames, ""),))
+    if shortfall > SUGGESTION_LENGTH_MARGIN_M:
+        suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
+    return tuple(suggestions)
 
 
 def suggest_flying_lower(

@@ -280,9 +280,10 @@ class _Trials:
         for survey in self._surveys:
             measure = measure_overlap(requirements, None, survey)
             distance = math.floor((None if measure is None else measure.needed_photo_spacing) or 0.0)
-            if 1.0 <= distance < survey.lines[0].photo:
+            first_line, *_ = survey.lines
+            if 1.0 <= distance < first_line.photo:
                 mission = with_photo_spacing(mission, survey, float(distance))
-                distances.append((survey.lines[0].photo, float(distance)))
+                distances.append((first_line.photo, float(distance)))
         if not distances:
             return None
         current, shortest = min(distances, key=lambda pair: pair[1])

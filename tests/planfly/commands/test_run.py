@@ -136,6 +136,7 @@ def test_check_of_the_log_repeats_the_verdict(demo: Path, tmp_path: Path) -> Non
     assert answer.pop("exit_code") == 0
     returns = answer.pop("returns")
     assert returns["returns"] == sum(returns["outcomes"].values()) > 0
+    assert answer.pop("headline") == "flyable"
     assert answer == json.loads((demo / "verdict.json").read_bytes())
 
 

@@ -80,8 +80,8 @@ def test_a_rally_point_and_a_landing_of_the_mission_are_reached(tmp_path: Path) 
     assert late.site_altitude_left - landing_alone.site_altitude_left == pytest.approx(500.0 / RATIO, abs=8.0)
     assert (found.best_site(late), without_rally.best_site(landing_alone)) == (1, 1)
     assert without_rally.sites[1].kind == "landing"
-    assert any(": rally point 1, " in glide_range_text(group, found) for group in found.ranges)
-    assert ": the landing at item 3, " in glide_range_text(found.ranges[-1], found)
+    assert any(": rally point 1 is in reach " in glide_range_text(group, found) for group in found.ranges)
+    assert ": the landing at item 3 is in reach " in glide_range_text(found.ranges[-1], found)
     assert "a rally point or landing place, but not home, from " in glides_headline(found)
 
 
@@ -207,7 +207,7 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     homeless = replace(setup, mission=replace(setup.mission, home=None))
     (nowhere,) = [one for one in judge_geometry(homeless).findings if (one.rule, one.place) == ("return", FLIGHT)]
     assert nowhere.ok is None
-    assert "home: not stated" in nowhere.reason
+    assert "home: missing" in nowhere.reason
 
 
 def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:

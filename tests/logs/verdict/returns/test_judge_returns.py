@@ -86,7 +86,7 @@ def test_a_sphere_and_a_zone_beside_the_way_are_met_and_named(tmp_path: Path) ->
     assert first_of(found, "threat") >= 1200.0
     worst = next(one for one in found.ranges if one.worst.kind == "threat")
     assert worst.worst.sphere_distance == pytest.approx(-70.0, abs=15.0)
-    assert "inside the sphere of post" in range_text(worst, found, hill_setup(tmp_path, threat).scenario)
+    assert "m into the sphere of post" in range_text(worst, found, hill_setup(tmp_path, threat).scenario)
     zone = (
         '[[zones]]\nname = "town"\nkind = "exclusion"\nradius_m = 300\neast_m = 1200\nnorth_m = 0\n'
         "ceiling_amsl_m = 300\n"
