@@ -142,7 +142,7 @@ class CampaignSummary:
     for more than `MAX_DECIDING_FLIGHTS`.
     unjudged_return: reason why the return after the last item is not judged in any flight; "" if it is judged.
     ranking: rules that flights failed, the most flights first, then all others with a margin, the closest first.
-    undecided_text: rules that leave the first undecided flight undecided, with their reasons; "" without such a flight.
+    undecided_text: rules not judged in the first undecided flight, with their reasons; "" if no flight is undecided.
     mission_fault: reason why the mission fails as a whole; "" if no flight fails so, or only with varied conditions.
     """
 

@@ -21,13 +21,19 @@ from world.frames import fit_polymap
 from world.kernels import Record
 from world.wind import Wind
 
-# Degrees of longitude and latitude per metre of the map around 8 E, 46 N.
-EAST_DEG, NORTH_DEG = 1.3e-5, 9e-6
+# Degrees of longitude per metre to the east, around 8 E, 46 N.
+LONGITUDE_DEG_PER_M = 1.3e-5
+# Degrees of latitude per metre to the north.
+LATITUDE_DEG_PER_M = 9e-6
 GEO_MAP = fit_polymap(
-    lambda east, north: (8.0 + EAST_DEG * east, 46.0 + NORTH_DEG * north), [[-9000.0, 9000.0]] * 2, 1e-9
+    lambda east, north: (8.0 + LONGITUDE_DEG_PER_M * east, 46.0 + LATITUDE_DEG_PER_M * north),
+    [[-9000.0, 9000.0]] * 2,
+    1e-9,
 )
-# Altitude of a level return, and distance from which it comes, m.
-UP_M, DISTANCE_M = 300.0, 6000.0
+# Altitude of a level return, m AMSL.
+UP_M = 300.0
+# Distance from the target at which a return starts, m.
+DISTANCE_M = 6000.0
 # Distance from its target at which it has arrived, m.
 ARRIVAL_M = 200.0
 
@@ -42,7 +48,7 @@ def wind_of(speeds: Floats, mean: float = 0.0) -> Wind:
     field = WindField(
         np.array([0.0, 400.0]),
         np.array([45.5, 46.5]),
-        8.0 + EAST_DEG * np.array([0.0, DISTANCE_M]),
+        8.0 + LONGITUDE_DEG_PER_M * np.array([0.0, DISTANCE_M]),
         np.broadcast_to([200.0, 400.0], (2, 2, 2, 2)).copy(),
         np.stack([eastward, np.zeros_like(eastward)], axis=-1),
     )
