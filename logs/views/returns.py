@@ -10,7 +10,7 @@ from flight.simulation.track import Track
 from logs.verdict.returns.drawn_returns import DrawnReturns, WorstReturn, group_segments
 from logs.verdict.returns.judge_glides import Glide, Glides, Reach
 from logs.verdict.returns.judge_returns import KINDS, Kind, SimulatedReturn
-from logs.verdict.returns.return_starts import planned_starts
+from logs.verdict.returns.return_starts import planned_positions
 from logs.verdict.returns.returns_text import outcome_text, segment_text
 from logs.views.charts import Chart, Label, Layer, Panel, join_with_gaps, series, shorten
 from logs.views.map import MapChart, NamedWind, end_labels, map_extent, scenario_map
@@ -284,10 +284,9 @@ def _path_positions(setup: FlightSetup, track: Track | None, first: float, last:
     track: the flown track, whose rows are thinned; None for the planned path.
     """
     if track is None:
-        starts = planned_starts(setup, max(_MIN_STEP_S, (last - first) / _PATH_POINTS))
-        is_shown = (starts.time >= first) & (starts.time <= last)
-        positions = np.column_stack([starts.rows[name] for name in ("east", "north", "up")])
-        return starts.time[is_shown], positions[is_shown]
+        times, positions = planned_positions(setup, max(_MIN_STEP_S, (last - first) / _PATH_POINTS))
+        is_shown = (times >= first) & (times <= last)
+        return times[is_shown], positions[is_shown]
     is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
     rows = np.flatnonzero(is_shown)
     rows = rows[:: max(1, len(rows) // _PATH_POINTS)]

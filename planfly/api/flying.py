@@ -1,7 +1,7 @@
 """Fly a mission, and judge a mission or a flight."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -13,6 +13,7 @@ from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, judge_log, loss_text
@@ -116,6 +117,7 @@ class Judged:
     lossy: True if part of a log could not be read.
     track: rows of the flight; None if nothing was flown.
     is_log: True for a flight read from a log or returned by an earlier call.
+    requirements: requirements of the route that was judged by its geometry; None for a flight.
     """
 
     setup: FlightSetup
@@ -124,6 +126,7 @@ class Judged:
     lossy: bool = False
     track: Track | None = None
     is_log: bool = False
+    requirements: RouteRequirements | None = field(default=None, repr=False)
 
     @property
     def returns_line(self) -> str:
@@ -133,7 +136,7 @@ class Judged:
     @property
     def return_summary(self) -> ReturnSummary:
         """Returns from a few points of the flight or the planned path, computed at each call."""
-        return return_summary(self.setup, self.track)
+        return return_summary(self.setup, self.track, self.requirements)
 
 
 # ----------------------------------------------------------------------
@@ -344,7 +347,8 @@ def judge(
         flight = fly(what, **flight_options)
         return Judged(flight.setup, flight.verdict, track=flight.track if len(flight.track) else None)
     setup = open_flight(what, flight_options)
-    return Judged(setup, judge_mission_geometry(setup))
+    requirements = route_requirements(setup)
+    return Judged(setup, judge_mission_geometry(setup, requirements), requirements=requirements)
 
 
 @takes_options

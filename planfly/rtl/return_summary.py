@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
@@ -12,16 +13,19 @@ from logs.verdict.returns.returns_text import headline, unjudged_parts_text
 from world.errors import PlanflyError
 
 
-def return_starts(setup: FlightSetup, track: Track | None, interval: float) -> ReturnStarts:
+def return_starts(
+    setup: FlightSetup, track: Track | None, interval: float, requirements: RouteRequirements | None = None
+) -> ReturnStarts:
     """Return the states from which returns start, on the track or on the planned path.
 
     The planned path is used if nothing was flown.
 
     interval: time between two returns, s.
+    requirements: the setup's route requirements if already known.
     """
     if track is not None and len(track):
         return flown_starts(setup, track, interval)
-    return planned_starts(setup, interval)
+    return planned_starts(setup, interval, requirements)
 
 
 # Number of returns in the summary and its pictures.
@@ -57,10 +61,14 @@ class ReturnSummary:
         return drawn_returns_without_glides(self.world, self.starts, self.returns)
 
 
-def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
+def return_summary(
+    setup: FlightSetup, track: Track | None, requirements: RouteRequirements | None = None
+) -> ReturnSummary:
     """Judge returns from a few points of a flight or planned path.
 
     The summary is empty without home or terrain.
+
+    requirements: the setup's route requirements if already known.
     """
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnSummary()
@@ -70,7 +78,7 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
         if track is not None and len(track):
             duration = float(track.time[-1] - track.time[0])
         interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
-        starts = return_starts(setup, track, interval)
+        starts = return_starts(setup, track, interval, requirements)
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")

@@ -16,7 +16,7 @@ from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import FLIGHT, Change, RemainingFinding, Suggestion, TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
@@ -192,12 +192,14 @@ def _without_far_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
     return near or suggestions
 
 
-def judge_mission_geometry(setup: FlightSetup) -> Verdict:
+def judge_mission_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
     """Judge the geometry of a mission without a flight.
 
     The verdict has only those suggestions that pass a geometric trial.
+
+    requirements: the setup's route requirements if already known.
     """
-    requirements = route_requirements(setup)
+    requirements = requirements or route_requirements(setup)
     verdict = judge_geometry(setup, requirements)
     return with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
 

@@ -142,13 +142,12 @@ def test_a_plan_is_opened_once_to_be_flown_judged_or_exported(count: Count, flig
     plan = str(flight / "plan.json")
     assert count("fly", plan, code=4) == ONCE | FLIGHT | HINT
     assert count("check", plan, code=4) == ONCE | FLIGHT | HINT
-    # The summary of the returns predicts the energy that the flight used before each of them.
-    judged = ONCE | OPENED | {"judge_geometry": 1, "route_requirements": 2}
+    judged = ONCE | OPENED | {"judge_geometry": 1, "route_requirements": 1}
     assert count("check", plan, "--geometry", code=4) == judged
     # Its fence is what the planned path keeps to.
     assert count("export", plan, "a.plan", code=0) == ONCE | OPENED | {"route_requirements": 1}
-    # Each picture of the returns predicts the energy anew.
-    with_returns = ONCE | OPENED | {"route_requirements": 4}
+    # The map's returns begin on the planned path.
+    with_returns = ONCE | OPENED | {"route_requirements": 2}
     assert count("export", plan, "a.kml", "b.plan", "b.fence", code=0) == with_returns
 
 

@@ -114,22 +114,66 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
     return np.asarray(np.nan_to_num(velocity))
 
 
-def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
+def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequirements | None = None) -> ReturnStarts:
     """Sample the planned path up to its own return to launch, with the predicted energy used before.
 
     interval: time between samples, s.
+    requirements: the setup's route requirements if already known.
 
     >>> from logs.recording.example_log import example_log
     >>> starts = planned_starts(example_log().setup, 1.0)
     >>> bool(starts.rows["velocity_north"][0] > 0.0), starts.is_flown
     (True, False)
     """
+    moves = _moves_before_return(setup)
+    if not len(moves):
+        return _empty_starts(is_flown=False)
+    times, move_numbers, fraction, position = _sample_positions(moves, interval)
+    move = moves[move_numbers]
+    course_change = fraction * move["length"] * move["curvature"]
+    course_east, course_north = move["course_east"], move["course_north"]
+    speed = move["length"] / np.maximum(1e-9, move["lasts"])
+    east, north = (
+        course_east * np.cos(course_change) + course_north * np.sin(course_change),
+        course_north * np.cos(course_change) - course_east * np.sin(course_change),
+    )
+    climb_rate = (move["climb"] + 2.0 * move["bend"] * fraction) / np.maximum(1e-9, move["lasts"])
+    velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
+    bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
+    leg_energy = np.array(leg_energies(requirements or route_requirements(setup))[0])
+    leg_duration = np.bincount(moves["leg"], weights=moves["lasts"])
+    move_energy = leg_energy[moves["leg"]] * moves["lasts"] / np.maximum(1e-9, leg_duration[moves["leg"]])
+    energy = np.cumsum(move_energy)[move_numbers] - (1.0 - fraction) * move_energy[move_numbers]
+    is_low = np.zeros(len(times), dtype=np.bool_)
+    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low)
+
+
+def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
+    """Return times, s, (t,), and positions, m, (t, 3), on the planned path up to its own return to launch.
+
+    interval: time between samples, s.
+    """
+    moves = _moves_before_return(setup)
+    if not len(moves):
+        return np.zeros(0), np.zeros((0, 3))
+    times, _, _, position = _sample_positions(moves, interval)
+    return times, position
+
+
+def _moves_before_return(setup: FlightSetup) -> Records:
+    """Return the moves of the planned path up to its own return to launch; none if it begins with one."""
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
-    moves = moves[moves["leg"] <= last_leg]
-    if not len(moves):
-        return _empty_starts(is_flown=False)
+    return moves[moves["leg"] <= last_leg]
+
+
+def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[np.intp], Floats, Floats]:
+    """Return times, s, move numbers, flown fractions of these moves, all (t,), and positions, m, (t, 3).
+
+    moves: at least one move of a planned path.
+    interval: time between samples, s.
+    """
     times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), interval)
     move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
     move = moves[move_numbers]
@@ -148,20 +192,7 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
         ],
         axis=1,
     )
-    speed = move["length"] / np.maximum(1e-9, move["lasts"])
-    east, north = (
-        course_east * np.cos(course_change) + course_north * np.sin(course_change),
-        course_north * np.cos(course_change) - course_east * np.sin(course_change),
-    )
-    climb_rate = (move["climb"] + 2.0 * move["bend"] * fraction) / np.maximum(1e-9, move["lasts"])
-    velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
-    bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
-    leg_energy = np.array(leg_energies(route_requirements(setup))[0])
-    leg_duration = np.bincount(moves["leg"], weights=moves["lasts"])
-    move_energy = leg_energy[moves["leg"]] * moves["lasts"] / np.maximum(1e-9, leg_duration[moves["leg"]])
-    energy = np.cumsum(move_energy)[move_numbers] - (1.0 - fraction) * move_energy[move_numbers]
-    is_low = np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low)
+    return times, move_numbers, fraction, position
 
 
 def flown_end(track: Track) -> ReturnStarts:

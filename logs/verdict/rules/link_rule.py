@@ -180,7 +180,7 @@ def _judge_reaction_returns(
     except MissionError:
         return None
     interval = float(max(1, math.ceil(sum(outage.duration for outage in outages) / _MAX_RETURNS)))
-    starts = planned_starts(setup, interval) if track is None else flown_starts(setup, track, interval)
+    starts = planned_starts(setup, interval, requirements) if track is None else flown_starts(setup, track, interval)
     return judge_returns(world, _starts_in_outages(starts, outages, reactions[0].delay, interval), interval, fly_again)
 
 

@@ -59,7 +59,9 @@ def return_findings(
     `flown_return_findings` judges planfly's own flights, because their track does not show how they ended.
     """
     if geometric:
-        required_findings = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
+        required_findings = _requirement_findings(
+            requirements, partial(planned_starts, requirements.setup, requirements=requirements)
+        )
         end_findings = _automatic_return_findings(requirements, planned_end(requirements))
         return [*_rtl_findings(requirements, None, "not flown yet"), *end_findings, *required_findings]
     if requirements.setup.source is None:
@@ -84,7 +86,7 @@ def flown_return_findings(
     has_arrived = aligned is not None and bool(aligned.passed[-1]) and end_reason == "completed"
     reason = "" if end_reason == "completed" else f": {end_reason}"
     track = None if aligned is None else aligned.track
-    starts = partial(planned_starts, requirements.setup)
+    starts = partial(planned_starts, requirements.setup, requirements=requirements)
     if track is not None:
         starts = partial(flown_starts, requirements.setup, track)
     end = flown_end(track) if track is not None and has_arrived else None
