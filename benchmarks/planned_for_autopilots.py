@@ -44,7 +44,7 @@ def fly(number: int, law: str, sitl: Path | None) -> Flown:
     longer = float(plan.objectives[0] / make_plan(scenario, exact, number + 1).objectives[0])
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
-    judged = fly_and_judge(setup, airframe, None, autopilot=sitl)
+    judged = fly_and_judge(setup, autopilot=sitl)
     harm = harm_of(scenario, plan.waypoints, judged.track)
     parts = [harm.text(scenario), "" if judged.ended == "completed" else judged.ended]
     parts += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]

@@ -68,7 +68,7 @@ def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
     setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
     verdicts = {"drawn": judge_geometry(setup)}
     if flown:
-        verdicts["flown"] = fly_and_judge(setup, airframe, None).verdict
+        verdicts["flown"] = fly_and_judge(setup).verdict
     wrong = [
         f"{level} {one.rule} {one.reason}"
         for level, verdict in verdicts.items()

@@ -62,8 +62,8 @@ def by_law(made: FieldMission) -> tuple[Verdict, float]:
 
 def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
     """Return the verdict on the program's flight, and True if it violated clearance or a sphere by over `GRAVE`."""
-    setup, airframe = setup_of(made)
-    flown = fly_and_judge(setup, airframe, None, autopilot=program)
+    setup, _ = setup_of(made)
+    flown = fly_and_judge(setup, autopilot=program)
     threats, position = made.scenario.threats, flown.track.position
     away = np.sqrt(((position[:, None] - threats.position[None]) ** 2).sum(axis=2)) - threats.kill_radius
     least = made.scenario.limits.min_clearance_m - GRAVE

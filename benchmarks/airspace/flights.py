@@ -91,7 +91,7 @@ def fly(number: int) -> Flown:
         return Flown("no plan", None, seconds)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
-    judged = fly_and_judge(setup, airframe, None)
+    judged = fly_and_judge(setup)
     kept = kept_by(scenario, judged.track.position)
     parts = ["" if judged.ended == "completed" else judged.ended, "" if kept.least >= 0.0 else "not inside"]
     parts += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]

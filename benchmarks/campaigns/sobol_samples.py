@@ -39,5 +39,5 @@ def fly_sobol(base: CampaignBase, index: int, wind: GivenWind | None = None) -> 
     """Fly one of them by its index; wind: mean wind in the scenario's place."""
     draw = sobol_draw(base.dispersions, base.seed, index)
     varied = vary_flight(base, draw, wind)
-    flown = fly_and_judge(varied.setup, varied.airframe, None, off_nominal=varied.off_nominal, reference="never")
+    flown = fly_and_judge(varied.setup, off_nominal=varied.off_nominal, reference="never")
     return FlightRow(draw, "flyable" if flown.verdict.flyable else "not flyable", flown.ended)

@@ -90,7 +90,7 @@ def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
         values = _by_legs(airframe.limits, table, np.array(plan.waypoints))
         return Flown(*values, float(plan.objectives[0]), cpu, "")
     items = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    judged = fly_and_judge(make_setup(scenario, airframe, items, seed, plan=plan), airframe, None)
+    judged = fly_and_judge(make_setup(scenario, airframe, items, seed, plan=plan))
     wrong = [] if judged.ended == "completed" else [judged.ended]
     wrong += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]
     seconds, energy = float(judged.track.time[-1]), float(judged.track.energy.max())

@@ -34,7 +34,6 @@ from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
-from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight, with_engine
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
@@ -224,7 +223,6 @@ def fly(
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
-            airframe_for_setup(setup),
             target,
             advance,
             every=60 // options["log_hz"],

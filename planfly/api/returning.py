@@ -49,7 +49,6 @@ from planfly.rtl.sitl_returns import (
 )
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
@@ -291,7 +290,7 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
     if request.program is not None:
         check_returns_as_arduplane(world, request.program)
     with stage("flying the mission"):
-        flight = fly_and_judge(setup, airframe_for_setup(setup), None, reference="never")
+        flight = fly_and_judge(setup, reference="never")
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 

@@ -272,7 +272,6 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
-            airframe,
             folder / "flight.mcap",
             advance,
             every=task.every,

@@ -223,16 +223,18 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     """Fly a mission, measure its photo lines, and look for remedies if requested."""
     _check_has_survey(setup)
-    airframe = airframe_for_setup(setup)
     with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
-        flight = fly_and_judge(setup, airframe, None, advance, reference="never")
+        flight = fly_and_judge(setup, None, advance, reference="never")
     result = _measure_survey(flight.requirements, flight.track, flight.verdict)
     if not suggest or result.usable:
         return result
     with stage("looking for what would help") as advance:
         step_counter = count(1)
         trials = find_survey_remedies(
-            flight.setup, airframe, flight.verdict, lambda text: advance(next(step_counter), 0.0, text)
+            flight.setup,
+            airframe_for_setup(setup),
+            flight.verdict,
+            lambda text: advance(next(step_counter), 0.0, text),
         )
     return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
 

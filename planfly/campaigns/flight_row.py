@@ -286,7 +286,6 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     varied_flight = vary_flight(base, draw, wind)
     flight = fly_and_judge(
         varied_flight.setup,
-        varied_flight.airframe,
         log,
         off_nominal=varied_flight.off_nominal,
         reference="never",

@@ -110,7 +110,7 @@ def _compile_flight_kernels() -> None:
     """Compile the kernels that fly, judge and record a mission."""
     scenario, airframe = _make_scenario_and_airframe()
     setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
-    flight = fly_and_judge(setup, airframe, None)
+    flight = fly_and_judge(setup)
     returns_line(setup, flight.track)
     with Recorder(Path(os.devnull), setup) as recorder:
         recorder.write(flight.track)

@@ -240,11 +240,11 @@ def fly_by_program(
         log = None if folder is None else folder / f"worst-return-{number}.mcap"
         with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:
             try:
-                setup, airframe = return_setup(world, starts.rows[start_index], simulated_return.target.landing)
+                setup, _ = return_setup(world, starts.rows[start_index], simulated_return.target.landing)
             except MissionError as error:
                 program_returns.append(ProgramReturn(simulated_return, reason=str(error)))
                 continue
-            flight = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
+            flight = fly_and_judge(setup, log, advance, autopilot=program, reference="never")
         version = flight.setup.autopilot.version
         program_return = _judge_flown_return(
             world, simulated_return, starts.rows[start_index], flight.track, flight.ended

@@ -51,7 +51,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     """
     context, mission = payload
     setup = context.setup(mission)
-    flight = fly_and_judge(setup, context.airframe, None, advance, reference="never")
+    flight = fly_and_judge(setup, None, advance, reference="never")
     judged_mission = JudgedMission(mission, setup, flight.requirements, flight.verdict)
     verdict_without_suggestions = replace(
         flight.verdict, findings=with_passing_suggestions(flight.verdict.findings, ())

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.catalog import program_class_for
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
@@ -18,7 +19,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
 from planfly.rtl.return_summary import ReturnSummary, return_summary
-from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
+from planfly.workflow.airframe import choose_seed, load_airframe
 from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
@@ -116,14 +117,13 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, airframe)))
     setup = make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
-    flight = fly_and_judge(setup, airframe, log)
+    flight = fly_and_judge(setup, log)
     return PlanThenFly(plan, mission, flight.track, flight.verdict)
 
 
 def fly_and_judge(
     setup: FlightSetup,
-    airframe: Airframe,
-    log: Path | None,
+    log: Path | None = None,
     advance: Advance | None = None,
     *,
     every: int = 1,
@@ -136,6 +136,7 @@ def fly_and_judge(
 ) -> JudgedFlight:
     """Fly a setup, record the flight if a log is named, and judge it.
 
+    log: file for the flight log; None writes no log.
     every: one row out of this many is recorded and judged, so that a check of the log gives the same verdict.
     autopilot: the program of ArduPlane or PX4 that flies instead of planfly's simulated autopilot; its own log is kept
     next to the flight log.
@@ -148,11 +149,11 @@ def fly_and_judge(
 
     If the flight cannot start, or `planfly.workflow.trial_flight.reason_not_to_start` gives a reason not to start it,
     the result has no row and no log; its verdict covers the route and says that the flight did not start.  Raises
-    FlightError if a program does not fly the mission to its end; then no log is left.
+    FlightError if the catalog does not contain the setup's aircraft, or if a program does not fly the mission to its
+    end; then no log is left.
     """
-    task = _FlightOptions(
-        airframe, log, advance, every, limits, reference, returns=returns, findings_only=findings_only
-    )
+    aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
+    task = _FlightTask(aircraft, log, advance, every, limits, reference, returns=returns, findings_only=findings_only)
     requirements = route_requirements(setup)
     reason = reason_not_to_start(requirements)
     if reason:
@@ -161,19 +162,17 @@ def fly_and_judge(
         if autopilot is not None:
             return _fly_with_program(task, setup, program_class_for(autopilot).with_model(setup.autopilot, autopilot))
         off_nominal_flight = off_nominal or OffNominal(Variation())
-        flight = Flight(
-            setup, airframe.aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset
-        )
+        flight = Flight(setup, aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset)
         return _record_and_judge(task, requirements, flight)
     except StartError as error:
         return _judge_unflown(requirements, log, f"not started: {error.reason}", reference)
 
 
 @dataclass(frozen=True, slots=True)
-class _FlightOptions:
-    """Arguments of `fly_and_judge` for one flight."""
+class _FlightTask:
+    """Arguments of `fly_and_judge` for one flight, and the setup's aircraft."""
 
-    airframe: Airframe
+    aircraft: Aircraft
     log: Path | None
     advance: Advance | None
     every: int
@@ -183,12 +182,12 @@ class _FlightOptions:
     findings_only: bool
 
 
-def _fly_with_program(task: _FlightOptions, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
     """Fly a setup with an autopilot program, keep the program's own log, and judge the flight.
 
     Raises FlightError, after removing the flight log, if the program does not fly the mission to its end.
     """
-    with program.start(setup, task.airframe.aircraft) as flight:
+    with program.start(setup, task.aircraft) as flight:
         flight.prepare()
         try:
             judged_flight = _record_and_judge(task, route_requirements(flight.setup), flight)
@@ -210,7 +209,7 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
     return log.with_suffix(program_class_for(program).log_suffix)
 
 
-def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
+def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
     """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     if task.log is None:
@@ -228,7 +227,7 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
     return replace(judged_flight, returns=summary)
 
 
-def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
+def _simulate_and_record(task: _FlightTask, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
     """Fly to the end or until the log is full, recording each block.
 
     Returns the track and the reason for the end.
@@ -262,7 +261,7 @@ def _judge_unflown(
 
 
 def _judge_track(
-    task: _FlightOptions, requirements: RouteRequirements, track: Track, end_reason: str, engine: str
+    task: _FlightTask, requirements: RouteRequirements, track: Track, end_reason: str, engine: str
 ) -> JudgedFlight:
     """Judge the recorded track of a flight, with reference flights unless only findings are requested."""
     end_time = float(track.time[-1]) if len(track) else 0.0
@@ -273,8 +272,7 @@ def _judge_track(
     if task.findings_only:
         verdict = judge_flight(requirements.setup, track, end_reason, requirements=requirements, findings_only=True)
         return JudgedFlight(requirements.setup, requirements, track, end_reason, verdict, events, engine)
-    aircraft = task.airframe.aircraft
     verdict, reference_flights = judge_with_reference_flights(
-        requirements, aircraft, track, end_reason, fly=task.reference
+        requirements, task.aircraft, track, end_reason, fly=task.reference
     )
     return JudgedFlight(requirements.setup, requirements, track, end_reason, verdict, events, engine, reference_flights)

@@ -169,7 +169,7 @@ def test_ardupilots_law_knows_the_answer_too(name: str) -> None:
     answers = case.equivalent or (case.flyable, case.flyable)
     planned = judge_geometry(setup)
     assert planned.flyable is answers[0], planned.summary
-    flown = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    flown = fly_and_judge(setup)
     assert flown.verdict.flyable is answers[1], flown.verdict.summary
     if case.equivalent is None:
         assert failed(flown.verdict) == set(case.rules if case.flown is None else case.flown)
@@ -184,7 +184,7 @@ def test_both_levels_know_the_answer(name: str) -> None:
     assert planned.flyable is case.flyable, planned.summary
     assert failed(planned) == set(case.rules)
     assert planned.headline.startswith(case.says)
-    flown = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    flown = fly_and_judge(setup)
     assert flown.verdict.flyable is case.flyable, flown.verdict.summary
     assert flown.verdict.headline.startswith(case.says)
     assert failed(flown.verdict) == set(case.rules if case.flown is None else case.flown)
@@ -203,7 +203,7 @@ def turn_of(verdict: Verdict) -> Finding:
 def test_a_corner_whose_arc_would_miss_its_waypoint_is_flown_over(turn_deg: float) -> None:
     setup = setup_of(Case(corner(turn_deg, 10.0), True))
     assert setup.route.fly_over.tolist() == [False, True, False]
-    flown = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    flown = fly_and_judge(setup)
     # 110 m from the waypoint, 316, 1,156 and 2,420.
     passes = RADIUS / math.cos(math.radians(turn_deg) / 2.0) - RADIUS
     beside = RADIUS * (1.0 - math.cos(math.radians(turn_deg)))

@@ -29,7 +29,6 @@ from planfly.campaigns.flight_row import (
     waypoint_crossings,
 )
 from planfly.campaigns.tables import is_same_flight
-from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge
 from tests.planfly.campaigns.made_campaigns import write_short
@@ -184,7 +183,7 @@ def test_a_flight_is_that_of_fly_in_the_same_wind(base: CampaignBase, tmp_path: 
     speed = own.speed + row.draw.values["wind_speed"]
     wind = (speed, math.degrees(own.from_course))
     opened = open_flight(mission, {"scenario": scenario, "seed": row.draw.seed, "wind": wind})
-    flown = fly_and_judge(opened, airframe_for_setup(opened), None)
+    flown = fly_and_judge(opened)
     assert speed != own.speed
     assert (row.outcome == "flyable") is flown.verdict.flyable
     assert row.duration == float(flown.track.time[-1])

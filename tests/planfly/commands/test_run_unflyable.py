@@ -20,7 +20,7 @@ def judge(plan: Plan, airframe: Airframe, first: int, last: int) -> Verdict:
     # Item 0 sets the speed; item k + 1 is waypoint k.  Nobody flies there from home.
     part = dataclasses.replace(mission, home=None, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
     setup = make_setup(plan.scenario, airframe, part, 1)
-    return fly_and_judge(setup, airframe, None).verdict
+    return fly_and_judge(setup).verdict
 
 
 def failing_legs(verdict: Verdict, legs: int) -> set[int]:

@@ -27,7 +27,7 @@ def fly(number: int, autopilot: Path | None) -> None:
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
     assert setup.nav == "gnss"
-    flown = fly_and_judge(setup, airframe, None, autopilot=autopilot)
+    flown = fly_and_judge(setup, autopilot=autopilot)
     assert flown.ended == "completed"
     harm = harm_of(scenario, plan.waypoints, flown.track)
     assert harm.text(scenario) == ""

@@ -180,7 +180,7 @@ def test_fresh_plans_do_no_harm(launch: str, aircraft: str, wanted: int, whose: 
         planned += 1
         mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
         setup = make_setup(scenario, airframe, mission, 1, plan=plan)
-        flown = fly_and_judge(setup, airframe, None, reference="never", autopilot=program)
+        flown = fly_and_judge(setup, reference="never", autopilot=program)
         harm, low = harm_of_flight(scenario, setup.route.positions[-1], flown.track.position)
         least = min(least, low)
         harmed += [f"{scenario.name}: {harm}"] if harm else []

@@ -14,7 +14,6 @@ from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from planfly.cli import main
-from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits, length_and_duration_text, predicted_seconds
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.pipeline import fly_and_judge
@@ -68,7 +67,7 @@ def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.Captur
     """Its predicted time is that of the flight, within a twentieth."""
     opened = opened_calm(long)
     told = length_and_duration_text(opened)
-    flown = fly_and_judge(opened, airframe_for_setup(opened), None)
+    flown = fly_and_judge(opened)
     assert flown.ended == "completed"
     assert predicted_seconds(opened) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
     assert told == f"{opened.path.length / 1e3:.1f} km, about {predicted_seconds(opened) / 60:.0f} min in the air"
@@ -77,13 +76,13 @@ def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.Captur
 def test_energy_ends_a_flight(long: Path) -> None:
     """At what is carried, where that is more than half of what the way takes by prediction; else it does not begin."""
     opened = opened_calm(long)
-    flown = fly_and_judge(opened, airframe_for_setup(opened), None)
+    flown = fly_and_judge(opened)
     used = float(flown.track.energy[-1])
     less = dataclasses.replace(opened, battery=0.7 * used)
-    short = fly_and_judge(less, airframe_for_setup(less), None)
+    short = fly_and_judge(less)
     assert short.ended == "nothing is left in the battery or the tank"
     assert float(short.track.energy[-1]) == pytest.approx(0.7 * used, rel=1e-3)
-    none = fly_and_judge(dataclasses.replace(opened, battery=0.1 * used), airframe_for_setup(opened), None)
+    none = fly_and_judge(dataclasses.replace(opened, battery=0.1 * used))
     assert (len(none.track), none.ended) == (0, "not started: it takes 10 times the energy carried")
 
 

@@ -25,7 +25,6 @@ from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
 from planfly.live.served_flights import ServedLog
 from planfly.workflow import reference_flights, suggestion_trials
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.pipeline import JudgedFlight, fly_and_judge
 from planfly.workflow.reference_flights import (
     find_deciding_parameter,
@@ -198,7 +197,7 @@ def over_a_hill(spare: float) -> FlightSetup:
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[JudgedFlight, Path]:
     setup, log = over_a_hill(4.7), tmp_path_factory.mktemp("hill") / "flight.mcap"
-    return fly_and_judge(setup, load_airframe(setup.scenario), log), log
+    return fly_and_judge(setup, log), log
 
 
 def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path]) -> None:
@@ -302,12 +301,11 @@ def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Pa
 
 def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
     setup = over_a_hill(30.0)
-    airframe = load_airframe(setup.scenario)
-    usual = fly_and_judge(setup, airframe, None)
+    usual = fly_and_judge(setup)
     assert usual.reference is None
     assert usual.verdict.flyable
     assert [level.name for level in usual.verdict.levels] == ["geometry", "autopilot"]
-    asked = fly_and_judge(setup, airframe, None, reference="always")
+    asked = fly_and_judge(setup, reference="always")
     assert asked.reference is not None
     assert asked.reference.airframe == judge_airframe_flight(setup, AIRCRAFT)
     assert asked.reference.deciding is None
@@ -329,7 +327,7 @@ def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[J
 
 def test_planflys_guidance_has_no_flight_beside_it() -> None:
     setup = replace(over_a_hill(30.0), autopilot=PlanflyGuidance())
-    judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    judged = fly_and_judge(setup)
     assert judged.reference is None
     assert [level.name for level in judged.verdict.levels] == ["geometry", "airframe"]
 
