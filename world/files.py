@@ -198,7 +198,7 @@ def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str
 
 
 def _is_list_of_tables(value: Any) -> bool:
-    """Return True for a list with at least one table, which must not have other values."""
+    """Return True for a list that contains a table; such a list may contain only tables."""
     return isinstance(value, list) and any(isinstance(item, Mapping) for item in value)
 
 

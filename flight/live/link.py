@@ -489,7 +489,7 @@ class Link:
         )
 
     def pop_notices(self) -> list[str]:
-        """Return the notices since the last call on senders that get no answer."""
+        """Return and clear the notices collected about senders that are not answered."""
         notices, self._notices = self._notices, []
         return notices
 

@@ -118,7 +118,7 @@ def place_stops(
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
     >>> len(placed.stops), placed.notes
-    (1, ('item 2: at the position of item 1: merged with it',))
+    (1, ('item 2: same position as item 1, merged with it',))
     """
     notes = Notes()
     if itinerary is None:
@@ -552,7 +552,7 @@ def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Not
             )
         notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the next leg", stop.item)
     else:
-        notes.add(f"at the position of {_stop_name(previous)}: merged with it", stop.item)
+        notes.add(f"same position as {_stop_name(previous)}, merged with it", stop.item)
     return previous if previous.item >= 0 else stop
 
 

@@ -182,9 +182,9 @@ def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, r
 def _note_autoland(
     mission: Mission, scenario: Scenario, parameters: Mapping[str, float], assumed_parameters: Mapping[str, float]
 ) -> Iterator[str]:
-    """Yield a note on a landing sequence with which ArduPlane does not arm if RTL_AUTOLAND is 0 (AP_Arming.cpp).
+    """Yield a note on a landing sequence if RTL_AUTOLAND is 0: ArduPlane then refuses to arm (AP_Arming.cpp).
 
-    A scenario with a landing needs no note on the assumed value: it comes with the parameters that planfly writes.
+    A scenario with a landing needs no note on an assumed value, because planfly writes RTL_AUTOLAND for its plan.
     """
     start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:

@@ -93,7 +93,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
     """
     line_break_count = max(text.count("\n"), text.count("\r"))
     if line_break_count > MAX_LINES:
-        raise MissionError(f"{source}: {line_break_count:,} lines: at most {MAX_LINES:,} are read", file=source)
+        raise MissionError(f"{source}: too long: {line_break_count:,} lines; the limit is {MAX_LINES:,}", file=source)
     lines = [
         (number, line.strip())
         for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
@@ -114,7 +114,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
             allowed=HEADER,
         )
     if len(lines) - 1 > MAX_ITEMS:
-        raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MAX_ITEMS:,} are read", file=source)
+        raise MissionError(f"{source}: too long: {len(lines) - 1:,} items; the limit is {MAX_ITEMS:,}", file=source)
     rows = [_parse_row(TextLine(source, number), line) for number, line in lines[1:]]
     if not rows:
         raise MissionError(f"{source}: no items after the header", file=source)
@@ -361,7 +361,9 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     """
     points = [_parse_point(TextLine(source, number), line) for number, line in _content_lines(text)]
     if len(points) > MAX_POINTS:
-        raise MissionError(f"{source}: {count_text(len(points), 'point')}: at most {MAX_POINTS} are read", file=source)
+        raise MissionError(
+            f"{source}: too long: {count_text(len(points), 'point')}; the limit is {MAX_POINTS}", file=source
+        )
     ring = points if points[0] == points[-1] else points[1:]
     if len(ring) < 4 or ring[0] != ring[-1]:
         raise MissionError(

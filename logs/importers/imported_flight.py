@@ -171,12 +171,12 @@ _MAX_INTERPOLATED_STEPS = 2.5
 _COMPARED_TIME_S = 5.0
 # Vehicles whose logs are refused, with their possessive for the message.
 _REFUSED: dict[VehicleKind, str] = {
-    "copter": "a copter's",
-    "rover": "a rover's",
-    "boat": "a boat's",
-    "submarine": "a submarine's",
-    "tracker": "an antenna tracker's",
-    "blimp": "a blimp's",
+    "copter": "a copter",
+    "rover": "a rover",
+    "boat": "a boat",
+    "submarine": "a submarine",
+    "tracker": "an antenna tracker",
+    "blimp": "a blimp",
 }
 # Quantities that a log may lack.
 _OPTIONAL_QUANTITIES: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
@@ -236,14 +236,16 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     ([('AUTO', 'log')], ('velocity', 'attitude'))
     """
     if raw.vehicle in _REFUSED:
-        program_text = f" ({raw.program})" if raw.program else ""
+        program_text = f" (program {raw.program})" if raw.program else ""
         raise LogError(
-            f"{raw.source}: {_REFUSED[raw.vehicle]} log{program_text}: only flights of aeroplanes are judged",
+            f"{raw.source}: the log of {_REFUSED[raw.vehicle]}{program_text}; only flights of aeroplanes are judged",
             file=raw.source,
         )
     series = raw.series["position"]
     if len(series.time) > _MAX_ROWS:
-        raise LogError(f"{raw.source}: {len(series.time):,} positions: at most {_MAX_ROWS:,} are read", file=raw.source)
+        raise LogError(
+            f"{raw.source}: too long: {len(series.time):,} positions; the limit is {_MAX_ROWS:,}", file=raw.source
+        )
     positions = clean_positions(series, raw.clock_jumps)
     spans = find_flight_spans(positions.time, positions.lat, positions.lon)
     if not spans:

@@ -93,7 +93,7 @@ def open_log(path: Path) -> "RawLog":
             raise LogError(f"{path}: {missing_text(path)}; expected a log ({', '.join(SUFFIXES)})", file=path)
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read", file=path)
+            raise LogError(f"{path}: too large: {size:,} bytes; the limit is {MAX_BYTES:,} bytes", file=path)
         with path.open("rb") as file:
             head = file.read(_HEAD)
         if not head:

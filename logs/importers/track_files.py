@@ -47,7 +47,7 @@ def track_text(path: Path, *, xml: bool) -> str:
     """
     size = path.stat().st_size
     if size > MAX_BYTES:
-        raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read of a track", file=path)
+        raise LogError(f"{path}: too large: {size:,} bytes; the limit for a track is {MAX_BYTES:,} bytes", file=path)
     text = _read_bytes(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
         raise LogError(
@@ -77,7 +77,7 @@ def _read_bytes(path: Path) -> bytes:
         cause = " ".join(str(error).split())[:120]
         raise LogError(f"{path}: an unreadable zipped file: {cause}", file=path) from error
     if len(data) > MAX_BYTES:
-        message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most this many are read of a track"
+        message = f"{path}: too large: more than {MAX_BYTES:,} bytes when unpacked, which is the limit for a track"
         raise LogError(message, file=path)
     return data
 

@@ -23,7 +23,7 @@ from world.wording import count_text
 _NAVIGATION_TEXTS = {
     "perfect": "exact",
     "rtk": "with RTK's error (0.05 m on each axis)",
-    "gnss": "with GNSS's error (1.5 m on each axis)",
+    "gnss": "with a GNSS error of 1.5 m on each axis",
 }
 AirspeedSource = Literal["scenario", "parameters", "aircraft", "flight"]
 _AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {

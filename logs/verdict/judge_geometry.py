@@ -322,6 +322,15 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.notes, conditions=conditions)
 
 
+# Statements that a plan exceeds a limit, by rule.
+_EXCEEDED_TEXTS = {
+    "turn": "the plan turns too sharply",
+    "slope": "the plan is too steep",
+    "clearance": "the plan is too close to the ground",
+    "bounds": "the plan leaves the area",
+}
+
+
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
     """Return the verdict on a search that found no feasible plan, from the certificate of its best path alone.
 
@@ -336,7 +345,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
     >>> way, none = np.zeros((2, 3)), np.zeros((0, 3))
     >>> plan = Plan(load_scenario("tight"), way, np.array([0, 2, 0, 0]), np.zeros(4), certificate, 1, "umda", 1, none)
     >>> print(judge_plan_only(plan).headline)
-    not flyable: no feasible plan was found: slope (the plan's slope limit is exceeded, smallest margin -2.86 deg, ...)
+    not flyable: no feasible plan was found: slope (the plan is too steep: smallest margin -2.86 deg, 2 violations)
     """
     margins = (
         ("turn", plan.certificate.turn, Violation.TURN, "deg", 180.0 / math.pi),
@@ -354,7 +363,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
         if missing_length > 0.0 and margin >= 0.0:
             reason = f"a leg is {missing_length:.0f} m too short for its turns"
         if is_exceeded:
-            reason = f"the plan's {rule} limit is exceeded, {reason}" + (f", {count} violations" if count else "")
+            reason = f"{_EXCEEDED_TEXTS[rule]}: {reason}" + (f", {count} violations" if count else "")
         findings.append(
             make_finding(
                 rule,

@@ -371,6 +371,6 @@ def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
 
 
 def _significant_digits(value: float, digits: int) -> str:
-    """Write a number to a number of significant digits, without an exponent."""
+    """Format a value with this number of significant digits, without an exponent."""
     figures = f"{value:.{digits}g}"
     return figures if "e" not in figures else f"{value:.0f}" if abs(value) >= 1.0 else f"{value:.9f}".rstrip("0")

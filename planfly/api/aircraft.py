@@ -102,9 +102,9 @@ def new_aircraft(
 ) -> Aircraft:
     """Make the folder of a new aircraft.
 
-    overwrite: True replaces the folder of an aircraft, and keeps files of other kinds in it.
-    Without numbers the folder gets copies of another aircraft's files: source is that aircraft, a name or a folder (the
-    Aerosonde if not given).  With numbers the folder gets a model that matches them, scaled from published aircraft of
+    overwrite: True replaces the aircraft's files in an existing folder; other files in it are kept.
+    Without options the folder gets copies of another aircraft's files: source is that aircraft, a name or a folder (the
+    Aerosonde if not given).  With options the folder gets a model that matches them, scaled from published aircraft of
     its class, and a list of unknown properties; mass, span, cruise and stall are required, the others are estimated if
     missing.
 

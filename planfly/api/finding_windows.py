@@ -137,7 +137,7 @@ def _with_files(result: WindowResult, folder: Path, command: str, *, overwrite: 
 
 
 def _parse_step(every: str) -> timedelta:
-    """Return the time between two departures.  Raises ArgumentError for another text."""
+    """Return the time between two departures.  Raises ArgumentError if the text states no such time."""
     match = _STEP.fullmatch(every.strip())
     if match is not None:
         number = float(match.group(1))
@@ -148,7 +148,7 @@ def _parse_step(every: str) -> timedelta:
 
 
 def _parse_time(name: str, text: str) -> datetime:
-    """Return a time of take-off in UTC.  Raises ArgumentError for another text, and for a time without an offset."""
+    """Return a time of take-off in UTC.  Raises ArgumentError if the text is not a time with an offset."""
     try:
         time = datetime.fromisoformat(text)
     except ValueError:

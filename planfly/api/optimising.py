@@ -267,7 +267,7 @@ def _parse_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
 
     name: name of the argument, for messages.
 
-    Raises ArgumentError for another number of rows.
+    Raises ArgumentError for a wrong number of rows.
     """
     columns = _parse_numbers(name, numbers)
     columns = columns[:, np.newaxis] if columns.ndim == 1 else columns

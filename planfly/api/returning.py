@@ -121,7 +121,7 @@ class ReturnsResult:
 
     @property
     def program_lines(self) -> tuple[str, ...]:
-        """Lines on the worst returns by the ArduPlane program and the simulated ArduPlane; empty without a program."""
+        """Comparison of the worst returns as flown by the ArduPlane program and by the simulated ArduPlane."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))

@@ -24,7 +24,7 @@ _MAX_FALL_S = 600.0
 
 
 def plate_drag(aircraft: Aircraft) -> float:
-    """Return the drag of an aircraft with its wing across the air, per mass and square of the airspeed, 1/m."""
+    """Return the drag deceleration of a fall with the wing broadside to the air, per airspeed squared, 1/m."""
     return 0.5 * _AIR_DENSITY * _PLATE_DRAG_COEFFICIENT * aircraft.wing_area / aircraft.mass
 
 

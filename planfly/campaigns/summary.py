@@ -292,7 +292,7 @@ def _scaled(entry: RankedRule) -> float:
 def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tuple[Sensitivity, ...]:
     """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first.
 
-    A failure by an unknown margin counts as the smallest known margin, or as zero if that is positive.
+    A failed flight of unknown margin is given the smallest known margin, but at most zero.
     The result is empty for fewer than `MIN_FLIGHTS_FOR_INDEX` flights with a margin.
 
     margins: margin of each flight, (n,), see `_read_margins`.

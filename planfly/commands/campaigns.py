@@ -184,7 +184,7 @@ def campaign(args: argparse.Namespace) -> int:
 
 
 def winds(args: argparse.Namespace) -> int:
-    """Find the strongest wind from each direction, or resume the search, and draw the chart."""
+    """Find the strongest wind from each direction in which a mission succeeds, or resume the search; draw a chart."""
     folder = _result_folder(args, "winds")
     with _report_stored_flights(args, folder, "winds.sqlite") as interrupted:
         result = call_api(planfly.winds, args, out=folder)

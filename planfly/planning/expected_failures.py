@@ -72,18 +72,20 @@ def _short_strip_text(plan: Plan) -> str:
     probability = math.erf(max(0.0, room) / (math.sqrt(2.0) * touchdown_sd))
     if probability >= HOLDING_PROBABILITY:
         return ""
-    remedies = [f"a strip of {_sufficient_strip_length(touchdown_sd):.0f} m"]
+    remedies = [f"use a strip of {_sufficient_strip_length(touchdown_sd):.0f} m"]
     if strip.height_sd is None:
         surveyed_length = _sufficient_strip_length(flown_sd)
-        remedies.insert(0, f"a survey of its height ([landing] height_sd_m; then {surveyed_length:.0f} m suffice)")
+        remedies.insert(
+            0, f"survey its altitude and state [landing] height_sd_m (then {surveyed_length:.0f} m are enough)"
+        )
     if turbulence != "none":
-        remedies.append("less turbulence")
+        remedies.append("fly in less turbulence")
     source = "the elevation file" if strip.height_sd is None else "its survey"
     return (
         f"only {100.0 * probability:.0f} % of the landings are expected to touch down on the strip of"
-        f" {strip.length:.0f} m: the standard deviation of its height is {height_sd:.1f} m ({source}), and that of the"
-        f" touchdown point {touchdown_sd:.0f} m (largest scatter of measured landings);"
-        f" would help: {', or '.join(remedies)}"
+        f" {strip.length:.0f} m: the altitude of the strip has a standard deviation of {height_sd:.1f} m ({source}),"
+        f" and the touchdown point one of {touchdown_sd:.0f} m (largest scatter of measured landings);"
+        f" to improve this, {', or '.join(remedies)}"
     )
 
 

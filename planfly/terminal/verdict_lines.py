@@ -37,7 +37,7 @@ def verdict_lines(
     for rule in presentation.failed_rules:
         lines += _failed_lines(rule)
     no_change_text = _no_change_text(verdict, suggests_by_geometry)
-    lines += [colour_text("          would pass: ", "hint") + no_change_text] if no_change_text else []
+    lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
     lines += [
         f"  open    {rule_word(finding.rule)} at {finding.where}: {finding.reason}"
         for finding in presentation.undecided[: 2 * _MAX_LISTED]
@@ -66,11 +66,11 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
     if not is_judged or has_hint:
         return ""
     if verdict.level == "geometric":
-        return "no change was found"
+        return "no change that passes was found"
     if not any(level.name == "geometry" and not level.flyable and not level.undecided for level in verdict.levels):
         return ""
     further_text = "; planfly check --geometry suggests changes for the planned route" if suggests_by_geometry() else ""
-    return f"no change was found by flying{further_text}"
+    return f"no change that passes was found in simulated flights{further_text}"
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
@@ -79,11 +79,13 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     They name the worst finding, its suggestion, or that of another if it has none, and the other places that failed.
     """
     worst_finding, *other_findings = rule.failed
-    rule_name = rule.words.word
-    places_text = (
-        f"{rule_name}, {len(rule.failed)} of {rule.judged}; the worst at" if other_findings else f"{rule_name} at"
-    )
-    lines = [colour_text("  failed  ", "bad") + f"{places_text} {worst_finding.where}: {worst_finding.reason}"]
+    # A fence item names its rule.
+    place_text = f"{rule.words.word} at {worst_finding.where}"
+    if worst_finding.where.startswith(f"{rule.words.word} "):
+        place_text = worst_finding.where
+    if other_findings:
+        place_text = f"{rule.words.word}, {len(rule.failed)} of {rule.judged}; the worst at {worst_finding.where}"
+    lines = [colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}"]
     if worst_finding.suggestions:
         lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
     elif helped_finding := next((finding for finding in other_findings if finding.suggestions), None):

@@ -497,7 +497,7 @@ def make_data_sheet_folder(
         _check_required_numbers(sheet)
         sized = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as draft_folder:
-        files = _make_files(sized, target.name, draft_folder, file_parameters, readme_lines)
+        files = _file_texts(sized, target.name, draft_folder, file_parameters, readme_lines)
     write_aircraft_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
@@ -523,7 +523,7 @@ def _parameter_lines(stated: StatedParameters, overridden: Sequence[str]) -> lis
     return ["", *lines] if lines else []
 
 
-def _make_files(
+def _file_texts(
     sized: SizedAircraft,
     name: str,
     draft_folder: Path,
@@ -532,7 +532,7 @@ def _make_files(
 ) -> dict[str, str]:
     """Return the text of each file of the aircraft's folder, by file name.
 
-    draft_folder: temporary folder for a draft of the aircraft, which trims and gains are computed from.
+    draft_folder: temporary folder for a draft of the aircraft, from which trims and gains are computed.
     readme_lines: lines of ``README.md`` on the parameter file.
     """
     folder = draft_folder / name

@@ -320,7 +320,7 @@ def add_leg_violations(
     legs, corners: measurements of the path.
     by_amount: True to add the excess of each violation, False to add 1.
 
-    Where legs must hold their turns, each leg shorter than its two turns adds to turn.
+    If `legs_hold_turns` is set, a leg that is too short for the turns at its two ends adds to the turn violations.
     """
     # The order of these lines fixes the order of summation, and so the last digit.
     _add_turn_violations(data, limits, legs, by_amount, violations)

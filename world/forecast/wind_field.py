@@ -70,11 +70,11 @@ class WindField:
 
     @classmethod
     def unpacked(cls, numbers: Floats, count: int) -> "WindField":
-        """Return the field whose packed form is given.
+        """Return the field from its packed form.
 
-        count: expected number of numbers.
+        count: expected length of the packed form.
 
-        Raises ValueError for another number of numbers, and for numbers that are not a field.
+        Raises ValueError if the packed form has another length or is not a wind field.
         """
         if numbers.size != count or count < _HEADER_SIZE or not np.isfinite(numbers).all():
             raise ValueError("not a wind field")

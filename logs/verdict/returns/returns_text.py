@@ -31,7 +31,7 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "energy": "takes more energy than may be used",
     "unknown": "flies where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
-    "used": "is not judged by energy, as the energy used before is unknown",
+    "used": "cannot be judged by energy, as the energy used before is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "comes lower than {limit:.0f} m above ground",
 }
@@ -43,7 +43,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "energy": "take more energy than may be used",
     "unknown": "fly where the terrain is unknown",
     "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
-    "used": "are not judged by energy, as the energy used before is unknown",
+    "used": "cannot be judged by energy, as the energy used before is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
@@ -171,9 +171,10 @@ def _judged_text(returns: Returns) -> str:
     total, failure_counts = len(returns.each), counts_text(returns)
     if failure_counts:
         safe_count = returns.count("safe")
-        return (
-            f"of {count_text(total, 'return')} {failure_counts}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
-        )
+        if total == max(returns.count(kind) for kind in KINDS) and total > 1:
+            return f"all {failure_counts.replace(' ', ' returns ', 1)}"
+        safe_text = "none is" if safe_count == 0 else "1 is" if safe_count == 1 else f"{safe_count} are"
+        return f"of {count_text(total, 'return')} {failure_counts}; {safe_text} safe"
     # Leave out returns that begin below the limit, as after a take-off: their lowest point is the start.
     high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
     lowest_return = min(high_returns, key=lambda ret: ret.clearance)

@@ -67,7 +67,7 @@ def test_a_log_that_claims_ten_gigabytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.BIN"
     with path.open("wb") as file:
         file.truncate(10 * 2**30)
-    with pytest.raises(LogError, match=f"10,737,418,240 bytes: at most {MAX_BYTES:,} are read"):
+    with pytest.raises(LogError, match=f"too large: 10,737,418,240 bytes; the limit is {MAX_BYTES:,} bytes"):
         open_log(path)
 
 

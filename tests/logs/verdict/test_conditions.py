@@ -51,7 +51,7 @@ def test_weather_and_ground() -> None:
     _, line = lines_of(setup.in_scenario(calm))
     assert line == "Conditions: no wind, no turbulence; navigation exact; no terrain; 1 zone"
     _, line = lines_of(replace(setup, nav="gnss"))
-    assert "; navigation with GNSS's error (1.5 m on each axis); " in line
+    assert "; navigation with a GNSS error of 1.5 m on each axis; " in line
 
 
 def test_the_zones_are_counted_the_missions_own_among_them() -> None:

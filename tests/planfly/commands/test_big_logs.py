@@ -61,4 +61,7 @@ def test_a_log_that_claims_ten_gigabytes_is_refused_at_once(
     began = time.process_time()
     assert main(["check", str(log)]) == 2
     assert time.process_time() - began < at_most(2.0)
-    assert capsys.readouterr().err == f"planfly: {log}: 10,737,418,240 bytes: at most 2,147,483,648 are read\n"
+    assert (
+        capsys.readouterr().err
+        == f"planfly: {log}: too large: 10,737,418,240 bytes; the limit is 2,147,483,648 bytes\n"
+    )

@@ -84,16 +84,19 @@ def test_a_track_alone_needs_a_plan(tmp_path: Path, capsys: Output) -> None:
 @pytest.mark.parametrize(
     ("write", "said"),
     [
-        (lambda path: dataflash(path, program="ArduCopter V4.5.7 (x)"), "a copter's log (ArduCopter V4.5.7 (x))"),
-        (lambda path: dataflash(path, program="ArduRover V4.5.0"), "a rover's log (ArduRover V4.5.0)"),
-        (lambda path: px4(path, vehicle_type=1), "a copter's log (PX4)"),
-        (lambda path: telemetry(path, kind=10), "a rover's log"),
+        (
+            lambda path: dataflash(path, program="ArduCopter V4.5.7 (x)"),
+            "the log of a copter (program ArduCopter V4.5.7 (x))",
+        ),
+        (lambda path: dataflash(path, program="ArduRover V4.5.0"), "the log of a rover (program ArduRover V4.5.0)"),
+        (lambda path: px4(path, vehicle_type=1), "the log of a copter (program PX4)"),
+        (lambda path: telemetry(path, kind=10), "the log of a rover"),
     ],
 )
 def test_other_vehicles_are_refused_by_name(
     tmp_path: Path, capsys: Output, write: Callable[[Path], Path], said: str
 ) -> None:
-    suffix = ".tlog" if "rover's log" in said and "Ardu" not in said else ".BIN" if "Ardu" in said else ".ulg"
+    suffix = ".tlog" if "of a rover" in said and "Ardu" not in said else ".BIN" if "Ardu" in said else ".ulg"
     log = write(tmp_path / f"a{suffix}")
     assert main(["import", str(log), str(tmp_path / "a.mcap")]) == 2
     error = capsys.readouterr().err

@@ -88,7 +88,7 @@ def test_gusts_move_the_touchdown_along_a_surveyed_strip() -> None:
     (moderate,) = said_of(landing_plan("moderate", length_m=200.0, height_sd_m=0.0))
     assert "only 71 % of the landings" in light
     assert "only 40 % of the landings" in moderate
-    assert light.endswith("a strip of 320 m, or less turbulence")
+    assert light.endswith("use a strip of 320 m, or fly in less turbulence")
 
 
 def test_a_plan_without_a_landing_says_nothing_of_strips() -> None:
