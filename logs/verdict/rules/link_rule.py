@@ -213,8 +213,8 @@ def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
     if points.diffraction_loss[k] >= _MIN_STATED_LOSS_DB:
         sight_text += f", {points.diffraction_loss[k]:.1f} dB lost by diffraction"
     text = (
-        f"link margin {abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the required fade"
-        f" margin on {place_text_within(leg)} at {along.time[k]:.0f} s, east {east:.0f} m, north {north:.0f} m,"
+        f"link margin {abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the required"
+        f" fade margin on {place_text_within(leg)} at {along.time[k]:.0f} s, east {east:.0f} m, north {north:.0f} m,"
         f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
     )
     if along.outages:
