@@ -192,6 +192,8 @@ def suggestion_text(suggestion: Suggestion) -> str:
         for state, fails in (("fails", True), ("undecided", False))
         if (items := [item for item in remaining if item.fails is fails])
     ]
+    if any(change.not_flown for change in suggestion):
+        notes.append(f"not tried by flight: the flight ended before this {suggestion[-1].place.kind}")
     return f"{text} ({'; '.join(notes)})" if notes else text
 
 
