@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, Suggestion
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
@@ -195,6 +196,16 @@ def suggestion_text(suggestion: Suggestion) -> str:
     if any(change.not_flown for change in suggestion):
         notes.append(f"not tried by flight: the flight ended before this {suggestion[-1].place.kind}")
     return f"{text} ({'; '.join(notes)})" if notes else text
+
+
+def without_trial(suggestion: Suggestion) -> Suggestion:
+    """Return a suggestion without the results of its trial.
+
+    >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s", not_flown=True)
+    >>> suggestion_text(without_trial((slower,)))
+    'fly leg 1 at 20.5 m/s instead of 25 m/s'
+    """
+    return tuple(replace(change, moves=(), remaining=(), not_flown=False) for change in suggestion)
 
 
 def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:

@@ -1,9 +1,9 @@
 """Trials of the suggestions of a verdict; a suggestion is offered only if its trial passes.
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight that reached the
-place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step that is too small, such as a height, is
-enlarged by the missing part.  A suggestion that passed states the moves of the items, and the findings that remain
-open on a part of the mission that was not flown before.
+place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step
+that is too small, such as a height, is enlarged by the missing part.  A suggestion that passed states the moves of the
+items, and the findings that remain open on a part of the mission that was not flown before.
 """
 
 import math
@@ -183,7 +183,7 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
 
 
 def _smallest_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
-    """Return the suggestions of the trials, the smallest moves first; of far moves only the smallest, and only alone."""
+    """Return the suggestions of the trials, the smallest moves first; of far moves only one, if all are far."""
     suggestions = sorted((trial.suggestion for trial in trials), key=_move_distance)
     near = [
         suggestion
