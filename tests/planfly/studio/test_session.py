@@ -138,10 +138,31 @@ def test_a_moved_mission_saved_is_read_as_it_is() -> None:
     assert session.mission_message()["unsaved"] is True
     for form in ("waypoints", "plan"):
         saved = session.save(form)
-        assert (session.mission_message()["unsaved"], session.mission_message()["changed"]) == (False, True)
+        assert (session.mission_message()["unsaved"], session.is_changed) == (False, True)
         assert parse_mission(saved.data.decode(), saved.name).items == session.mission.items
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     assert session.mission_message()["unsaved"] is True
+
+
+def test_the_unsaved_mark_compares_with_what_the_file_holds(tmp_path: Path) -> None:
+    """Saved 10 m higher, the opened mission is the unsaved one, and a revert returns to the file."""
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 6).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
+    opened = session.mission
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.overwrite_file()
+    saved = session.mission
+    assert not session.is_unsaved
+    session.step_history("undo")
+    assert (session.mission, session.mission_message()["unsaved"]) == (opened, True)
+    # The same content is saved, however it was made.
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=4.0))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=6.0))
+    assert (session.mission == saved, session.is_unsaved) == (True, False)
+    session.step_history("undo")
+    session.step_history("revert")
+    assert (session.mission, session.is_unsaved) == (saved, False)
 
 
 def test_what_a_form_does_not_hold_is_said() -> None:
