@@ -20,7 +20,7 @@ from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import Document, open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, TriedChanges, open_session
 from planfly.workflow import suggestion_trials
-from planfly.workflow.suggestion_trials import with_tried_suggestions
+from planfly.workflow.suggestion_trials import SuggestionTrials, with_tried_suggestions
 from tests.mission_lines import setup_of, wp
 from tests.own_aircraft import copy_aerosonde, write_mission, write_scenario
 from tests.planfly.studio.drafts import drawn_session, session_of, try_planned, world_of
@@ -502,7 +502,7 @@ def test_a_suggestion_applied_mends_its_finding(rule: str, by: float, seed: int,
 
 def test_a_suggestion_that_fails_its_trial_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
     """The path would remain inside the missile's range."""
-    monkeypatch.setattr(suggestion_trials, "MAX_TRIED_FINDINGS", 2)
+    monkeypatch.setattr(suggestion_trials, "MAX_TRIED_FINDINGS", 3)
     session = drawn_session(4, 12)
     findings = session.judged.verdict.findings
     number = next(n for n, one in enumerate(findings) if one.rule == "threat" and one.suggestions)
@@ -513,6 +513,7 @@ def test_a_suggestion_that_fails_its_trial_is_not_offered(monkeypatch: pytest.Mo
         ]
 
     assert offered() == []
+    assert SuggestionTrials(session.context, session.judged).try_suggestion(findings[number], 0) is None
     try_planned(session)
     assert number not in offered()
     with pytest.raises(MissionError, match="no longer exists"):
