@@ -126,6 +126,8 @@ class Change(DocumentConfig):
     """Moves of items with which the suggestion passed its trial, stated with its last change; all else is unmoved."""
     remaining: tuple[RemainingFinding, ...] = field(default=(), compare=False)
     """Findings that remain open after the suggestion, stated with its last change."""
+    not_flown: bool = field(default=False, compare=False)
+    """True, with the last change, if the suggestion was tried by geometry only, because the flight ended before it."""
 
 
 # Changes to make together.  A finding has alternative suggestions, any of which would make it pass.

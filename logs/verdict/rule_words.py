@@ -18,6 +18,7 @@ from logs.verdict.headline_phrases import (
     small_circle_phrase,
     zone_phrase,
 )
+from logs.verdict.wording import RULE_NOUNS
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +185,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="survey",
             title="photo lines",
-            noun="photo line",
+            noun=RULE_NOUNS["survey"],
             question="How much of each photo line of a survey is flown so that its photos can be used?",
             margin=Margin("share of the photo line", "%", 5.0),
             phrase=photo_line_phrase,
@@ -207,7 +208,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="takeoff",
             title="take-off",
-            noun="take-off",
+            noun=RULE_NOUNS["takeoff"],
             question="Can the aircraft climb from the ground at home to the position of the take-off item?",
             margin=Margin("slope", "deg"),
             unjudged="take-off",
@@ -216,7 +217,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="climbout",
             title="climb-out",
-            noun="climb-out",
+            noun=RULE_NOUNS["climbout"],
             question="Is the climb from home to the mission's first waypoint clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=reason_phrase,
@@ -264,7 +265,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="go_around",
             title="go-around",
-            noun="go-around",
+            noun=RULE_NOUNS["go_around"],
             question="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
             margin=None,
             phrase=reason_phrase,
@@ -279,7 +280,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="link",
             title="radio link",
-            noun="radio link",
+            noun=RULE_NOUNS["link"],
             question="Does the radio link to the ground station keep its fade margin along the whole path?",
             margin=Margin("longest outage", "s"),
             explains_unjudged=True,
@@ -294,7 +295,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="departure",
             title="loss of control",
-            noun="loss of control",
+            noun=RULE_NOUNS["departure"],
             question="Are all values finite, are bank and airspeed plausible, and is the ground never touched?",
             margin=Margin("largest bank", "deg", 10.0),
             urgency=4,

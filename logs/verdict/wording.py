@@ -2,14 +2,24 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
-from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, Suggestion
+from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, RemainingFinding, Suggestion
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
 from world.wording import count_text as count_text
 
 # Text of a unit after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "dB": " dB", "legs": " legs", "%": " %"}
+# Names of rules within a sentence that differ from their names in data.
+RULE_NOUNS = {
+    "survey": "photo line",
+    "takeoff": "take-off",
+    "climbout": "climb-out",
+    "go_around": "go-around",
+    "link": "radio link",
+    "departure": "loss of control",
+}
 # Rules that judge a flight where another rule judges the route.
 FLOWN_COUNTERPARTS = {"landing": "touchdown"}
 # Greatest length of a statement in a headline, characters.
@@ -188,11 +198,28 @@ def suggestion_text(suggestion: Suggestion) -> str:
     remaining = [finding for change in suggestion for finding in change.remaining]
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
-        f"then still {state}: {', '.join(f'{item.rule} at {place_text(item.place)}' for item in items)}"
+        f"then still {state}: {', '.join(texts)}"
         for state, fails in (("fails", True), ("undecided", False))
-        if (items := [item for item in remaining if item.fails is fails])
+        if (texts := [_remaining_text(item) for item in remaining if item.fails is fails])
     ]
+    if any(change.not_flown for change in suggestion):
+        notes.append(f"not tried by flight: the flight ended before this {suggestion[-1].place.kind}")
     return f"{text} ({'; '.join(notes)})" if notes else text
+
+
+def _remaining_text(finding: RemainingFinding) -> str:
+    """Name the rule and the place of a finding that remains open."""
+    return f"{RULE_NOUNS.get(finding.rule, finding.rule)} at {place_text(finding.place)}"
+
+
+def without_trial(suggestion: Suggestion) -> Suggestion:
+    """Return a suggestion without the results of its trial.
+
+    >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s", not_flown=True)
+    >>> suggestion_text(without_trial((slower,)))
+    'fly leg 1 at 20.5 m/s instead of 25 m/s'
+    """
+    return tuple(replace(change, moves=(), remaining=(), not_flown=False) for change in suggestion)
 
 
 def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | None = None) -> str:
@@ -280,7 +307,9 @@ def disagreement_text(disagreement: Disagreement) -> str:
     'landing at waypoint 2 fails by geometry, and touchdown, by which a flight judges it, passes in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    rule_and_place = f"{disagreement.rule} at {place_text_within(disagreement.place)}"
+    rule_and_place = (
+        f"{RULE_NOUNS.get(disagreement.rule, disagreement.rule)} at {place_text_within(disagreement.place)}"
+    )
     counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
     conjunction = f", and {counterpart}, by which a flight judges it," if counterpart else " and"
     return (
@@ -296,7 +325,7 @@ def deciding_text(deciding: DecidingParameter) -> str:
     'with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass'
     """
     place_name, error = place_text(deciding.place), deciding.off
-    effect = f"the flight fails {deciding.rule} at {place_name}"
+    effect = f"the flight fails {RULE_NOUNS.get(deciding.rule, deciding.rule)} at {place_name}"
     if error is not None and deciding.rule == "corridor":
         effect = f"the aircraft is {abs(error):.0f} m off {place_name}"
     elif error is not None:

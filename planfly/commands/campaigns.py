@@ -213,6 +213,7 @@ def _result_folder(args: argparse.Namespace, kind: str) -> Path:
 
 def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
     """Repeat one flight of the campaign in a folder, with a log; return the exit code of its outcome."""
+    from logs.verdict.rule_words import rule_word
     from logs.verdict.wording import place_text
 
     for option, target in (("--json", args.json), ("--junit", args.junit)):
@@ -225,7 +226,7 @@ def _repeat_flight(args: argparse.Namespace, folder: Path) -> int:
     if flight.row.undecided_text:
         print(f"  Not judged: {flight.row.undecided_text}")
     for rule, place in flight.row.failures:
-        print(f"  failed  {rule} at {place_text(place)}")
+        print(f"  failed  {rule_word(rule)} at {place_text(place)}")
     print(f"log       {flight.log}")
     return {"flyable": FLYABLE, "undecided": INCOMPLETE}.get(flight.row.outcome, NOT_FLYABLE)
 

@@ -13,6 +13,7 @@ class History:
     """Missions, each made from the previous mission by an edit.
 
     first: the mission as opened.
+    saved: the mission in the file; the mission as opened or downloaded last if there is no file.
     steps: the result of each edit, with its description.
     position: number of steps that are in effect.
 
@@ -25,6 +26,10 @@ class History:
     first: Mission
     steps: list[tuple[Mission, str]] = field(default_factory=list)
     position: int = 0
+    saved: Mission = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.saved = self.first
 
     @property
     def mission(self) -> Mission:

@@ -9,7 +9,7 @@ from typing import Any
 from planfly.arguments import CHOICES
 from planfly.studio import messages
 from planfly.studio.changes import FlightResults, describe_changes
-from planfly.studio.session import Session
+from planfly.studio.session import Session, TriedChanges
 from planfly.studio.view_model import Json, round_to_json
 from planfly.studio.worker_process import Answer, Task, WorkerProcess
 from planfly.studio.worker_tasks import PlanRequest
@@ -19,6 +19,8 @@ from world.errors import MissionError, PlanflyError
 
 # Interval between two progress reports of a task, s.
 _REPORT_INTERVAL_S = 0.12
+# Levels of the verdicts whose suggestions are tried, by the names of the tasks.
+_TRIAL_LEVELS = {"geometry_trials": "geometric", "trials": "flown"}
 # Name of the process that flies.
 FLIGHT_WORKER = "flight"
 # Name of the process for long tasks.
@@ -30,7 +32,7 @@ class _ActiveTask:
     """A task that a worker process is doing.
 
     number: number of the task, unique in a session.
-    name: kind of the task: "fly", "plan", "trials" or a long task.
+    name: kind of the task: "fly", "plan", a key of `_TRIAL_LEVELS`, or a long task.
     rev: revision of the mission for which the task is done.
     item_range: first and last item between which a path is planned; None for other tasks, and for the whole mission.
     report_time: time of the last progress report, s.
@@ -127,12 +129,20 @@ class Jobs:
     # Requests.
 
     def fly(self, session: Session) -> None:
-        """Fly the current mission and cancel a flight in progress; do nothing while a first path is planned."""
+        """Fly the current mission and cancel a flight in progress; do nothing while a first path is planned.
+
+        Before the flight, suggestions of its geometric verdict are tried.
+        """
         if self.is_planning_first_path(session):
             return
-        self._submit_task(
-            FLIGHT_WORKER, "fly", "planfly.studio.worker_tasks.fly", (session.context, session.mission), session.rev
-        )
+        tried = session.tried.get("geometric")
+        is_tried = tried is not None and tried.rev == session.rev
+        has_suggestions = any(finding.suggestions for finding in session.judged.verdict.failed)
+        name, function = ("fly", "fly")
+        if has_suggestions and not is_tried:
+            name, function = ("geometry_trials", "try_planned_suggestions")
+        payload = session.context, session.mission
+        self._submit_task(FLIGHT_WORKER, name, f"planfly.studio.worker_tasks.{function}", payload, session.rev)
 
     def plan(self, message: messages.Plan, session: Session) -> None:
         """Plan one or several paths. Raises PlanflyError for items between which no path can be planned."""
@@ -240,7 +250,9 @@ class Jobs:
         if task.name == "plan" and task.rev != session.rev:
             reason = "the mission was changed while its path was planned, so the path is not used: plan again"
             return [self._stopped_message("plan"), {"kind": "fault", "text": reason}]
-        return [self._result_message(task, answer.value, session)]
+        result = self._result_message(task, answer.value, session)
+        # The task that follows begins before it reports progress.
+        return [result, *(following.message for following in [self._active.get(worker)] if following is not None)]
 
     def _stopped_message(self, name: str) -> Json:
         """Return the message that a task has ended without a result.
@@ -254,7 +266,8 @@ class Jobs:
     def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
         """Store the result of a task, and return the message that shows the result on the pages.
 
-        After a failed flight of the current mission, a trial of its suggestions is started.
+        After a failed flight of the current mission, trials of its suggestions are started; after trials by geometry,
+        the flight.
         """
         if task.name == "fly":
             previous_results, self._last_results = self._last_results, value.pop("figures")
@@ -263,7 +276,7 @@ class Jobs:
                 self._submit_task(
                     FLIGHT_WORKER,
                     "trials",
-                    "planfly.studio.worker_tasks.try_suggestions",
+                    "planfly.studio.worker_tasks.try_flown_suggestions",
                     (session.context, judged_mission),
                     task.rev,
                 )
@@ -274,10 +287,14 @@ class Jobs:
                 "changes": describe_changes(previous_results, self._last_results),
             }
             return self._flight_message
-        if task.name == "trials":
-            session.flown_trials = task.rev, value["missions"]
-            self._flight_message = (self._flight_message or {}) | {"findings": value["findings"]}
-            return {"kind": "tried", "rev": task.rev, "findings": value["findings"]}
+        if task.name in _TRIAL_LEVELS:
+            level, findings = _TRIAL_LEVELS[task.name], value["findings"]
+            session.tried[level] = TriedChanges(task.rev, findings, value["changes"])
+            if level == "flown":
+                self._flight_message = (self._flight_message or {}) | {"findings": findings}
+            elif task.rev == session.rev:
+                self.fly(session)
+            return {"kind": "tried", "rev": task.rev, "job": task.name, "findings": findings}
         if task.name == "plan":
             # Until then the paths of an earlier search can be chosen, also if this one is stopped.
             session.plans = ([front_plan.plan for front_plan in value], task.item_range)

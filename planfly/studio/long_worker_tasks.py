@@ -11,6 +11,7 @@ from typing import Any
 from flight.mission.items import Mission
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.returns_text import headline, point_of_no_return_text, range_text
+from logs.verdict.rule_words import rule_word
 from planfly.campaigns.campaign_base import CampaignBase, campaign_of_setup
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
@@ -95,7 +96,7 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
     lower, upper = wilson(flyable, FLIGHT_COUNT).low, wilson(flyable + undecided, FLIGHT_COUNT).high
     headline = f"{flyable} of {FLIGHT_COUNT} flights are flyable"
     headline += f", {undecided} not judged in full" if undecided else ""
-    common = [f"{rule} fails in {count}" for rule, count in failure_counts.most_common(5)]
+    common = [f"{rule_word(rule)} fails in {count}" for rule, count in failure_counts.most_common(5)]
     return {
         "state": "ok" if flyable == FLIGHT_COUNT else "open" if flyable or undecided else "fail",
         "headline": f"{headline}: {lower:.0%} to {upper:.0%} at 95 %",

@@ -354,7 +354,8 @@ class Server:
                     home_relative_text(session.document.path.parent) if message.over and session.document.path else ""
                 )
                 answer = {"name": saved.name, "losses": list(saved.losses), "where": folder, "data": content}
-                page.send({"kind": "saved", "unsaved": session.is_unsaved, **answer})
+                page.send({"kind": "saved", **answer})
+                self._broadcast({"kind": "unsaved", "unsaved": session.is_unsaved})
             case messages.Hello():
                 raise ValueError("a page must send its token only once")
             case _:

@@ -7,12 +7,15 @@ revision; an edit of an older revision is refused, so that no page edits a missi
 import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from flight.mission import edits
 from flight.mission.items import LANDINGS, Mission
-from logs.verdict.wording import count_text, moves_text
+from logs.verdict.places import Suggestion
+from logs.verdict.rule_words import rule_word
+from logs.verdict.wording import count_text, moves_text, suggestion_text, without_trial
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
@@ -24,9 +27,8 @@ from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, R
 from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, own_aircraft, settings_json
 from planfly.studio.view_model import Json, mission_json, windows_json, world_json
 from planfly.studio.worker_process import INTERNAL
-from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
+from planfly.workflow.apply_suggestion import item_moves
 from planfly.workflow.mission_context import JudgedMission
-from planfly.workflow.suggestion_trials import SuggestionTrials
 from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_atomically
@@ -43,6 +45,19 @@ class StaleEdit(Exception):
     """Raised for an edit of an older revision of the mission."""
 
 
+class TriedChanges(NamedTuple):
+    """Suggestions of a verdict that passed their trials.
+
+    rev: revision of the judged mission.
+    findings: findings with these suggestions, as page data.
+    changes: changed mission and suggestion of each trial, keyed by the numbers of finding and suggestion.
+    """
+
+    rev: int
+    findings: list[Json]
+    changes: dict[tuple[int, int], tuple[Mission, Suggestion]]
+
+
 @dataclass(slots=True)
 class Session:
     """One edited mission.
@@ -53,15 +68,12 @@ class Session:
     rev: revision, which increases with every change.
     judged: the current mission with its verdict.
     plans: planned paths to choose from, and the first and last item between which they replace items, or None.
-    flown_trials: flown revision, and the missions with a suggestion that passed a trial flight, keyed by the numbers of
-        finding and suggestion.
+    tried: suggestions that passed their trials, by the level of the verdict, "geometric" or "flown".
     world_rev: revision of the world, which increases with every change of the world.
     autosaved_rev: revision of the last autosave.
     unreadable: autosave files that cannot be read.
     document_rev: number that increases with every opened document.
     named_file: file named on the command line, the only file that may be overwritten.
-    saved_mission: the mission as saved last over the document's file; without such a file, as downloaded last.
-    file_mission: the mission as saved last over the document's file.
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
     replaced_settings: autosaved settings of this document that were not restored, each as text.
@@ -77,12 +89,10 @@ class Session:
     rev: int = 1
     world_rev: int = 1
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
-    flown_trials: tuple[int, dict[tuple[int, int], Mission]] = field(default_factory=lambda: (0, {}))
+    tried: dict[str, TriedChanges] = field(default_factory=dict)
     autosaved_rev: int = 0
     unreadable: list[Path] = field(default_factory=list)
     named_file: Path | None = None
-    saved_mission: Mission | None = None
-    file_mission: Mission | None = None
     document_rev: int = 1
     earlier_states: list[_OpenedState] = field(default_factory=list)
     undone_states: list[_OpenedState] = field(default_factory=list)
@@ -169,8 +179,8 @@ class Session:
 
     @property
     def is_unsaved(self) -> bool:
-        """True if the mission differs from the opened mission and from the mission saved last."""
-        return self.is_changed and self.mission is not self.saved_mission
+        """True if the mission differs from the mission in the file."""
+        return self.mission != self.history.saved
 
     # ------------------------------------------------------------------
     # Edits.
@@ -188,14 +198,14 @@ class Session:
         self._add_to_history(mission, text)
 
     def step_history(self, kind: str) -> None:
-        """Undo, redo, or revert to the opened mission; do nothing if there is nothing to undo, redo or revert.
+        """Undo, redo, or revert to the mission in the file; do nothing if there is nothing to undo, redo or revert.
 
         kind: "undo", "redo" or "revert".
         """
         if kind == "revert":
-            if self.is_changed:
-                self._set_mission(self.history.first)
-                self._add_to_history(self.history.first, "revert to the file")
+            if self.is_unsaved:
+                self._set_mission(self.history.saved)
+                self._add_to_history(self.history.saved, "revert to the file")
             return
         if kind == "undo" and not self.history.undo_text and self.earlier_states:
             current_state = self._opened_state()
@@ -350,45 +360,17 @@ class Session:
     def _mission_with_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission changed by a suggestion, and a description of the edit.
 
-        Raises MissionError for a suggestion that no longer exists or does not pass its trial.
+        Raises MissionError for a suggestion that has not passed a trial on this revision.
         """
-        if message.flown:
-            return self._mission_with_flown_suggestion(message)
-        findings = self.judged.verdict.findings
-        if not message.finding < len(findings):
-            raise MissionError(f"{self.document.name}: that finding no longer exists", field="finding")
-        finding = findings[message.finding]
-        if not message.which < len(finding.suggestions):
+        tried = self.tried.get("flown" if message.flown else "geometric")
+        change = tried.changes.get((message.finding, message.which)) if tried and tried.rev == self.rev else None
+        if change is None:
             raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        trials = SuggestionTrials(self.context, self.judged)
-        trial = trials.try_suggestion(finding, message.which)
-        if trial is None:
-            # A suggestion that moves no item has a reason of its own.
-            apply_suggestion(self.context, self.judged, finding, finding.suggestions[message.which])
-            reason = trials.explain_refusal(finding, message.which)
-            raise MissionError(f"{self.document.name}: {reason}", field="suggestion")
-        return self._suggested_edit(trial.setup.mission, finding.rule)
-
-    def _suggested_edit(self, mission: Mission, source: str) -> tuple[Mission, str]:
-        """Return a mission with a suggestion applied, and a description of the edit with the moves of the items.
-
-        source: where the suggestion comes from.
-        """
+        mission, suggestion = change
+        source = "the flight" if message.flown else rule_word(self.judged.verdict.findings[message.finding].rule)
         moves = item_moves(self.context, self.mission, mission)
-        changed = [str(new.seq) for old, new in zip(self.mission.items, mission.items, strict=False) if new != old]
-        edit_text = f": move {moves_text(moves)}" if moves else f": change item {', '.join(changed)}" if changed else ""
-        return replace(mission, autopilot=self.mission.autopilot), f"apply a suggestion of {source}{edit_text}"
-
-    def _mission_with_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
-        """Return the mission as flown in the trial of a suggestion, and a description of the edit.
-
-        Raises MissionError if the mission was changed after the trial.
-        """
-        rev, missions = self.flown_trials
-        flown_mission = missions.get((message.finding, message.which)) if rev == self.rev else None
-        if flown_mission is None:
-            raise MissionError(f"{self.document.name}: that suggestion no longer exists", field="suggestion")
-        return self._suggested_edit(flown_mission, "the flight")
+        edit_text = f"move {moves_text(moves)}" if moves else suggestion_text(without_trial(suggestion))
+        return replace(mission, autopilot=self.mission.autopilot), f"apply a suggestion of {source}: {edit_text}"
 
     def _replace_items_between(self, plan: Plan, first: int, last: int) -> Mission:
         """Return the mission with a planned path in place of the items between two items.
@@ -449,13 +431,13 @@ class Session:
     # Page data, and files.
 
     def mission_message(self) -> Json:
-        """Return the message with the current mission and its verdict."""
+        """Return the message with the current mission and its verdict, with the suggestions that passed a trial."""
+        tried = self.tried.get("geometric")
         return {
             "kind": "sheet",
             "rev": self.rev,
             "name": self.document.name,
             "document": self.document_rev,
-            "changed": self.is_changed,
             "unsaved": self.is_unsaved,
             "undo": self.undo_text,
             "redo": self.redo_text,
@@ -463,6 +445,7 @@ class Session:
             "planned": self.judged.setup.plan is not None,
             "notes": [*filter(None, [self.replaced_text]), *self.mission.warnings, *self.judged.setup.notes],
             **mission_json(self.context, self.judged),
+            **({"findings": tried.findings} if tried is not None and tried.rev == self.rev else {}),
         }
 
     @property
@@ -489,7 +472,7 @@ class Session:
         """
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form in KINDS and form != "kml" and not self.file_kind:
-            self.saved_mission = self.mission
+            self.history.saved = self.mission
         return saved_file
 
     def overwrite_file(self) -> SavedFile:
@@ -505,10 +488,10 @@ class Session:
             raise PlanflyError(message, file=path)
         saved_file = self.save(self.file_kind)
         write_atomically(path, saved_file.data)
-        self.saved_mission = self.mission
+        self.history.saved = self.mission
         self.document = replace(self.document, on_disk=saved_file.data)
         # The next autosave knows the new file.
-        self.file_mission, self.autosaved_rev = self.mission, 0
+        self.autosaved_rev = 0
         return saved_file
 
     # ------------------------------------------------------------------
@@ -538,7 +521,7 @@ class Session:
             return
         file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
-        is_in_file = self.mission is self.file_mission
+        is_in_file = bool(self.file_kind) and not self.is_unsaved
         text = autosave_text(self.context, self.document, self.history, plan, is_in_file=is_in_file)
         write_atomically(file, text)
         self.autosaved_rev = self.rev

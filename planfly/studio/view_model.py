@@ -1,6 +1,7 @@
 """Convert the world, the mission with its states, and the profile to the data that the page draws, in m."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +13,9 @@ from flight.mission.items import AMSL, OVER_HOME, Command, Mission, MissionItem,
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
+from logs.verdict.judge_geometry import with_passing_suggestions
 from logs.verdict.measures.route_requirements import judged_airspace
+from logs.verdict.places import TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
@@ -148,7 +151,7 @@ def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
         "verdict": verdict_json(verdict),
-        "findings": findings_json(verdict),
+        "findings": findings_json(verdict, ()),
         "profile": profile_json(context.scenario, setup),
         "total": {
             "km": round(float(route_distance(setup.route.positions)[-1]) / 1000.0, 2),
@@ -282,11 +285,14 @@ def verdict_json(verdict: Verdict) -> Json:
     }
 
 
-def findings_json(verdict: Verdict) -> list[Json]:
+def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[Json]:
     """Return page data of the findings to list.
 
     These are the failed and undecided findings, then the finding closest to its limit for each rule.
+
+    tried: suggestions that passed their trials; failed findings have no others.
     """
+    verdict = replace(verdict, findings=with_passing_suggestions(verdict.findings, tried))
     return [
         _finding_json(number, finding) for number, finding in verdict.present().findings_to_list(_MAX_LISTED_FINDINGS)
     ]

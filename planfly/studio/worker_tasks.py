@@ -29,7 +29,7 @@ from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.pipeline import fly_and_judge
-from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, tried_suggestions
+from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, finding_key, tried_suggestions
 from planner.evaluation.certify import least_height
 from planner.evaluation.problem import make_problem
 from planner.search.plan_front import FrontPlan
@@ -47,24 +47,23 @@ _MAX_DRAWN_ROWS = 1_500
 def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission with its simulated autopilot, judge the flight, and return the results as page data.
 
-    The findings have no suggestions.  "judged" is the pickled flight for `try_suggestions`, or empty if nothing failed.
+    The findings have no suggestions.  "judged" is the pickled flight for `try_flown_suggestions`, or empty if nothing
+    failed.
     """
     context, mission = payload
     setup = context.setup(mission)
     flight = fly_and_judge(setup, None, advance, reference="never")
     judged_mission = JudgedMission(mission, setup, flight.requirements, flight.verdict)
-    verdict_without_suggestions = replace(
-        flight.verdict, findings=with_passing_suggestions(flight.verdict.findings, ())
-    )
     states = place_states(flight.requirements, flight.verdict.findings)
     seconds = round(float(flight.track.time[-1]), 1) if len(flight.track) else 0.0
     return {
         "verdict": verdict_json(flight.verdict),
-        "findings": findings_json(verdict_without_suggestions),
+        "findings": findings_json(flight.verdict, ()),
         "judged": pickle.dumps(judged_mission) if flight.verdict.failed else b"",
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
         "ended": flight.ended,
+        "early": not flight.verdict.complete,
         "autopilot": setup.autopilot.title,
         "seconds": seconds,
         "figures": flight_results(mission, setup.route, flight.verdict.findings, seconds),
@@ -72,31 +71,44 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     }
 
 
-def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
+def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+    """Try the suggestions of a mission by geometry, and return those that passed, as `try_flown_suggestions` does."""
+    context, mission = payload
+    return _try_suggestions(context, context.judge(mission), advance)
+
+
+def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
     """Try the suggestions of a failed flight in trial flights, and return those that passed.
 
-    The result has the findings with these suggestions, as page data, and the missions with a suggestion applied, keyed
-    by the numbers of finding and suggestion; a suggestion that moves no item has no mission.
+    The result has the findings with these suggestions, as page data, and each changed mission with its suggestion,
+    keyed by the numbers of finding and suggestion; a suggestion that changes no mission is not among them.
 
     payload: the editing context, and the pickled flight.
     """
     context, pickled = payload
-    judged_mission: JudgedMission = pickle.loads(pickled)
+    return _try_suggestions(context, pickle.loads(pickled), advance)
+
+
+def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
+    """Try the suggestions of a verdict, and return those that passed, as `try_flown_suggestions` does."""
 
     def report_and_continue() -> bool:
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
         return False
 
+    verdict = judged_mission.verdict
     passed_trials = SuggestionTrials(context, judged_mission, report_and_continue).find_passing()
-    findings = with_passing_suggestions(judged_mission.verdict.findings, tried_suggestions(passed_trials))
-    missions = {
-        (number, which): trial.setup.mission
-        for number, finding in enumerate(judged_mission.verdict.findings)
-        for which, suggestion in enumerate(findings[number].suggestions)
-        for trial in passed_trials
-        if trial.finding is finding and trial.suggestion == suggestion and can_apply(suggestion)
+    tried = tried_suggestions(passed_trials)
+    missions = {(finding_key(trial.finding), trial.suggestion): trial.setup.mission for trial in passed_trials}
+    offered = with_passing_suggestions(verdict.findings, tried)
+    changes = {
+        (number, which): (missions[finding_key(finding), suggestion], suggestion)
+        for number, finding in enumerate(verdict.findings)
+        if finding.ok is False
+        for which, suggestion in enumerate(offered[number].suggestions)
+        if can_apply(suggestion)
     }
-    return {"findings": findings_json(replace(judged_mission.verdict, findings=findings)), "missions": missions}
+    return {"findings": findings_json(verdict, tried), "changes": changes}
 
 
 def _track_json(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:

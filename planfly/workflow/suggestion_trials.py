@@ -1,9 +1,9 @@
 """Trials of the suggestions of a verdict; a suggestion is offered only if its trial passes.
 
-A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight.  It passes if its
-finding is then ok, and every finding that passed before still passes.  A step that is too small, such as a height, is
-enlarged by the missing part.  A suggestion that passed states the moves of the items, and the findings that remain
-open on a part of the mission that was not flown before.
+A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight that reached the
+place of the finding.  It passes if its finding is then ok, and every finding that passed before still passes.  A step
+that is too small, such as a height, is enlarged by the missing part.  A suggestion that passed states the moves of the
+items, and the findings that remain open on a part of the mission that was not flown before.
 """
 
 import math
@@ -17,7 +17,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.places import FLIGHT, Change, RemainingFinding, Suggestion, TriedSuggestions
+from logs.verdict.places import FLIGHT, Change, ItemMove, RemainingFinding, Suggestion, TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
@@ -41,8 +41,8 @@ MAX_TRIED_LEGS = 5000
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
-# Horizontal move of an item that is suggested only if nothing else passes, m.
-FAR_MOVE_DISTANCE_M = 1000.0
+# Horizontal move of an item that is suggested only if no smaller move passes, m; the detour is up to twice as long.
+FAR_MOVE_DISTANCE_M = 300.0
 # Greatest share of a leg's height error that may remain with a suggestion for its slope.
 MAX_HEIGHT_ERROR_SHARE = 0.5
 # Factor on the part that a step still lacks.
@@ -169,27 +169,38 @@ class PassedTrial:
 
 
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
-    """Return the suggestions that passed, grouped by finding, without far moves if another suggestion passed."""
+    """Return the suggestions that passed, grouped by finding, the smallest moves of items first.
+
+    A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller one passed.
+    """
     trials_by_finding: dict[int, list[PassedTrial]] = {}
     for trial in passed_trials:
         trials_by_finding.setdefault(id(trial.finding), []).append(trial)
     return tuple(
-        TriedSuggestions(trials[0].finding.rule, trials[0].finding.place, _without_far_moves(trials))
+        TriedSuggestions(trials[0].finding.rule, trials[0].finding.place, _smallest_moves(trials))
         for trials in trials_by_finding.values()
     )
 
 
-def _without_far_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
-    """Return the suggestions of the trials, without those that move an item very far if there are others."""
-    suggestions = tuple(trial.suggestion for trial in trials)
-    near = tuple(
+def _smallest_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
+    """Return the suggestions of the trials, the smallest moves first; of far moves only one, if all are far."""
+    suggestions = sorted((trial.suggestion for trial in trials), key=_move_distance)
+    near = [
         suggestion
         for suggestion in suggestions
-        if all(
-            math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for change in suggestion for move in change.moves
-        )
-    )
-    return near or suggestions
+        if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _moves_of(suggestion))
+    ]
+    return tuple(near or suggestions[:1])
+
+
+def _moves_of(suggestion: Suggestion) -> list[ItemMove]:
+    """Return the moves of items of a suggestion that passed its trial."""
+    return [move for change in suggestion for move in change.moves]
+
+
+def _move_distance(suggestion: Suggestion) -> float:
+    """Return the largest move of an item, m; 0 for a suggestion that moves none, such as another airspeed."""
+    return max((math.hypot(move.east, move.north, move.up) for move in _moves_of(suggestion)), default=0.0)
 
 
 def judge_mission_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
@@ -276,51 +287,43 @@ class SuggestionTrials:
         if passed_candidate is None:
             return None
         (*first_changes, last_change), trial = passed_candidate
-        moves = item_moves(self.context, self.judged.mission, trial.setup.mission)
-        remaining = remaining_findings(*self._compared_verdicts(trial))
-        last_change = replace(last_change, moves=moves, remaining=remaining)
+        last_change = replace(
+            last_change,
+            moves=item_moves(self.context, self.judged.mission, trial.setup.mission),
+            remaining=remaining_findings(*self._compared_verdicts(trial, finding)),
+            not_flown=self._is_unreached(finding),
+        )
         return PassedTrial(finding, (*first_changes, last_change), trial.setup)
 
-    def explain_refusal(self, finding: Finding, number: int) -> str:
-        """Return the reason why no geometric trial of a suggestion passes: the finding stays, or others are added."""
-        verdicts = [
-            trial.geometry_verdict
-            for _, trial in islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
-        ]
-        for verdict in verdicts:
-            open_after = [item for item in verdict.findings if item.ok is not True]
-            added = added_findings(self._current_trial.geometry_verdict, verdict)
-            if added and finding_key(finding) not in map(finding_key, open_after):
-                others_text = f", and {len(added) - 1} more" if len(added) > 1 else ""
-                return f"this suggestion would add a finding: {_finding_text(added[0])}{others_text}"
-        remaining = next(
-            (
-                item
-                for verdict in verdicts[-1:]
-                for item in verdict.findings
-                if finding_key(item) == finding_key(finding)
-            ),
-            finding,
-        )
-        return f"this suggestion would not remove its finding: {_finding_text(remaining)}"
-
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
-        """Return True if a trial passes by geometry, and by a flight if the judged verdict is flown.
+        """Return True if a trial passes by geometry, and by a flight if the judged flight reached the finding's place.
 
         A trial beyond the allowed number of flights fails.
         """
-        if self.judged.verdict.level == "flown":
+        if self._is_tried_by_flight(finding):
             if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
                 return False
             if "flight_verdict" not in vars(trial):
                 self._flights_left -= 1
             if self._flights_left < 0:
                 return False
-        return is_passed(*self._compared_verdicts(trial), finding)
+        return is_passed(*self._compared_verdicts(trial, finding), finding)
 
-    def _compared_verdicts(self, trial: Trial) -> tuple[Verdict, Verdict]:
-        """Return the verdicts before and after a trial's change, on flights or by geometry as the judged verdict."""
-        if self.judged.verdict.level == "flown":
+    def _is_tried_by_flight(self, finding: Finding) -> bool:
+        """Return True if the suggestions of a finding are flown."""
+        return self.judged.verdict.level == "flown" and not self._is_unreached(finding)
+
+    def _is_unreached(self, finding: Finding) -> bool:
+        """Return True if a finding fails by geometry at a leg or waypoint that the judged flight did not reach."""
+        verdict, place = self.judged.verdict, finding.place
+        if verdict.level != "flown" or verdict.complete or place.kind not in ("leg", "waypoint"):
+            return False
+        is_beyond_end = place.index is not None and place.index > sum(map(math.isfinite, verdict.leg_ends))
+        return is_beyond_end and finding_key(finding) in map(finding_key, self._current_trial.geometry_verdict.failed)
+
+    def _compared_verdicts(self, trial: Trial, finding: Finding) -> tuple[Verdict, Verdict]:
+        """Return the verdicts before and after a trial's change, on flights or by geometry."""
+        if self._is_tried_by_flight(finding):
             return self.judged.verdict, trial.flight_verdict
         return self._current_trial.geometry_verdict, trial.geometry_verdict
 
@@ -342,9 +345,21 @@ class SuggestionTrials:
             yield suggestion, trial
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
             larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
+            if larger_suggestion is not None:
+                larger_suggestion = self._with_present_lengths(larger_suggestion)
             if larger_suggestion is None:
                 return
             suggestion = larger_suggestion
+
+    def _with_present_lengths(self, suggestion: Suggestion) -> Suggestion:
+        """Return a suggestion whose lengths of legs are compared with the lengths in the unchanged mission."""
+        runs = self.judged.requirements.runs
+        return tuple(
+            replace(change, current=float(runs[change.place.index]))
+            if change.what == "length" and change.place.index is not None
+            else change
+            for change in suggestion
+        )
 
     def _changed_flight(self, finding: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
         """Return mission and setup with a suggestion applied; a shorter duration is tried as a larger battery."""
@@ -391,7 +406,8 @@ def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggest
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:
             if kinds == {"length"}:
-                return _merge_lengths(suggestion, needed_suggestion)
+                lengths = {change.place: change for change in (*suggestion, *needed_suggestion)}
+                return tuple(sorted(lengths.values(), key=lambda change: change.place.index or 0))
             if kinds <= _STEP_KINDS:
                 return _merge_steps(suggestion, needed_suggestion)
             if kinds <= _ENERGY_KINDS:
@@ -414,18 +430,6 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
             wanted = steps[key].wanted + _GROWTH_FACTOR * change.wanted + _GROWTH_M
         steps[key] = replace(change, wanted=float(round(wanted)))
     return tuple(steps.values())
-
-
-def _merge_lengths(suggestion: Suggestion, needed_lengths: Suggestion) -> Suggestion:
-    """Return the suggested lengths of legs, replaced by the lengths still needed.
-
-    The present length in ``current`` stays as before.
-    """
-    lengths = {change.place: change for change in suggestion}
-    for change in needed_lengths:
-        current = lengths[change.place].current if change.place in lengths else change.current
-        lengths[change.place] = replace(change, current=current)
-    return tuple(sorted(lengths.values(), key=lambda change: change.place.index or 0))
 
 
 def _merge_energy_changes(change: Change, needed_change: Change) -> Change:

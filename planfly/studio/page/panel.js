@@ -117,10 +117,9 @@ export class Panel {
     this.drawVerdict();
   }
 
-  // What passed its trial flight.
+  // What passed its trial, by geometry or in flight.
   tried(message) {
-    if (!this.flight || this.flight.rev !== message.rev) return;
-    this.flight.findings = message.findings;
+    if (message.job === "trials" && this.flight?.rev === message.rev) this.flight.findings = message.findings;
     this.drawVerdict();
   }
 
@@ -146,17 +145,17 @@ export class Panel {
       if (flight.changes.length) part.append(element("p", {}, element("b", {}, "Since the last flight")), element("ul", { class: "changes" }, ...flight.changes.map((text) => element("li", {}, text))));
       box.append(part);
     }
-    // A place that the flight has judged, too, is listed only there, with the changes that the geometry offers if it has none.
-    const flownFailed = flight && !stale ? flight.findings.filter((one) => one.ok !== true) : [];
+    // A place that the flight has judged, too, is listed only there; one that it did not reach with the changes of the geometry.
+    const isFlown = flight && !stale, flownFailed = isFlown ? flight.findings.filter((one) => one.ok !== true) : [];
     const same = (one) => (other) => other.rule === one.rule && other.where === one.where;
     const failed = now.findings.filter((one) => one.ok !== true && !flownFailed.some(same(one)));
-    if (failed.length) box.append(element("h2", {}, titleOf(failed, "")), element("ul", { class: "findings" }, ...failed.map((one) => this.finding(one, false))));
+    if (failed.length) box.append(element("h2", {}, titleOf(failed, "")), element("ul", { class: "findings" }, ...failed.map((one) => this.finding(one, false, isFlown && one))));
     if (flownFailed.length) {
-      const { trials } = this.app.now.work, planned = (one) => !one.suggestions.length && !trials && now.findings.find((other) => other.ok !== true && same(one)(other));
-      const trying = trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
+      const planned = (one) => one.ok === null && !one.suggestions.length && now.findings.find((other) => other.ok !== true && same(one)(other));
+      const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
       box.append(element("h2", {}, titleOf(flownFailed, " in flight")), ...(trying ? [trying] : []), element("ul", { class: "findings" }, ...flownFailed.map((one) => this.finding(one, true, planned(one)))));
     }
-    const isFlown = flight && !stale, passed = (isFlown ? flight : now).findings.filter((one) => one.ok);
+    const passed = (isFlown ? flight : now).findings.filter((one) => one.ok);
     if (passed.length) box.append(element("h2", {}, `Closest to its limit ${isFlown ? "in flight" : "by geometry"}, by rule`), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, isFlown))));
     if (now.notes.length) box.append(element("h2", {}, "Notes"), element("ul", { class: "notes" }, ...now.notes.slice(0, 20).map((text) => element("li", {}, text))));
     box.append(element("div", { class: "asks" },
@@ -188,7 +187,7 @@ export class Panel {
   finding(one, flown, planned) {
     const { rev } = this.now, from = planned || one, suggestions = from.suggestions.map((each, which) => element("li", {},
       each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: from.number, which, flown: flown && !planned }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
-      element("span", {}, planned ? `${each.text} (by geometry, not flown)` : each.text)));
+      element("span", {}, planned && each.apply ? `${each.text} (${this.flight.early ? "not tried by flight: the flight ended before it" : "by geometry, not flown"})` : each.text)));
     const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
     return element("li", { "data-state": one.ok === false ? "fail" : one.ok === null ? "open" : "ok" },
@@ -316,7 +315,7 @@ export class Panel {
     const pick = element("input", { type: "file", id: "pick", onchange: (event) => event.target.files[0] && this.openFile(event.target.files[0]) });
     box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: a mission (.waypoints, .plan, plan.json), a flight log whose mission is opened (.mcap, .bin, .tlog, .ulg, .gpx with a route, .igc with a task), or the autopilot's parameters (.parm, .param)."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
     if (this.folder) box.append(...this.byPath());
-    box.append(element("h2", {}, "Back"), element("p", {}, element("button", { type: "button", disabled: !now?.changed, onclick: () => app.send({ kind: "revert" }) }, "Revert to the file"), element("small", {}, "undo brings the changes back")));
+    box.append(element("h2", {}, "Back"), element("p", {}, element("button", { type: "button", disabled: !now?.unsaved, onclick: () => app.send({ kind: "revert" }) }, "Revert to the file"), element("small", {}, "undo brings the changes back")));
   }
 
   // A file in the folder of the one that the command named, by its path or from a list.
@@ -343,7 +342,7 @@ export class Panel {
     const place = `${where ? "saved" : "downloaded"} ${where ? `in ${where}` : "by your browser"}`;
     this.file = { rev: this.now.rev, text: `${name} was ${place}` };
     clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is ${place}. `), losses.length ? "It lacks:" : "It contains the whole mission."), ...(lost ? [lost] : []));
-    this.reveal("files");
+    if (this.shown !== "files") this.app.complain(`${name} is ${place}.${losses.length ? ` It lacks: ${losses.join("; ")}` : ""}`);
   }
 
   async openFile(file) {

@@ -298,6 +298,15 @@ function onStopped({ job }) {
   planningEnded(job);
 }
 
+// Suggestions that passed their trials, by geometry or in flight.
+function onTried(message) {
+  now.work[message.job] = null;
+  progress();
+  if (message.job === "geometry_trials" && message.rev === now.sheet?.rev) now.sheet.findings = message.findings;
+  answers();
+  panel.tried(message);
+}
+
 function isStale() {
   return !now.flown || !now.sheet || now.flown.rev !== now.sheet.rev || Boolean(now.dragging);
 }
@@ -336,7 +345,8 @@ function answers() {
   }
   if (model.planning) setAnswer("geometry", "none", "planning \u2026", "");
   else setAnswer("geometry", shown, now.fault || words, model.verdict.headline);
-  const work = now.work.fly;
+  // The trials by geometry come before the flight.
+  const work = now.work.fly || now.work.geometry_trials;
   if (work && !now.dragging) setAnswer("flown", "checking", `flying ${Math.round(100 * (work.share || 0))} %`, work.text || "");
   else if (!flown) setAnswer("flown", "none", "not yet", "");
   else if (isStale()) setAnswer("flown", "stale", answerText(flown.verdict, true), flown.verdict.headline);
@@ -360,7 +370,7 @@ function progress() {
   const works = Object.values(now.work).filter(Boolean), bar = $("progress");
   $("stop").hidden = !works.length;
   // What is tried by flight has no known end.
-  const long = works.find((one) => !["fly", "trials"].includes(one.job)) || now.work.fly;
+  const long = works.find((one) => !["fly", "trials", "geometry_trials"].includes(one.job)) || now.work.fly;
   bar.hidden = !long;
   if (!long) return;
   // Each work has a bar of its own, or the next one's would shrink from where the last one's was.
@@ -530,12 +540,13 @@ const link = new Link({
   sheet: onSheet,
   preview: onPreview,
   flown: onFlown,
-  tried: (message) => { now.work.trials = null; progress(); panel.tried(message); },
+  tried: onTried,
+  unsaved: ({ unsaved }) => { now.sheet.unsaved = unsaved; showName(now.sheet.name, unsaved); panel.drawFiles(); },
   working: onWorking,
   stopped: onStopped,
   choices: (message) => panel.choices(message),
   ways: (message) => { now.work.plan = null; progress(); panel.ways(message); answers(); },
-  saved: (message) => { complain(""); showName(now.sheet.name, message.unsaved); panel.saved(message); },
+  saved: (message) => { complain(""); panel.saved(message); },
   ...Object.fromEntries(Object.entries(QUESTIONS).map(([job, title]) => [job, (message) => {
     now.work[job] = null;
     progress();

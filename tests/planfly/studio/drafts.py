@@ -8,7 +8,8 @@ import numpy as np
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from planfly.flight_options import MissionOptions
 from planfly.studio.documents import Document
-from planfly.studio.session import Session
+from planfly.studio.session import Session, TriedChanges
+from planfly.studio.worker_tasks import try_planned_suggestions
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
 from world.errors import MissionError
@@ -74,6 +75,12 @@ def session_of(mission: Mission, name: str = "jacksboro") -> Session:
     return Session.from_document(
         Document("drawn.waypoints", "drawn", setup, "waypoints"), MissionOptions(scenario=name)
     )
+
+
+def try_planned(session: Session) -> None:
+    """Try the suggestions of a session by geometry, as a worker process does."""
+    value = try_planned_suggestions((session.context, session.mission), lambda done, total, remark: None)
+    session.tried["geometric"] = TriedChanges(session.rev, **value)
 
 
 def drawn_session(seed: int, count: int, name: str = "jacksboro", *, jumps: bool = True) -> Session:

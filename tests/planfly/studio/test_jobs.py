@@ -14,9 +14,9 @@ from planfly.studio.documents import open_document, straight_plan
 from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
 from planfly.studio.session import Session, open_session
 from planfly.studio.worker_process import Answer, Task
-from planfly.studio.worker_tasks import fly, try_suggestions
+from planfly.studio.worker_tasks import fly, try_flown_suggestions, try_planned_suggestions
 from planner.search.plan_front import FrontPlan
-from tests.planfly.studio.drafts import drawn_session, session_of
+from tests.planfly.studio.drafts import drawn_session, session_of, try_planned
 from world.errors import MissionError
 
 
@@ -123,19 +123,22 @@ def test_a_line_to_which_an_undo_leads_back_is_flown(jobs: Jobs, tmp_path: Path)
 def answer_of(jobs: Jobs, session: Session, function: Any) -> dict[str, Any]:
     work = asked(jobs, FLIGHT_WORKER)[-1]
     value = function(work.payload, lambda done, total, remark: None)
-    (message,) = jobs.handle_answer(FLIGHT_WORKER, Answer(work.number, "done", value), session)
+    message, *_ = jobs.handle_answer(FLIGHT_WORKER, Answer(work.number, "done", value), session)
     return message
 
 
 def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Jobs) -> None:
     session = drawn_session(8, 8)
     jobs.fly(session)
+    # The suggestions by geometry are tried first, and the flight follows.
+    planned = answer_of(jobs, session, try_planned_suggestions)
+    assert session.mission_message()["findings"] == planned["findings"]
     before = answer_of(jobs, session, fly)
     # The flight's own list offers nothing that was not tried.
     assert before["verdict"]["failed"]
     assert [one["suggestions"] for one in before["findings"] if one["suggestions"]] == []
-    assert asked(jobs, FLIGHT_WORKER)[-1].function.endswith("try_suggestions")
-    tried = answer_of(jobs, session, try_suggestions)
+    assert asked(jobs, FLIGHT_WORKER)[-1].function.endswith("try_flown_suggestions")
+    tried = answer_of(jobs, session, try_flown_suggestions)
     offered = [
         (one, which) for one in tried["findings"] for which, each in enumerate(one["suggestions"]) if each["apply"]
     ]
@@ -146,7 +149,8 @@ def test_what_failed_in_flight_is_offered_with_changes_that_were_flown(jobs: Job
     old_items = session.mission.items
     session.edit(apply)
     moved = [new.seq for old, new in zip(old_items, session.mission.items, strict=True) if old != new]
-    assert re.match(rf"apply a suggestion of the flight: (move|change) item {moved[0]}\b", session.undo_text)
+    assert re.match(rf"apply a suggestion of the flight: (move|set the radius of) item {moved[0]}\b", session.undo_text)
+    try_planned(session)
     jobs.fly(session)
     after = answer_of(jobs, session, fly)
     assert after["verdict"]["failed"] <= before["verdict"]["failed"]
@@ -168,7 +172,7 @@ def test_trials_end_when_other_work_comes() -> None:
         raise Ended
 
     with pytest.raises(Ended):
-        try_suggestions((session.context, flown["judged"]), other)
+        try_flown_suggestions((session.context, flown["judged"]), other)
 
 
 def test_paths_that_were_found_can_be_chosen_after_another_search_was_stopped(jobs: Jobs) -> None:

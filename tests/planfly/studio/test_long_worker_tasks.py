@@ -2,6 +2,7 @@
 
 from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 import planfly
 from aircraft.data_sheet import DataSheet
 from flight.mission.items import Mission
+from logs.verdict.places import FLIGHT
 from planfly.campaigns.campaign_base import open_campaign
 from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.worker_pool import Workers
@@ -66,6 +68,15 @@ def test_the_departures_are_those_of_the_forecast(few_flights: None, tmp_path: P
 def test_without_a_forecast_there_are_no_departures(tmp_path: Path) -> None:
     with pytest.raises(MissionError, match=r"departures need a forecast: planfly studio --forecast FILE --at TIME"):
         long_worker_tasks.run_window_task(opened(tmp_path), lambda *_: None)
+
+
+def test_a_campaign_names_what_fails_as_the_verdict_does(
+    few_flights: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = SimpleNamespace(outcome="not flyable", failures=(("departure", FLIGHT),))
+    monkeypatch.setattr(long_worker_tasks, "fly_one", lambda base, index: row)
+    answer = long_worker_tasks.run_campaign_task(opened(tmp_path), lambda *_: None)
+    assert answer["lines"][0] == "loss of control fails in 3"
 
 
 def test_a_battery_is_found(few_flights: None, tmp_path: Path) -> None:

@@ -189,7 +189,7 @@ def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: p
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
     again.start_first_task(session)
-    assert asked[-1].function == "planfly.studio.worker_tasks.fly"
+    assert asked[-1].function == "planfly.studio.worker_tasks.try_planned_suggestions"
 
 
 def test_a_certificate_does_not_outlive_settings() -> None:

@@ -282,6 +282,13 @@ def test_what_is_said_of_a_saved_file_ends_with_the_next_change(page: Browser) -
     undo_all(page)
 
 
+def test_a_save_leaves_the_view(page: Browser) -> None:
+    page.value("document.getElementById('tab-verdict').click(); document.activeElement.blur()")
+    key(page, "s", 83, control=True)
+    page.wait_for("document.getElementById('message').textContent.startsWith('m.waypoints is saved in ')")
+    assert page.value("document.getElementById('panel-verdict').hidden") is False
+
+
 def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
     before = saved(page)
     drag(page, centre(page, ".mark .dot", 2), (40.0, 25.0), let_go=False)
@@ -447,7 +454,7 @@ FINDINGS = """import('/panel.js').then(({ Panel }) => {
     const app = { now: { work: {} }, commit: (one) => sent.push([one.finding, one.flown]) };
     const box = document.createElement('div');
     const now = { rev: 1, verdict, notes: [], findings: planned };
-    const flight = { rev, verdict, changes: [], autopilot: '', seconds: 1, findings: flown };
+    const flight = { rev, verdict, changes: [], autopilot: '', seconds: 1, early: true, findings: flown };
     Object.assign(Object.create(Panel.prototype), { app, boxes: { verdict: box }, now, flight }).buildVerdict();
     box.querySelector('.apply')?.click();
     const parts = box.querySelectorAll(':scope > h2, :scope > .findings > li');
@@ -456,7 +463,7 @@ FINDINGS = """import('/panel.js').then(({ Panel }) => {
   const leg = (ok, ...more) => finding('slopes', 'leg 1', ok, ...more);
   const [other, open] = [finding('clearance', 'leg 2', false), finding('slopes', 'leg 3', null)];
   return [show([leg(false, raise), other], [leg(false), open]),
-    show([], [leg(null)]), show([leg(null)], [leg(true)]), sent,
+    show([leg(false, raise)], [leg(null)]), show([leg(null)], [leg(true)]), sent,
     show([leg(true)], [finding('slopes', 'leg 3', true)]), show([leg(true)], [finding('slopes', 'leg 3', true)], 0)];
 })"""
 
@@ -467,10 +474,12 @@ def test_a_place_is_listed_once_under_a_title_of_what_it_is(page: Browser) -> No
         "What fails",
         "clearance leg 2",
         "What fails or is not judged in flight",
-        "slopes leg 1Applyraise it (by geometry, not flown)",
+        "slopes leg 1",
         "slopes leg 3",
     ]
-    assert flown == ["What is not judged in flight", "slopes leg 1"]
+    # What failed in flight has only changes that were flown; what the flight did not reach has those of the geometry.
+    untried = "slopes leg 1Applyraise it (not tried by flight: the flight ended before it)"
+    assert flown == ["What is not judged in flight", untried]
     assert planned[0] == "What is not judged"
     # The geometry's own finding is applied.
     assert sent == [[1, False]]
@@ -741,6 +750,11 @@ def test_a_phone_drags_by_touch(browser: Browser, studio: Studio) -> None:
     phone.wait_for(READY)
     assert phone.value("document.documentElement.scrollWidth <= innerWidth")
     assert phone.value(OVERLAPS) == 0
+    for answer in ("geometry", "flown"):
+        phone.value(f"document.querySelector('#{answer} span').textContent = 'not flyable: 17 findings, changed since'")
+        assert phone.value(
+            f"(([one]) => one.scrollWidth <= one.clientWidth)(document.querySelectorAll('#{answer} span'))"
+        )
     before = undo_text(phone)
     x, y = centre(phone, ".mark .dot", 2)
 

@@ -69,8 +69,14 @@ def test_a_drag_is_judged_and_a_move_is_flown_and_seen_by_both_pages(studio: Ser
         # An edit of the sheet before is refused, and the page is shown the sheet as it is.
         other.send(kind="delete", rev=sheet["rev"], ks=[item["k"]])
         other.until("stale")
+        # What one page saves is saved for all, and what is edited afterwards is not.
+        page.send(kind="save", form="waypoints", over=True)
+        assert other.until("unsaved")["unsaved"] is False
         page.send(kind="undo")
-        assert page.until("sheet", rev=mine["rev"] + 1)["items"] == sheet["items"]
+        undone = other.until("sheet", rev=mine["rev"] + 1)
+        assert (undone["items"], undone["unsaved"]) == (sheet["items"], True)
+        page.send(kind="save", form="waypoints", over=True)
+        other.until("unsaved")
 
 
 def test_a_file_of_the_folder_is_opened_and_none_outside(studio: Served) -> None:

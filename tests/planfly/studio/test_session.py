@@ -12,17 +12,18 @@ import planfly
 from flight.mission import edits
 from flight.mission.items import Command, Frame, Mission, MissionItem, renumber_items
 from flight.mission_files.formats import mission_text, parse_mission
+from logs.verdict.places import Change, Place
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
 from planfly.studio import messages
 from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import Document, open_document, open_dropped, straight_plan
-from planfly.studio.session import Session, StaleEdit, open_session
-from planfly.workflow.apply_suggestion import apply_suggestion
-from planfly.workflow.suggestion_trials import with_tried_suggestions
+from planfly.studio.session import Session, StaleEdit, TriedChanges, open_session
+from planfly.workflow import suggestion_trials
+from planfly.workflow.suggestion_trials import SuggestionTrials, with_tried_suggestions
 from tests.mission_lines import setup_of, wp
 from tests.own_aircraft import copy_aerosonde, write_mission, write_scenario
-from tests.planfly.studio.drafts import drawn_session, session_of, world_of
+from tests.planfly.studio.drafts import drawn_session, session_of, try_planned, world_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
 from world.frames import to_geo
@@ -49,10 +50,11 @@ def draw_edit(session: Session, rng: np.random.Generator) -> None:
         case "raise":
             session.edit(messages.Raise(kind="raise", rev=rev, by=float(rng.integers(-20, 30))))
         case "apply":
-            ready = [(n, i) for n, i in enumerate(session.judged.verdict.findings) if i.suggestions]
+            try_planned(session)
+            ready = list(session.tried["geometric"].changes)
             if ready:
-                finding = ready[int(rng.integers(len(ready)))][0]
-                session.edit(messages.Apply(kind="apply", rev=rev, finding=finding, which=0))
+                finding, which = ready[int(rng.integers(len(ready)))]
+                session.edit(messages.Apply(kind="apply", rev=rev, finding=finding, which=which))
         case _:
             session.step_history(str(kind))
 
@@ -137,10 +139,31 @@ def test_a_moved_mission_saved_is_read_as_it_is() -> None:
     assert session.mission_message()["unsaved"] is True
     for form in ("waypoints", "plan"):
         saved = session.save(form)
-        assert (session.mission_message()["unsaved"], session.mission_message()["changed"]) == (False, True)
+        assert (session.mission_message()["unsaved"], session.is_changed) == (False, True)
         assert parse_mission(saved.data.decode(), saved.name).items == session.mission.items
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     assert session.mission_message()["unsaved"] is True
+
+
+def test_the_unsaved_mark_compares_with_what_the_file_holds(tmp_path: Path) -> None:
+    """Saved 10 m higher, the opened mission is the unsaved one, and a revert returns to the file."""
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 6).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
+    opened = session.mission
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.overwrite_file()
+    saved = session.mission
+    assert not session.is_unsaved
+    session.step_history("undo")
+    assert (session.mission, session.mission_message()["unsaved"]) == (opened, True)
+    # The same content is saved, however it was made.
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=4.0))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=6.0))
+    assert (session.mission == saved, session.is_unsaved) == (True, False)
+    session.step_history("undo")
+    session.step_history("revert")
+    assert (session.mission, session.is_unsaved) == (saved, False)
 
 
 def test_what_a_form_does_not_hold_is_said() -> None:
@@ -470,38 +493,49 @@ def test_a_suggestion_applied_mends_its_finding(rule: str, by: float, seed: int,
     session = drawn_session(seed, items)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
     findings = session.judged.verdict.findings
-    number, item = next((n, i) for n, i in enumerate(findings) if i.rule == rule and i.suggestions)
+    try_planned(session)
+    number, item = next((n, findings[n]) for n, _ in session.tried["geometric"].changes if findings[n].rule == rule)
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
     after = [one for one in session.judged.verdict.findings if (one.rule, one.place) == (item.rule, item.place)]
     assert not [one for one in after if one.ok is False]
 
 
-@pytest.mark.parametrize(
-    ("seed", "by", "rule", "said"),
-    [
-        (4, 0.0, "threat", "would not remove its finding: east valley (missile): threat: inside the missile's range"),
-        (6, 30.0, "bounds", "would add a finding: leg 1, to item 3: clearance: .* 60 m are required"),
-    ],
-)
-def test_a_refused_suggestion_names_the_finding_that_stays_or_is_added(
-    seed: int, by: float, rule: str, said: str
-) -> None:
-    session = drawn_session(seed, 12)
-    session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+def test_a_suggestion_that_fails_its_trial_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The path would remain inside the missile's range."""
+    monkeypatch.setattr(suggestion_trials, "MAX_TRIED_FINDINGS", 3)
+    session = drawn_session(4, 12)
     findings = session.judged.verdict.findings
-    number = next(n for n, one in enumerate(findings) if one.rule == rule and one.suggestions)
-    with pytest.raises(MissionError, match=said.replace("(", "[(]").replace(")", "[)]")) as refused:
+    number = next(n for n, one in enumerate(findings) if one.rule == "threat" and one.suggestions)
+
+    def offered() -> list[int]:
+        return [
+            one["number"] for one in session.mission_message()["findings"] if one["ok"] is False and one["suggestions"]
+        ]
+
+    assert offered() == []
+    assert SuggestionTrials(session.context, session.judged).try_suggestion(findings[number], 0) is None
+    try_planned(session)
+    assert number not in offered()
+    with pytest.raises(MissionError, match="no longer exists"):
         session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
-    if by:
-        # The suggestion made by hand: its finding is gone, and leg 1 is too low, which it was not.
-        item = findings[number]
-        mission = apply_suggestion(session.context, session.judged, item, item.suggestions[0])
-        after = session.context.judge(mission).verdict.failed
-        assert (item.rule, item.place) not in [(one.rule, one.place) for one in after]
-        low = [one.place.to_item for one in after if one.rule == "clearance"]
-        assert 3 in low
-        assert 3 not in [one.place.to_item for one in session.judged.verdict.failed if one.rule == "clearance"]
-    assert "or would" not in str(refused.value)
+    # Each that is offered is applied, and as few fail or fewer.
+    failed = len(session.judged.verdict.failed)
+    tried = session.tried["geometric"]
+    assert {number for number, _ in tried.changes} <= set(offered())
+    for number, which in tried.changes:
+        session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=which))
+        assert len(session.judged.verdict.failed) < failed
+        session.step_history("undo")
+        session.tried["geometric"] = tried._replace(rev=session.rev)
+
+
+def test_a_suggested_speed_is_named_by_its_undo() -> None:
+    session = drawn_session(5, 12)
+    slower = (Change("airspeed", Place("leg", 2, to_item=4), 25.0, 20.5, "m/s", not_flown=True),)
+    changes = {(0, 0): (replace(session.mission, source="slower"), slower)}
+    session.tried["geometric"] = TriedChanges(session.rev, [], changes)
+    session.edit(messages.Apply(kind="apply", rev=session.rev, finding=0, which=0))
+    assert session.undo_text.endswith(": fly leg 2, to item 4, at 20.5 m/s instead of 25 m/s")
 
 
 def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
@@ -521,6 +555,7 @@ def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
     session = session_of(Mission(drawn_session(5, 12).mission.home, tuple(items), source="chord"))
     findings = session.judged.verdict.findings
     number = next(n for n, one in enumerate(findings) if (one.place.kind, one.place.index) == ("missile", m))
+    try_planned(session)
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
     points = np.asarray(session.judged.requirements.path.points)
     assert np.linalg.norm(points - centre, axis=1).min() - radius > 4.5

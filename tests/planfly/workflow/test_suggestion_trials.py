@@ -1,5 +1,6 @@
 """A suggestion is offered if its trial mends its finding, and what passed before still passes."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -97,6 +98,8 @@ def test_what_an_early_end_left_unjudged_is_named() -> None:
     text = suggestion_text((replace(higher(1, 12.0)[0], remaining=remaining),))
     fails_text = "then still fails: clearance at leg 4"
     assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; then still undecided: clearance at leg 5)"
+    lost = replace(higher(1, 12.0)[0], remaining=(RemainingFinding("departure", FLIGHT, fails=True),))
+    assert suggestion_text((lost,)) == "raise both ends of leg 1 by 12 m (then still fails: loss of control at flight)"
     # The energy of a flight that ended early passes only for the part that was flown.
     flown_part, whole = (make_finding("energy", FLIGHT, ok=ok, reason="") for ok in (True, False))
     assert is_passed(replace(before, findings=(*before.findings, flown_part)), verdict_of(whole), low(1))
@@ -224,8 +227,8 @@ def test_another_leg_that_then_fails_is_raised_with_it(monkeypatch: pytest.Monke
     assert tried.suggestions == ((*higher(1, 12.0), *higher(4, 10.0), *higher(5, 8.0)),)
 
 
-@pytest.mark.parametrize(("distance", "count"), [(999.0, 2), (1001.0, 1)])
-def test_a_move_by_kilometres_is_offered_only_if_nothing_else_passes(distance: float, count: int) -> None:
+@pytest.mark.parametrize(("distance", "count"), [(299.0, 2), (301.0, 1)])
+def test_a_far_move_is_offered_only_if_no_smaller_one_passes(distance: float, count: int) -> None:
     [near], [far] = higher(1, 12.0), higher(1, 30.0)
     far = replace(far, moves=(ItemMove(3, 0.6 * distance, 0.8 * distance, 0.0),))
     item = low(1, (near,), (far,))
@@ -234,6 +237,49 @@ def test_a_move_by_kilometres_is_offered_only_if_nothing_else_passes(distance: f
     assert len(tried.suggestions) == count
     assert (near,) in tried.suggestions
     assert tried_suggestions([far_trial])[0].suggestions == ((far,),)
+
+
+def test_the_smallest_move_is_offered_first_and_of_far_moves_only_the_smallest() -> None:
+    changes = [
+        replace(higher(1, up)[0], moves=(ItemMove(3, 0.0, north, up),)) for north, up in ((40.0, 30.0), (0.0, 12.0))
+    ]
+    far = [replace(higher(1, 1.0)[0], moves=(ItemMove(3, 0.0, north, 0.0),)) for north in (900.0, 400.0)]
+    for offered, expected in ((changes, changes[::-1]), (far, far[1:])):
+        item = low(1, *((change,) for change in offered))
+        trials = [PassedTrial(item, (change,), SESSION.judged.setup) for change in offered]
+        [tried] = tried_suggestions(trials)
+        assert [change.moves for (change,) in tried.suggestions] == [change.moves for change in expected]
+
+
+def test_beyond_the_end_of_a_flight_a_suggestion_is_tried_by_geometry_and_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The flight passed two waypoints, so that it ended on leg 2: legs 1 and 2 are flown, and leg 3 is not."""
+    findings = [low(leg, higher(leg, 12.0)) for leg in (1, 2, 3)]
+    verdict = replace(verdict_of(*findings), complete=False, leg_ends=(10.0, 20.0, math.inf, math.inf))
+    for fails_by_geometry in (True, False):
+        trials, flights = trials_of(monkeypatch, findings, lambda up: [])
+        trials.judged = replace(trials.judged, verdict=verdict)
+        if fails_by_geometry:
+            trials._current_trial.geometry_verdict = verdict_of(*findings, level="geometric")
+        not_flown = {trial.finding.place.index: trial.suggestion[-1].not_flown for trial in trials.find_passing()}
+        assert not_flown == {1: False, 2: False, 3: fails_by_geometry}
+        assert flights.count == (2 if fails_by_geometry else 3)
+    text = suggestion_text((replace(higher(3, 12.0)[0], not_flown=True),))
+    assert text == "raise both ends of leg 3 by 12 m (not tried by flight: the flight ended before this leg)"
+
+
+def test_a_longer_leg_is_compared_with_its_length_in_the_mission(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The trial moves the start of leg 3, which then is 77 m long; in the mission it has another length."""
+
+    def short(leg: int, current: float) -> Finding:
+        return low(leg, (Change("length", Place("leg", leg), current, current + 90.0, "m"),))
+
+    runs = SESSION.judged.requirements.runs
+    state = iter([[short(3, 77.0)], []])
+    trials, _ = trials_of(monkeypatch, [short(2, float(runs[2]))], lambda up: next(state))
+    [trial] = trials.find_passing()
+    assert [change.current for change in trial.suggestion] == [float(runs[2]), float(runs[3])]
 
 
 def test_what_helps_nothing_or_harms_elsewhere_is_not_offered(monkeypatch: pytest.MonkeyPatch) -> None:
