@@ -18,7 +18,7 @@ TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_spee
 POWERS = ("power_idle", "power_level", "power_full")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Envelope:
     """Limits of steady flight from trims, relative to the air mass.
 

@@ -32,7 +32,7 @@ TRACKING = record_dtype(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TrackingError:
     """Deviation of an autopilot from its legs.
 

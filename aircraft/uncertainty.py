@@ -218,7 +218,7 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
 # Draws: whole aircraft, each a row of values.
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Draws:
     """Draws (random samples) of an aircraft's properties.
 

@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_args, get_type_hints
 
+from aircraft.catalog import find_aircraft, model_hash
 from flight.autopilots.catalog import program_class_for
 from flight.simulation.setup import EngineChoice, VerticalDatum
 from planfly.arguments import check_arguments, is_valid_wind
 from planfly.workflow.file_autopilots import with_file_autopilot
 from world.argument_types import check_types
-from world.errors import ArgumentError
+from world.errors import ArgumentError, FlightError
 from world.files import absolute_path, did_you_mean
 from world.scenario import (
     Scenario,
@@ -347,8 +348,9 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
 
     program: the autopilot program that flies, or None for a simulated autopilot.
     If no autopilot is named, the parameter file determines it.
-    Raises ScenarioError for values that a scenario file must not have, ParameterError for the file of another
-    autopilot, and ForecastError for a forecast that cannot be used or that does not cover the flight.
+    Raises ScenarioError for values that a scenario file must not have, ArgumentError for an aircraft that is unknown
+    and an airspeed at which it does not fly, ParameterError for the file of another autopilot, and ForecastError for a
+    forecast that cannot be used or that does not cover the flight.
 
     >>> changed = apply_options(load_scenario("tight"), {"wind": (8.0, 270.0), "airspeed": 28.0})
     >>> changed.wind.speed, changed.flight.airspeed_mps
@@ -366,6 +368,7 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     if forecast is not None:
         # With the time of flight first, so that the file is read once, for this time.
         scenario = without_forecast(scenario)
+    _check_aircraft_options(scenario, options)
     new_scenario = with_flight(with_flight_time(scenario, options.get("at")), **flight_entries(options, program))
     if forecast is not None:
         new_scenario = with_forecast(new_scenario, str(forecast))
@@ -376,6 +379,23 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
             "at", None, "missing: a forecast needs the time of take-off, as in 2026-05-01T10:00+02:00", shown=""
         )
     return new_scenario
+
+
+def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
+    """Raise ArgumentError for an aircraft of the options that is unknown, and an airspeed at which it does not fly."""
+    stated_aircraft, airspeed = flight_entries(options)["aircraft"], options.get("airspeed")
+    name = str(stated_aircraft or scenario.flight.aircraft)
+    try:
+        aircraft = find_aircraft(name)
+        model_hash(aircraft)
+    except FlightError as error:
+        if stated_aircraft is None:
+            # The scenario names it, which the load of its airframe reports.
+            return
+        raise ArgumentError.of_argument("aircraft", name, str(error)) from error
+    if airspeed is not None and not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
+        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
+        raise ArgumentError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:

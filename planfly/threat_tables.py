@@ -1,5 +1,6 @@
 """Convert threats from a data frame, columns, mappings or an array to tables of a scenario file."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from world.scenario_tables import SCALE_RATIOS
 GivenThreats = Mapping[str, ArrayLike] | Sequence[Mapping[str, Any]] | ArrayLike
 # Keys of the columns of an array of threats.
 _ARRAY_COLUMNS = ("east_m", "north_m", "kill_radius_m", "detection_radius_m")
+_NAN_ALLOWED = "expected a number: 0 for no such zone, None for a value that is not stated"
 _EXPECTED = (
     "expected a data frame or a mapping of columns named as the keys of [[threats]], a list of mappings with these"
     " keys, or an array (n, 4) of east, north, kill radius and detection radius, m"
@@ -23,27 +25,29 @@ def threat_tables(threats: Any) -> list[dict[str, Any]]:
     """Return a table of a scenario file for each threat, without missing values and radii of 0.
 
     threats: a data frame or a mapping of columns named as the keys of [[threats]], a list of mappings with these keys,
-    or an array (n, 4) of east, north, kill radius and detection radius, m.
+    or an array (n, 4) of east, north, kill radius and detection radius, m.  None and masked values are missing.
 
-    Raises ArgumentError, which names the argument `threats`, for anything else.
+    Raises ArgumentError, which names the argument `threats`, for anything else, and for NaN.
 
     >>> threat_tables([(900.0, 90.0, 60.0, 0.0)])
     [{'east_m': 900.0, 'north_m': 90.0, 'kill_radius_m': 60.0}]
     """
     try:
         if isinstance(threats, Mapping):
-            rows = _rows_of_columns({name: np.asarray(values) for name, values in threats.items()})
+            rows = _rows_of_columns({name: np.ma.asarray(values) for name, values in threats.items()})
         elif hasattr(threats, "to_dict"):
             rows = threats.to_dict("records")
         elif len(threats) and all(isinstance(row, Mapping) for row in threats):
             rows = [dict(row) for row in threats]
+        elif np.iscomplexobj(threats):
+            raise TypeError(_EXPECTED)
         else:
-            rows = _rows_of_array(np.asarray(threats, dtype=np.float64))
+            rows = _rows_of_array(np.ma.asarray(threats, dtype=np.float64))
     except (TypeError, ValueError) as error:
         if isinstance(error, ArgumentError):
             raise
         raise ArgumentError.of_argument("threats", type(threats).__name__, _EXPECTED) from None
-    return [_threat_table(row) for row in rows]
+    return [_threat_table(number, row) for number, row in enumerate(rows)]
 
 
 def _rows_of_columns(columns: Mapping[str, np.ndarray[Any, Any]]) -> list[dict[str, Any]]:
@@ -55,19 +59,28 @@ def _rows_of_columns(columns: Mapping[str, np.ndarray[Any, Any]]) -> list[dict[s
     return [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
 
 
-def _rows_of_array(array: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
-    """Return the rows of an array (n, 4) of positions and radii, m; positions must be finite."""
+def _rows_of_array(array: np.ma.MaskedArray[Any, Any]) -> list[dict[str, Any]]:
+    """Return the rows of an array (n, 4) of positions and radii, m."""
     if array.size and array.shape[1:] != (len(_ARRAY_COLUMNS),):
         raise ArgumentError.of_argument("threats", array, _EXPECTED, shown=f"of shape {array.shape}")
-    for row, column in np.argwhere(~np.isfinite(array[:, :2])) if array.size else ():
-        place = f"threats row {row}: {_ARRAY_COLUMNS[column]}"
-        raise ArgumentError.of_argument(place, float(array[row, column]), "expected a position, m")
     return [dict(zip(_ARRAY_COLUMNS, row, strict=True)) for row in array.tolist()]
 
 
-def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a threat as a table of a scenario file, without missing values and radii of 0."""
-    values = {key: value for key, value in row.items() if value is not None and value == value}
+def _threat_table(number: int, row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a threat as a table of a scenario file, without missing values and radii of 0.
+
+    number: number of its row, from 0.
+    """
+    values = {}
+    for key, value in row.items():
+        is_nan = isinstance(value, float | np.floating) and math.isnan(value)
+        if hasattr(value, "__len__") and not isinstance(value, str):
+            shown = type(value).__name__
+            raise ArgumentError.of_argument(f"threats row {number}: {key}", value, "expected a number", shown=shown)
+        if is_nan and key != "name":
+            raise ArgumentError.of_argument(f"threats row {number}: {key}", float(value), _NAN_ALLOWED)
+        if value is not None and not is_nan:
+            values[key] = value
     for kind in SCALE_RATIOS:
         radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
         if values.get(radius) == 0.0:

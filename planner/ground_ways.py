@@ -19,7 +19,7 @@ _Course = Annotated[float, Field(ge=-10.0, le=10.0)]
 _Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ClimbOut:
     """Departure: launch at home, climb straight ahead to the take-off altitude, and waypoints to the plan.
 
@@ -41,7 +41,7 @@ class ClimbOut:
         _lock_arrays(self, "home", "waypoints")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Descent:
     """Approach: waypoints from the plan's end to the line-up, then the line-up and the landing point.
 

@@ -248,6 +248,9 @@ class Plan:
             return self.certificate.problems
         return ("it violates constraints at its sampled points",)
 
+    def __hash__(self) -> int:
+        return hash(plan_json(self))
+
     def __eq__(self, other: object) -> bool:
         return plan_json(self) == plan_json(other) if isinstance(other, Plan) else NotImplemented
 

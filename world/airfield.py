@@ -152,7 +152,7 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
     return slopes[0], slopes[1]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ReturnRequirements:
     """Requirements on RTL (return to launch), glides and go-arounds, and RTL settings of a plan's mission.
 

@@ -70,6 +70,9 @@ _GEO_TOLERANCE_DEG = 1e-5
 GROUND_BUFFER = 1000.0
 
 
+# Classes of the fields of a scenario that are neither numbers nor tables.
+_FIELD_CLASSES = {"spec": ScenarioFile, "origin": GeoOrigin, "terrain": Terrain, "threats": Threats, "wind": Wind}
+
 _Class = TypeVar("_Class")
 
 
@@ -91,7 +94,7 @@ def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
 
 
 @_with_clear_errors
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Scenario:
     """Environment of one mission, in map axes (m) and radians.
 
@@ -137,9 +140,17 @@ class Scenario:
     link: RadioLink | None = None
 
     def __post_init__(self) -> None:
-        """Lock the arrays."""
+        """Check the types, and lock the arrays."""
+        for name, field_class in _FIELD_CLASSES.items():
+            value = getattr(self, name)
+            if not isinstance(value, field_class) and (value is not None or name != "terrain"):
+                raise TypeError(f"{name}: {type(value).__name__}: expected a {field_class.__name__}")
         for name in ("bounds", "start", "destination", *(("home",) if self.home is not None else ())):
-            array = np.array(getattr(self, name), dtype=np.float64)
+            array, shape = np.array(getattr(self, name)), (2, 2) if name == "bounds" else (3,)
+            if array.shape != shape or array.dtype.kind not in "fiu" or np.isnan(array).any():
+                text = f"{array.dtype} of shape {array.shape}" if array.shape != shape else str(array.tolist())
+                raise ValueError(f"{name}: {text}: expected an array {shape} of numbers")
+            array = array.astype(np.float64)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 

@@ -25,7 +25,7 @@ EDGE_TOLERANCE = 2e-3
 TILE_PIXELS = 16
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
     """Measured or synthetic ground heights above mean sea level.
 

@@ -7,7 +7,7 @@ import numpy as np
 from world.arrays import Floats
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Threats:
     """m air-defence units; a radius of 0 means that the unit has no missile, or no radar.
 

@@ -71,7 +71,7 @@ _HEIGHT = 4
 _POWER = 6
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Band:
     """Predicted band of one quantity, and the values of the flight.
 

@@ -47,7 +47,7 @@ _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Equation:
     """Fit of one equation of motion.
 
@@ -68,7 +68,7 @@ class Equation:
     correlation: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
     """Estimate of an aircraft's parameters from its logs.
 

@@ -42,7 +42,7 @@ _FILTER_GAINS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 _WHITENESS_TIME_S = 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
     """Errors of one model's predictions.
 
@@ -57,7 +57,7 @@ class Prediction:
     whiteness: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PredictedLog:
     """Predictions of a log by several models.
 

@@ -47,7 +47,7 @@ _DIFFERENCE_STEP = 0.02
 IS_MOMENT: Flags = np.array([parameter.group in AXES for parameter in PARAMETERS])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Refinement:
     """Refined parameters of the moments.
 

@@ -11,7 +11,7 @@ launch as ArduPlane does with its default parameters.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -137,9 +137,9 @@ class AutopilotProgram(DocumentConfig):
     """Version that the program reports."""
     sha256: str
     """SHA-256 of the program's file."""
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float] = field(hash=False)
     """Values that replaced the program's own defaults, as the program stored them."""
-    changed: Mapping[str, float]
+    changed: Mapping[str, float] = field(hash=False)
     """Parameters for which the user's file states a different value from the aircraft's."""
     unused: tuple[str, ...] = ()
     """Names in the user's file that the program does not know, or that belong to other hardware."""

@@ -60,7 +60,7 @@ TIMEOUT_RATIO = 3.0
 TIMEOUT_BASE_S = 600.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ReturnEnvironment:
     """Terrain and threats that an RTL can meet, for compiled code.
 

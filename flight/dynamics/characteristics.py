@@ -66,7 +66,7 @@ class Mode:
         return math.log(2.0) / abs(self.root.real) if self.root.real != 0.0 else math.inf
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class StepResponse:
     """Response to one control, from level flight at cruise.
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import jsbsim
 import numpy as np
@@ -72,7 +72,8 @@ def silence() -> Iterator[Callable[[], str]]:
     """Suppress standard output, because JSBSim prints its banner at every debug level.
 
     JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. Yield a function that returns the
-    output of both.  Both belong to the process, so one thread at a time suppresses them.
+    output of both.  Both belong to the process, so one thread at a time suppresses them; what other threads print
+    meanwhile is not suppressed.
     """
     with _SILENCE_LOCK:
         yield from _suppressed_output()
@@ -83,7 +84,11 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
     sys.stdout.flush()
     saved_descriptor = os.dup(1)
     try:
-        with tempfile.TemporaryFile() as cpp_file, contextlib.redirect_stdout(io.StringIO()) as python_output:
+        with (
+            tempfile.TemporaryFile() as cpp_file,
+            _stream_to(saved_descriptor, sys.stdout) as others,
+            contextlib.redirect_stdout(_ThreadOutput(others, sys.stdout)) as python_output,
+        ):
             os.dup2(cpp_file.fileno(), 1)
 
             def text() -> str:
@@ -94,6 +99,49 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
     finally:
         os.dup2(saved_descriptor, 1)
         os.close(saved_descriptor)
+
+
+class _ThreadOutput(io.StringIO):
+    """Text that the thread which made it prints; the text of other threads goes to a stream of theirs.
+
+    others: this stream.
+    stdout: standard output, to which they write when the stream is closed.
+    """
+
+    def __init__(self, others: TextIO, stdout: TextIO) -> None:
+        super().__init__()
+        self._thread, self._others, self._stdout = threading.get_ident(), others, stdout
+
+    def write(self, text: str) -> int:
+        """Keep the text of the own thread, and pass on any other."""
+        if threading.get_ident() == self._thread:
+            return super().write(text)
+        try:
+            count = self._others.write(text)
+            self._others.flush()
+        except ValueError:
+            # A print that began while the output was suppressed, and ends after it.
+            return self._stdout.write(text)
+        return count
+
+
+@contextmanager
+def _stream_to(saved_descriptor: int, stdout: TextIO) -> Iterator[TextIO]:
+    """Yield a stream of standard output that does not write to file descriptor 1.
+
+    saved_descriptor: another descriptor of the file of descriptor 1.
+    stdout: standard output, which is yielded if it does not write to descriptor 1, as in a notebook.
+    """
+    try:
+        writes_to_descriptor = stdout.fileno() == 1
+    except (AttributeError, OSError, ValueError):
+        writes_to_descriptor = False
+    if not writes_to_descriptor:
+        yield stdout
+        return
+    encoding, errors = stdout.encoding, stdout.errors
+    with open(saved_descriptor, "w", encoding=encoding, errors=errors, closefd=False) as stream:
+        yield stream
 
 
 # ----------------------------------------------------------------------

@@ -188,7 +188,7 @@ def profile_at(nodes: Records, distance: float) -> tuple[float, float, float]:
 MAX_CHORD_TURN_RAD = math.radians(5.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class FlyByPath:
     """A fly-by path as a function of the distance along it.
 

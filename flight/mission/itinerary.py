@@ -592,7 +592,8 @@ class _ItineraryBuilder:
         if treatment == Treatment.OPEN:
             self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
         elif item.command in MARKS:
-            notes.add(f"{name}: a mark, nothing to fly", item.seq)
+            # Others jump to it; by itself it is flown as written.
+            return
         elif support.reason == CAMERA_REASON:
             notes.add(f"{name}: {CAMERA_REASON}", item.seq)
         else:

@@ -106,7 +106,7 @@ def _set_fields(points: Records, fields: dict[str, ArrayLike]) -> None:
         points[name][1 if name == "airspeed" else 0 :] = values
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Route:
     """Waypoints in flying order; leg i goes from waypoint i to i + 1.
 

@@ -65,7 +65,7 @@ DIGITS = {
 }
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Track:
     """Flown track, as stored in a log.
 

@@ -6,7 +6,7 @@ A recorded verdict is returned unchanged, for comparison; no code relies on it.
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -185,8 +185,8 @@ class FlightLog:
     track: Track
     events: tuple[LogEvent, ...]
     ended: str | None
-    recorded_verdict: dict[str, Any] | None
-    versions: dict[str, str]
+    recorded_verdict: dict[str, Any] | None = field(hash=False)
+    versions: dict[str, str] = field(hash=False)
     complete: bool
     problem: str
     end_time: float

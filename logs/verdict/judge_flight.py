@@ -27,7 +27,7 @@ from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
-from logs.verdict.summary import headline, summary_lines, undecided_text
+from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
 
@@ -116,13 +116,13 @@ def _level_answers(
 
     If the envelope is not applied, only the flight's own answer is returned.
     """
-    levels, source = [], requirements.setup.envelope.source
+    levels, notes = [], setup_notes(requirements.setup, flight_findings)
     if requirements.envelope:
         geometric = (*blocking_item_findings(requirements.setup), *geometric_findings(requirements, flight_findings))
         has_failed = any(finding.ok is False for finding in geometric)
         passes = not has_failed and not undecided_findings(geometric)
         disagreements = _disagreements("geometry", geometric, flight_findings)
-        headline_text = headline(geometric, passes, source)
+        headline_text = headline(geometric, passes, notes)
         levels.append(
             LevelAnswer("geometry", passes, headline_text, disagreements, undecided=not passes and not has_failed)
         )
@@ -130,7 +130,7 @@ def _level_answers(
         finding.ok is False for finding in flight_findings
     )
     own_answer = LevelAnswer(
-        flown_level(requirements.setup), flyable, headline(flight_findings, flyable, source), undecided=undecided
+        flown_level(requirements.setup), flyable, headline(flight_findings, flyable, notes), undecided=undecided
     )
     return (*levels, own_answer)
 

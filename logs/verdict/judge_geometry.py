@@ -22,7 +22,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName, TriedSuggestions
 from logs.verdict.rule import Judge, Rule
 from logs.verdict.rules.registry import RULES
-from logs.verdict.summary import headline, summary_lines, undecided_text
+from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from planner.plan import Plan, Violation
@@ -273,7 +273,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     complete = setup.plan is None or not setup.plan.failures
     unjudged, has_failed = undecided_text(findings), any(finding.ok is False for finding in findings)
     flyable = complete and not unjudged and not has_failed
-    headline_text = headline(findings, flyable, setup.envelope.source)
+    headline_text = headline(findings, flyable, setup_notes(setup, findings))
     levels = (LevelAnswer("geometry", flyable, headline_text, undecided=bool(unjudged) and not has_failed),)
     conditions = judging_conditions(setup)
     return Verdict(
@@ -313,9 +313,10 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     route_findings = geometric_findings(requirements)
     passes = not any(finding.ok is False for finding in route_findings)
     findings = (*with_suggestions(requirements, None, route_findings), end_finding)
+    notes = setup_notes(setup, findings)
     levels = (
-        LevelAnswer("geometry", passes, headline(route_findings, passes)),
-        LevelAnswer(flown_level(setup), False, headline(findings, False)),
+        LevelAnswer("geometry", passes, headline(route_findings, passes, notes)),
+        LevelAnswer(flown_level(setup), False, headline(findings, False, notes)),
     )
     conditions = judging_conditions(setup)
     lines = summary_lines(findings, setup, "geometric", levels, conditions)

@@ -16,8 +16,8 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 
 # Quantity of a change.
 # - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn",
-#   "radius" that a loiter's item states, "home altitude", "altitude frame" of the items below ground, "launch course"
-#   of the scenario.
+#   "radius" that a loiter's item states, "home altitude", "altitude frame" of the items below ground, "end loiter"
+#   instead of the last waypoint, "launch course" of the scenario.
 # - Changes by a step: "height" (higher) or "descent" (lower) of a leg or of the path at a zone; "inset" of the path
 #   from the area's edges; "distance" from a missile; "north", "east", "south" or "west" of the path at a zone;
 #   "duration" of the flight.
@@ -32,6 +32,7 @@ Quantity = Literal[
     "radius",
     "home altitude",
     "altitude frame",
+    "end loiter",
     "launch course",
     "height",
     "descent",

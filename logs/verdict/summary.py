@@ -20,9 +20,10 @@ from logs.verdict.findings import (
     undecided_findings,
 )
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
-from logs.verdict.places import DecidingParameter, LevelAnswer, Place
+from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
-from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
+from logs.verdict.suggestions import home_height
+from logs.verdict.tolerances import HOME_ERROR_M, NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
 from world.wording import count_text, is_one_edit
 
@@ -37,22 +38,36 @@ _LEVEL_TITLES = {
 }
 
 
-def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
+def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
+    """Return the notes for a headline on what all findings depend on: an uncertain aircraft, and home's altitude.
+
+    An altitude of home that is a finding of its own is not noted.
+    """
+    source, height = setup.envelope.source, home_height(setup)
+    notes = [f"an aircraft from {source}"] if source else []
+    is_found = any(finding.rule == "clearance" and finding.place == FLIGHT for finding in findings)
+    # The height is NaN if it is unknown.
+    if abs(height) > HOME_ERROR_M and not is_found:
+        side = "above" if height > 0.0 else "below"
+        notes.append(f"home is {abs(height):.0f} m {side} the ground there, and all heights above home with it")
+    return tuple(notes)
+
+
+def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[str] = ()) -> str:
     """Return the first line of a verdict: the answer, with the failed, unjudged or narrowly passed findings.
 
     flyable: True if the verdict is flyable.
-    source: source of the aircraft's model, if the model is uncertain, otherwise "".
+    setup_notes: see `setup_notes`.
     """
-    source_notes = [f"an aircraft from {source}"] if source else []
     if flyable:
         unjudged = [_unjudged_text(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
         unjudged += ["return not judged"] if any(finding.check == NO_HOME for finding in findings) else []
         notes = [*filter(None, unjudged), *_near_miss_notes(findings), *_altitude_notes(findings)]
-        return "; ".join(["flyable", *notes, *source_notes])
+        return "; ".join(["flyable", *notes, *setup_notes])
     failed_findings = _failed_by_urgency(findings)
     if not failed_findings and (open_text := undecided_text(findings)):
         notes = [*_near_miss_notes(findings), *_altitude_notes(findings)]
-        return "; ".join([f"not judged in full: {open_text}", *notes, *source_notes])
+        return "; ".join([f"not judged in full: {open_text}", *notes, *setup_notes])
     named_findings = _headline_findings(failed_findings)
     unnamed_count = len(failed_findings) - len(named_findings)
     text = (
@@ -60,7 +75,7 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
         + ", ".join(_headline_phrase(item) for item in named_findings)
         + (f", +{unnamed_count} more" if unnamed_count else "")
     )
-    return "; ".join([text, *source_notes])
+    return "; ".join([text, *setup_notes])
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:

@@ -136,6 +136,8 @@ def _other_change_text(change: Change) -> str:
             return f"set home to {requested_value:.1f} m AMSL, the ground there, instead of {change.current:.1f} m"
         case "altitude frame":
             return "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
+        case "end loiter":
+            return f"end with a loiter: make item {change.place.item} a NAV_LOITER_UNLIM (or add a landing)"
         case "launch course":
             return f"launch on a course of {requested_value:.0f}° instead of {change.current:.0f}°, against the wind"
         case "duration":

@@ -141,7 +141,7 @@ def map_chart(
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, stops)
-    labels += [] if route is None else _waypoint_labels(scenario, route, stops, failed)
+    labels += [] if route is None else _waypoint_labels(route, stops, failed)
     extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
     return scenario_map(
         scenario, subject, layers, labels, extent, route=route, failing_threats=frozenset(failing_threats), winds=winds
@@ -165,7 +165,8 @@ def scenario_map(
 
     labels: labels that take precedence over the names of threats and zones.
     extent: range as from `map_extent`.
-    route: waypoints (w, 3), m, whose altitudes determine the filled sections of missiles.
+    route: waypoints (w, 3), m, whose ends are start and destination, and whose altitudes determine the filled sections
+    of missiles.
     failing_threats: indices of the threats whose rule fails.
     """
     east, north = extent
@@ -179,7 +180,9 @@ def scenario_map(
     origin = scenario.origin
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
-        Panel("north", "km", (*area_layers, *layers, *_end_markers(scenario)), span=north, labels=(*labels, *names)),
+        Panel(
+            "north", "km", (*area_layers, *layers, *_end_markers(scenario, route)), span=north, labels=(*labels, *names)
+        ),
         east,
         north,
         position_text(origin.lat_deg, origin.lon_deg),
@@ -280,31 +283,32 @@ def _waypoint_layers(
     return layers
 
 
-def _end_markers(scenario: Scenario) -> list[Layer]:
+def _named_ends(scenario: Scenario, route: Floats | None) -> tuple[tuple[str, Floats], tuple[str, Floats]]:
+    """Return start and destination, by name: the ends of the route, or the scenario's without a route."""
+    first, last = (scenario.start, scenario.destination) if route is None else (route[0], route[-1])
+    return ("start", first), ("destination", last)
+
+
+def _end_markers(scenario: Scenario, route: Floats | None) -> list[Layer]:
     """Make the markers of start and destination."""
     return [
         Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
-        for name, point in (("start", scenario.start), ("destination", scenario.destination))
+        for name, point in _named_ends(scenario, route)
     ]
 
 
 def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -> list[Label]:
-    """Return the labels of start and destination, one label if they coincide.
-
-    If the first or last waypoint coincides with them, its number is part of the label.
+    """Return the labels of start and destination, with the numbers of their waypoints; one label if they coincide.
 
     stops: number of each waypoint of the route.
     """
-    labels = []
-    for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
-        is_at_waypoint = route is not None and _are_close(route[row], point)
-        text = name
-        if is_at_waypoint and route is not None:
-            text = f"{stops[row]} {name}"
-        labels.append(Label(text, float(point[0]), float(point[1]), "end"))
-    start, destination = labels
-    if not _are_close(scenario.start, scenario.destination):
-        return labels
+    ends, numbers_of_ends = _named_ends(scenario, route), ("", "") if route is None else (stops[0], stops[-1])
+    start, destination = (
+        Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
+        for (name, point), stop in zip(ends, numbers_of_ends, strict=True)
+    )
+    if not _are_close(ends[0][1], ends[1][1]):
+        return [start, destination]
     return [replace(start, text=f"{start.text}, {destination.text}")]
 
 
@@ -313,21 +317,17 @@ def _are_close(a: Floats, b: Floats) -> bool:
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 
-def _waypoint_labels(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+def _waypoint_labels(route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
     """Return the numbers of waypoints as labels: at most `_MAX_NUMBERS`, and all that fail a rule.
 
     Waypoints at start and destination are left out.
     """
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
-    last = len(route) - 1
-    unlabelled_waypoints = {
-        k for k, end in ((0, scenario.start), (last, scenario.destination)) if _are_close(route[k], end)
-    }
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0} | set(failed.waypoints)
     return [
         Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
-        for k in sorted(numbered_waypoints - unlabelled_waypoints)
+        for k in sorted(numbered_waypoints - {0, len(route) - 1})
     ]
 
 

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypedDict, Unpack, cast, overload
 
@@ -43,7 +43,7 @@ class AircraftNumbers:
     model_sha256: str
     envelope: Envelope
     trims: tuple[TrimRow, ...]
-    modes: Mapping[float, tuple[Mode, ...]]
+    modes: Mapping[float, tuple[Mode, ...]] = field(hash=False)
     cruise: tuple[Mode, ...]
     steps: tuple[StepResponse, ...]
     lacking: tuple[str, ...] = ()

@@ -379,6 +379,9 @@ def winds(
 ) -> WindsResult:
     """Find the strongest wind from each direction in which a mission is flyable with a given probability.
 
+    Of the result, ``boundaries`` states the wind of each direction, ``judged`` whether enough flights decide it,
+    ``reasons`` why not, and ``answer`` the answer of the whole search.
+
     target: a built-in scenario's name, a scenario's TOML file, a `Scenario`, a `Plan`, or a plan.json, .waypoints or
     .plan file.
     prove: the probability.

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from planfly.flight_options import load_scenario_with_options
 from planfly.runtime.stages import report_line
 from planfly.threat_tables import GivenThreats, threat_tables
@@ -34,10 +36,11 @@ def make_scenario(
     base: a built-in scenario's name, a TOML file's path, or a `Scenario`.
     threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
     named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of east, north, kill radius
-    and detection radius, m.  A radius that is 0 or missing means no such zone; a scale that is missing is a quarter of
-    the kill radius and a third of the detection radius.
-    tables: values of other tables, as mappings with the keys of a scenario file, and its name and description; other
-    keys of a table stay, except for a position, and a table of another kind or file, which are replaced as a whole.
+    and detection radius, m.  A radius that is 0 or None means no such zone; a scale that is None is a quarter of the
+    kill radius and a third of the detection radius.  NaN is refused.
+    tables: values of other tables, as mappings with the keys of a scenario file, whose lists may be arrays, and its
+    name and description; other keys of a table stay, except for a position, and a table of another kind or file, which
+    are replaced as a whole.
     Another elevation file replaces the base's origin, too, unless an origin is given: the middle of its
     latitudes and longitudes becomes the origin.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
@@ -50,7 +53,7 @@ def make_scenario(
     """
     base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
-    for name, values in tables.items():
+    for name, values in _plain_values(tables).items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         spec[name] = _change_table(spec[name], values) if is_merged else values
     terrain_table, base_table = spec["terrain"], base_scenario.to_json()["terrain"]
@@ -67,6 +70,15 @@ def make_scenario(
         if note not in base_scenario.notes:
             report_line(f"{scenario.name}: {note}")
     return scenario
+
+
+def _plain_values(values: Any) -> Any:
+    """Return the values of tables with lists and numbers of Python in place of numpy's."""
+    if isinstance(values, Mapping):
+        return {key: _plain_values(value) for key, value in values.items()}
+    if isinstance(values, list | tuple):
+        return [_plain_values(value) for value in values]
+    return values.tolist() if isinstance(values, np.ndarray | np.generic) else values
 
 
 def _change_table(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -32,7 +32,7 @@ _MODELS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class BestFound:
     """A point with its objective values and constraint violations.
 

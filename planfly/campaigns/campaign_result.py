@@ -84,7 +84,7 @@ DEFAULT_FLIGHTS = 300
 MAX_FLIGHTS = 5000
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class CampaignResult:
     """Result of `planfly.campaign`.
 

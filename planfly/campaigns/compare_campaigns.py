@@ -1,7 +1,7 @@
 """Compare two campaigns: their probabilities, the difference, the rules that fail more often, and their inputs."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,7 +31,7 @@ class ComparedCampaign:
     name: str
     tally: Tally
     interval: Interval
-    failed_by_rule: dict[str, int]
+    failed_by_rule: dict[str, int] = field(hash=False)
 
 
 @dataclass(frozen=True, repr=False)

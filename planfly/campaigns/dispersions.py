@@ -14,7 +14,7 @@ each flight uses one of its rows, chosen by the flight's own seed, instead of fa
 
 import hashlib
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -371,7 +371,7 @@ class Draw:
 
     index: int
     seed: int
-    values: dict[str, float]
+    values: dict[str, float] = field(hash=False)
 
 
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Literal
 
 from logs.verdict.conditions import Conditions
 from logs.verdict.places import Place
@@ -15,6 +16,7 @@ from planfly.campaigns.dispersions import standard_draws, standard_population
 from planfly.campaigns.failure_counts import RuleFailures, count_failures
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne, code_hash
 from planfly.campaigns.flight_row import FlightRow, fly_one
+from planfly.campaigns.statistics.decision import wilson
 from planfly.campaigns.statistics.wind_boundary import (
     Direction,
     DrawnNumbers,
@@ -110,12 +112,15 @@ class CalmFailures:
     by_rule: tuple[RuleFailures, ...]
 
 
+# Answer of a search for winds.
+WindsAnswer = Literal["judged", "not flyable", "not judged in full", "not judged"]
+
+
 @dataclass(frozen=True, repr=False)
 class WindsResult:
     """Result of a search: the boundary of each direction, and the flights from which the boundaries are estimated.
 
-    boundaries: boundary of each direction; one from fewer than `MIN_FLIGHTS_PER_DIRECTION` flights, or with undecided
-        flights, is an estimate that the verdict does not judge.
+    boundaries: boundary of each direction; `judged` and `reasons` state which of them are only estimates, and why.
     flights: direction, wind speed, m/s, and True if flyable, of each flight.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights, without the wind, which depends on the direction.
@@ -149,17 +154,86 @@ class WindsResult:
         counts = Counter(self.flights[number][0] for number, _ in self.undecided)
         return [counts[direction] for direction in range(len(self.boundaries))]
 
+    @property
+    def is_only_calm(self) -> bool:
+        """True if all flights were in calm air and none was flyable, so that no wind was searched."""
+        return self.calm is not None and self.calm.flights == len(self.flights)
+
+    @property
+    def fails_in_calm_air(self) -> bool:
+        """True if the flights in calm air show that the mission misses the target probability there."""
+        calm = self.calm
+        if calm is None:
+            return False
+        if self.is_only_calm and calm.failed_count == calm.flights:
+            return True
+        return wilson(calm.flights - calm.failed_count, calm.flights).high < self.goal.target
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Reason why the boundary of each direction is not judged; "" if it is judged.
+
+        A direction whose boundary is calm air is judged if the flights there show it.
+        """
+        fails_in_calm_air, max_width = self.fails_in_calm_air, 2.0 * BOUNDARY_ACCURACY_MPS
+        counts = zip(self.flight_counts(), self.undecided_counts(), strict=True)
+        reasons = []
+        for boundary, (count, undecided_count) in zip(self.boundaries, counts, strict=True):
+            is_calm = fails_in_calm_air and boundary.estimate < CALM_MPS
+            if undecided_count and not is_calm:
+                reasons.append(f"{undecided_count} of {count_text(count, 'flight')} not judged in full")
+            elif is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
+                reasons.append("")
+            elif count < MIN_FLIGHTS_PER_DIRECTION:
+                reasons.append(f"{count_text(count, 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
+            else:
+                reasons.append(f"an interval of {boundary.width:.2f} m/s; at most {max_width:g} m/s is required")
+        return tuple(reasons)
+
+    @property
+    def judged(self) -> tuple[bool, ...]:
+        """True for each direction whose boundary is judged; `reasons` states why the others are not."""
+        return tuple(not reason for reason in self.reasons)
+
+    @property
+    def estimated(self) -> tuple[bool, ...]:
+        """True for each direction whose boundary is stated: it is judged, or only its interval is too wide.
+
+        With fewer flights the boundary and its interval depend mostly on assumptions, and flights that are not judged
+        in full may be on either side of it.
+        """
+        counts = zip(self.flight_counts(), self.undecided_counts(), strict=True)
+        return tuple(
+            is_judged or (count >= MIN_FLIGHTS_PER_DIRECTION and not undecided_count)
+            for is_judged, (count, undecided_count) in zip(self.judged, counts, strict=True)
+        )
+
+    @property
+    def answer(self) -> WindsAnswer:
+        """The answer: "judged", "not flyable", "not judged in full" or "not judged".
+
+        It is "not flyable" if the mission does not reach the target probability even in calm air, because the flights
+        there show it or all boundaries are judged; "not judged" if no direction has a judged boundary; "not judged in
+        full" if only some directions have one; and otherwise "judged".
+        """
+        judged = self.judged
+        if self.fails_in_calm_air or (self.calm is not None and all(judged)):
+            return "not flyable"
+        if not any(judged):
+            return "not judged"
+        return "judged" if all(judged) else "not judged in full"
+
     def __repr__(self) -> str:
-        counts = self.flight_counts()
         speeds = [
             boundary.estimate
-            for boundary, count in zip(self.boundaries, counts, strict=True)
-            if count >= MIN_FLIGHTS_PER_DIRECTION
+            for boundary, is_estimated in zip(self.boundaries, self.estimated, strict=True)
+            if is_estimated
         ]
         speed_text = f", {min(speeds):.1f} m/s the lowest" if speeds else ""
-        unjudged_text = f", {len(counts) - len(speeds)} of them not judged" if len(speeds) < len(counts) else ""
-        subject = f"{count_text(len(counts), 'direction')}{unjudged_text}{speed_text}"
-        return f"<WindsResult {subject}; {count_text(sum(counts), 'flight')}>"
+        unjudged_count = self.judged.count(False)
+        unjudged_text = f", {unjudged_count} of them not judged" if unjudged_count else ""
+        subject = f"{count_text(len(self.boundaries), 'direction')}{unjudged_text}{speed_text}"
+        return f"<WindsResult {subject}; {count_text(len(self.flights), 'flight')}>"
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,6 +27,7 @@ from planfly.campaigns.find_winds import (
     CALM_MPS,
     MIN_FLIGHTS_PER_DIRECTION,
     CalmFailures,
+    WindsAnswer,
     WindsResult,
 )
 from planfly.campaigns.flight_row import STATION_COUNT, FlightRow, fly_one
@@ -43,8 +44,7 @@ from planfly.campaigns.pictures import (
     draw_tornado,
     group_by_speed,
 )
-from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound, wilson
-from planfly.campaigns.statistics.wind_boundary import needs_more_flights
+from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
 from planfly.campaigns.summary import (
     CampaignSummary,
     campaign_lines,
@@ -334,8 +334,6 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 
 # Schema of ``winds.json``.
 WINDS_SCHEMA = "planfly.winds/2"
-# Answer of a search for winds.
-WindsAnswer = Literal["judged", "not flyable", "not judged in full", "not judged"]
 # Style of the page's answer, by the answer.
 _ANSWER_STYLES: dict[WindsAnswer, AnswerStyle] = {
     "judged": "",
@@ -355,7 +353,7 @@ _BOUNDARY_EXPLANATION = (
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
     """Return the boundary, its interval and the flights of each wind direction, for the go/no-go chart."""
-    directions, reasons = [], unsettled_reasons(winds)
+    directions, reasons = [], winds.reasons
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
         for direction, speed, flyable in winds.flights:
@@ -378,7 +376,7 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
 
 def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: str) -> None:
     """Write the files of a search for winds: ``winds.json``, ``winds.png`` and ``winds.html``."""
-    goal, directions, reasons = winds.goal, chart_directions(winds), unsettled_reasons(winds)
+    goal, directions, reasons = winds.goal, chart_directions(winds), winds.reasons
     wind = base.scenario.wind
     scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
     figure = draw_go_no_go(directions, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
@@ -392,7 +390,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
             f"no: {reason}" if reason else "yes",
         )
         for direction, rule, reason, is_estimated in zip(
-            directions, _deciding_rules(winds), reasons, _estimated_directions(winds), strict=True
+            directions, _deciding_rules(winds), reasons, winds.estimated, strict=True
         )
     ]
     data = {
@@ -400,7 +398,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
         "name": base.name,
         "seed": base.seed,
         "target": goal.target,
-        "answer": winds_answer(winds),
+        "answer": winds.answer,
         "reason": next(iter(_unsettled_lines(winds)), ""),
         "confidence": goal.confidence,
         "most": goal.most,
@@ -412,7 +410,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
                 "boundary_mps": round(direction.boundary, 3),
                 "interval_mps": [round(direction.low, 3), round(direction.high, 3)],
                 "beyond": direction.is_beyond_search,
-                "judged": not reasons[k],
+                "judged": winds.judged[k],
                 "reason": reasons[k],
                 "flown": [
                     {"speed_mps": round(speed, 3), "flights": count, "flyable": flyable}
@@ -445,7 +443,7 @@ def _winds_page(
         command_name="winds",
         name=name,
         heading="wind in which it is flyable",
-        style=_ANSWER_STYLES[winds_answer(winds)],
+        style=_ANSWER_STYLES[winds.answer],
         lines=wind_lines(winds),
         figures=[(figure, "Go/no-go chart: wind from each direction")],
         tables=[PageTable([(title, "n") for title in titles], rows)],
@@ -476,73 +474,9 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
-def _is_only_calm(winds: WindsResult) -> bool:
-    """Return True if all flights were in calm air and none was flyable, so that no wind was searched."""
-    return winds.calm is not None and winds.calm.flights == len(winds.flights)
-
-
-def _fails_in_calm_air(winds: WindsResult) -> bool:
-    """Return True if the flights in calm air show that the mission misses the target probability there."""
-    calm = winds.calm
-    if calm is None:
-        return False
-    if _is_only_calm(winds) and calm.failed_count == calm.flights:
-        return True
-    return wilson(calm.flights - calm.failed_count, calm.flights).high < winds.goal.target
-
-
-def unsettled_reasons(winds: WindsResult) -> list[str]:
-    """Return for each direction the reason why its boundary is not judged, or "" if it is.
-
-    A direction whose boundary is calm air is judged if the flights there show it.
-    """
-    fails_in_calm_air, max_width = _fails_in_calm_air(winds), 2.0 * BOUNDARY_ACCURACY_MPS
-    counts = zip(winds.flight_counts(), winds.undecided_counts(), strict=True)
-    reasons = []
-    for boundary, (count, undecided_count) in zip(winds.boundaries, counts, strict=True):
-        is_calm = fails_in_calm_air and boundary.estimate < CALM_MPS
-        if undecided_count and not is_calm:
-            reasons.append(f"{undecided_count} of {count_text(count, 'flight')} not judged in full")
-        elif is_calm or not needs_more_flights(boundary, count, BOUNDARY_ACCURACY_MPS, MIN_FLIGHTS_PER_DIRECTION):
-            reasons.append("")
-        elif count < MIN_FLIGHTS_PER_DIRECTION:
-            reasons.append(f"{count_text(count, 'flight')} of at least {MIN_FLIGHTS_PER_DIRECTION}")
-        else:
-            reasons.append(f"an interval of {boundary.width:.2f} m/s; at most {max_width:g} m/s is required")
-    return reasons
-
-
-def _estimated_directions(winds: WindsResult) -> list[bool]:
-    """Return True for each direction whose boundary is stated: it is judged, or only its interval is too wide.
-
-    With fewer flights the boundary and its interval depend mostly on assumptions, and flights that are not judged in
-    full may be on either side of it.
-    """
-    counts = zip(winds.flight_counts(), winds.undecided_counts(), strict=True)
-    return [
-        not reason or (count >= MIN_FLIGHTS_PER_DIRECTION and not undecided_count)
-        for reason, (count, undecided_count) in zip(unsettled_reasons(winds), counts, strict=True)
-    ]
-
-
-def winds_answer(winds: WindsResult) -> WindsAnswer:
-    """Return the answer of a search for winds.
-
-    It is "not flyable" if the mission does not reach the target probability even in calm air, because the flights there
-    show it or all boundaries are judged; "not judged" if no direction has a judged boundary; "not judged in full" if
-    only some directions have one; and otherwise "judged".
-    """
-    reasons = unsettled_reasons(winds)
-    if _fails_in_calm_air(winds) or (winds.calm is not None and not any(reasons)):
-        return "not flyable"
-    if all(reasons):
-        return "not judged"
-    return "not judged in full" if any(reasons) else "judged"
-
-
 def _unsettled_lines(winds: WindsResult) -> list[str]:
     """Return lines that the search or some of its directions are not judged, and why; [] if all are judged."""
-    reasons = unsettled_reasons(winds)
+    reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
     if winds.undecided and any(reasons):
@@ -553,7 +487,7 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
         )
     all_counts = zip(winds.flight_counts(), winds.undecided_counts(), reasons, strict=True)
     counts = [count for count, undecided_count, reason in all_counts if reason and not undecided_count]
-    if not counts or _is_only_calm(winds):
+    if not counts or winds.is_only_calm:
         return lines
     unsettled_count = len(counts)
     directions_text = f"{count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'}"
@@ -651,7 +585,7 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
     """Return one line with the lowest and the highest boundary of a search for winds; [] if none is stated."""
     directions = [
         direction
-        for direction, is_estimated in zip(chart_directions(winds), _estimated_directions(winds), strict=True)
+        for direction, is_estimated in zip(chart_directions(winds), winds.estimated, strict=True)
         if is_estimated
     ]
     if not directions:
@@ -667,7 +601,7 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
             f" (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
         ]
     if highest.boundary < CALM_MPS:
-        basis = "" if _fails_in_calm_air(winds) else ", by the best estimate,"
+        basis = "" if winds.fails_in_calm_air else ", by the best estimate,"
         return [f"does not fly with P >= {target:g}{basis} even in calm air"]
     return [
         f"does not fly with P >= {target:g}, by the best estimate, in any wind from {lowest.from_deg:g}°,"
@@ -679,13 +613,13 @@ def wind_lines(winds: WindsResult) -> list[str]:
     """Return the result of a search for winds as a few lines of text."""
     percent = f"{100 * winds.goal.confidence:g} %"
     answer_lines = [*_unsettled_lines(winds), *_boundary_lines(winds)]
-    if winds_answer(winds) == "not flyable":
+    if winds.answer == "not flyable":
         # Failures in calm air answer the question, whatever the directions show.
         answer_lines.reverse()
     flights_text = count_text(len(winds.flights), "flight")
-    if _is_only_calm(winds):
+    if winds.is_only_calm:
         flights_text += "; no wind was tried, because no flight in calm air is flyable"
-    elif any(_estimated_directions(winds)):
+    elif any(winds.estimated):
         flights_text += f"; intervals at {percent}, from the flights in each direction"
     return [
         *answer_lines,
@@ -707,8 +641,8 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
     The answer fails unless it is "judged".  A direction that is not judged is skipped, and a direction fails in which
     the mission does not fly even in calm air.
     """
-    lines, reasons = wind_lines(winds), unsettled_reasons(winds)
-    cases = [answer_case("" if winds_answer(winds) == "judged" else lines[0])]
+    lines, reasons = wind_lines(winds), winds.reasons
+    cases = [answer_case("" if winds.answer == "judged" else lines[0])]
     for direction, reason in zip(chart_directions(winds), reasons, strict=True):
         case = JunitCase("planfly.winds", f"from {direction.from_deg:g}°")
         if reason:

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -155,7 +155,7 @@ class CampaignSummary:
     deciding: tuple[DecidingRule, ...]
     ranking: tuple[RankedRule, ...]
     worst: tuple[FlightRow, ...]
-    dispersions: dict[str, dict[str, Any]]
+    dispersions: dict[str, dict[str, Any]] = field(hash=False)
     made_of: str
     conditions: Conditions
     deciding_flights: int | None = None

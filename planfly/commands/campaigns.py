@@ -190,11 +190,11 @@ def winds(args: argparse.Namespace) -> int:
         result = call_api(planfly.winds, args, out=folder)
     if interrupted():
         return interrupted()
-    from planfly.campaigns.report import wind_lines, winds_answer, winds_suite
+    from planfly.campaigns.report import wind_lines, winds_suite
 
     print("\n".join(wind_lines(result)))
     print(f"results   {folder}/ (winds.html, winds.png, winds.json, winds.sqlite)")
-    code = _WINDS_EXIT_CODES[winds_answer(result)]
+    code = _WINDS_EXIT_CODES[result.answer]
     write_json_if_requested(args, lambda: _with_exit_code(folder / "winds.json", code))
     write_suite_if_requested(args, lambda: winds_suite(args.target, result))
     return code

@@ -43,7 +43,7 @@ STRIP_ALGORITHM = "umda-strip"
 STRIP_HALF_WIDTHS_M = {7: 2500.0, 15: 2500.0, 30: 2500.0, 60: 1500.0}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SeededPlan:
     """Values of one plan for tables and figures.
 

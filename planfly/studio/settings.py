@@ -85,7 +85,6 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
         "airspeed": settings.airspeed,
         "autopilot": settings.autopilot,
     }
-    _check_airspeed(scenario, options)
     new_scenario = apply_options(scenario, options)
     if settings.limits is None and settings.ceiling is None:
         return new_scenario
@@ -97,18 +96,6 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
             raise PlanflyError("ceiling: only a scenario has an area with a ceiling", field="ceiling")
         spec["area"]["ceiling_amsl_m"] = settings.ceiling
     return scenario_from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
-
-
-def _check_airspeed(scenario: Scenario, options: FlightOptions) -> None:
-    """Raise PlanflyError if the aircraft cannot fly at the airspeed of the options."""
-    airspeed, name = options.get("airspeed"), options.get("aircraft")
-    if airspeed is None:
-        return
-    new_scenario = scenario if name is None else with_flight(scenario, aircraft=str(name))
-    aircraft, _ = find_aircraft_and_energy(new_scenario)
-    if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
-        raise PlanflyError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 
 
 def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, settings: Settings) -> ChangedParameters:

@@ -11,6 +11,9 @@ from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACT
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 from world.wording import count_text
 
+# Smallest fraction of the lines' length without usable photos that is stated; it is printed as 1 %.
+MIN_STATED_FRACTION = 0.005
+
 
 def is_line_usable(measure: LineMeasure | None) -> bool:
     """Return True if at least `PHOTO_COVERAGE_FRACTION` of a photo line is usable.
@@ -84,6 +87,9 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     for number, (check, (text, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
         if check in faults and spacing:
             texts[number] += f": that needs {text.format(spacing)} there"
+    if measure.unusable_fraction > MIN_STATED_FRACTION:
+        unusable_text = f"{100.0 * measure.unusable_fraction:.0f} % of the lines' length, where no photo can be used"
+        texts.append(f"overlap not judged on {unusable_text}")
     if measure.ground_sampling is not None:
         sampling_text = " to ".join(dict.fromkeys(f"{100.0 * distance:.1f}" for distance in measure.ground_sampling))
         heights_text = f"{measure.min_height:.0f} m to {measure.max_height:.0f} m above ground"

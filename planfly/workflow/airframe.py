@@ -144,9 +144,6 @@ def find_aircraft_and_energy(scenario: Scenario) -> tuple[Aircraft, float]:
         aircraft = find_aircraft(table.aircraft)
         model_hash(aircraft)
     except FlightError as error:
-        if scenario.external:
-            # Only an option names the aircraft of a mission.
-            raise ScenarioError.of_argument("aircraft", table.aircraft, str(error)) from error
         raise ScenarioError.from_error(error, scenario.name, "flight.aircraft", table.aircraft) from error
     return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 

@@ -322,6 +322,15 @@ def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Findi
         edited.mission, edited.is_changed = replace(mission, items=tuple(items)), True
 
 
+def _end_with_loiter(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+    """Turn the last waypoint into a loiter without end, which keeps the autopilot from returning by itself."""
+    index = None if change.place.index is None else edited.item_index(change.place.index)
+    if index is not None:
+        items = list(edited.mission.items)
+        items[index] = replace(items[index], command=Command.NAV_LOITER_UNLIM, params=(0.0,) * 4)
+        edited.mission, edited.is_changed = replace(edited.mission, items=tuple(items)), True
+
+
 def _change_loiter_radius(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Set the radius of a loiter's item; it circles in the same direction as before."""
     index = None if change.place.index is None else edited.item_index(change.place.index)
@@ -402,6 +411,7 @@ _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] 
     "descent": _change_altitude,
     "home altitude": _set_home_altitude,
     "altitude frame": _set_altitude_frame,
+    "end loiter": _end_with_loiter,
     "radius": _change_loiter_radius,
     "inset": _move_inside_area,
     "distance": _move_away_from_missile,

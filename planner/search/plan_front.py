@@ -105,7 +105,7 @@ class FrontPlan:
     energy: float
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Front:
     """Plans, the shortest first; no plan is better than another plan in every objective.
 

@@ -21,7 +21,7 @@ COMPARISON_STEP_M = 10.0
 SECONDS_PER_HOUR = 3600.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Profile:
     """Measurements of a flight at n points along its route; NaN where the route was not flown.
 
@@ -95,7 +95,7 @@ class Spread:
     percentile_95: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Reflight:
     """Imported flight and simulated flight side by side.
 

@@ -254,6 +254,7 @@ class OverlapMeasure:
     line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
         and height above ground, m.
     min_height, max_height: heights above ground of the usable photos, m; NaN if none is usable.
+    unusable_fraction: fraction of the length of all lines without a usable photo, where no overlap is judged.
     """
 
     camera: Camera
@@ -268,6 +269,7 @@ class OverlapMeasure:
     side_height: float = math.nan
     min_height: float = math.nan
     max_height: float = math.nan
+    unusable_fraction: float = 0.0
 
     @property
     def needed_photo_spacing(self) -> float | None:
@@ -302,14 +304,14 @@ class _Strip(NamedTuple):
     """Points of a photo line, with a flag for usable points.
 
     positions: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
-    is_lost: True if less of the line can be used than a photo line requires.
+    usable_fraction: fraction of the line's length with usable points.
     """
 
     positions: Floats
     heights: Floats
     speeds: Floats
     is_usable: Flags
-    is_lost: bool = False
+    usable_fraction: float = 1.0
 
 
 def measure_overlap(
@@ -323,10 +325,16 @@ def measure_overlap(
     if plan is None or plan.camera is None:
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
-    kept_strips = [None if strip is None or strip.is_lost else strip for strip in strips]
+    kept_strips = [
+        None if strip is None or strip.usable_fraction < PHOTO_COVERAGE_FRACTION else strip for strip in strips
+    ]
+    lengths = [LineAxis(requirements.points[line.first : line.last + 1]).length for line in survey.lines]
+    unusable_fractions = [1.0 if strip is None else 1.0 - strip.usable_fraction for strip in strips]
     used_heights = [strip.heights[strip.is_usable] for strip in strips if strip is not None]
     heights = np.concatenate(used_heights) if used_heights else np.empty(0)
-    measure = OverlapMeasure(plan.camera)
+    measure = OverlapMeasure(
+        plan.camera, unusable_fraction=float(np.average(unusable_fractions, weights=lengths)) if strips else 0.0
+    )
     if heights.size:
         measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()))
     measure = _with_side_overlap(measure, requirements, survey, kept_strips)
@@ -358,7 +366,7 @@ def _line_strip(
     is_usable = meets_conditions & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
     speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
     heights = heights_over_ground(requirements, rows.position)
-    return _Strip(rows.position, heights, speeds, is_usable, is_lost=usable_fraction < PHOTO_COVERAGE_FRACTION)
+    return _Strip(rows.position, heights, speeds, is_usable, usable_fraction)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:

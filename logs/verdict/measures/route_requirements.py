@@ -46,7 +46,7 @@ from world.wind import Wind
 _BOX_MARGIN_M = 10.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Airspace:
     """Zones in the order in which findings number them.
 

@@ -50,7 +50,7 @@ _MAX_CELL_PIXELS = 8
 MAP_MARGIN_M = 3000.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class GlideMap:
     """Map of square cells, with n rows from south to north and e columns from west to east.
 

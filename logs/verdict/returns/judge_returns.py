@@ -286,7 +286,7 @@ def worst_first_key(ret: SimulatedReturn) -> tuple[int, float]:
     return KINDS.index(ret.kind), math.inf if math.isnan(margin) else margin
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ReturnWorld:
     """Data that determine the outcomes of simulated returns to launch, except the starts of the returns.
 

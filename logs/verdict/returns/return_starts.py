@@ -24,7 +24,7 @@ _VELOCITY_WINDOW_S = 1.0
 SINK_HEIGHT_LOSS_M = 10.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ReturnStarts:
     """Positions and velocities at which returns begin.
 

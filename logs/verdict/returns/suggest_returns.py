@@ -45,7 +45,7 @@ class Remedy:
     rally: rally points that replace the mission's; None keeps the mission's.
     """
 
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict, hash=False)
     rally: tuple[ReturnPoint, ...] | None = None
 
     def apply_to(self, world: ReturnWorld) -> ReturnWorld:

@@ -25,7 +25,7 @@ from logs.verdict.measures.mission_ends import (
 from logs.verdict.measures.route_progress import rtl_arrival_circle
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import FLIGHT
+from logs.verdict.places import FLIGHT, Change, Suggestion
 from logs.verdict.returns.glides_text import glides_headline
 from logs.verdict.returns.judge_glides import MARGIN, judge_glides
 from logs.verdict.returns.judge_returns import (
@@ -315,9 +315,22 @@ def without_path_following_findings(
     return tuple(finding for finding in kept_findings if finding.ok is not None or finding.place not in unflown)
 
 
+def _suggest_end_loiter(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest a loiter without end instead of a last waypoint from which the return by itself fails."""
+    setup, end = requirements.setup, requirements.waypoint(requirements.legs)
+    commands = {item.seq: item.command for item in setup.mission.items}
+    is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT
+    if finding.place != end or not is_waypoint or not judges_return_after_last_item(setup):
+        return ()
+    return ((Change("end loiter", end, None, float(Command.NAV_LOITER_UNLIM), ""),),)
+
+
 RULE = Rule(
     name="return",
     judge=return_findings,
     judge_end=flown_return_findings,
     merge=without_path_following_findings,
+    suggest=_suggest_end_loiter,
 )

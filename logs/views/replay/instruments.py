@@ -40,7 +40,7 @@ _WIDE = _Size(80, 25, 31)
 _NARROW = _Size(MIN_WIDTH, 11, 21)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Instruments:
     """A log prepared for frames, with its timeline and the ground under each row, (t,) m, NaN if unknown."""
 

@@ -1,9 +1,11 @@
 """Nothing comes out while a library talks, by either way, and everything does afterwards."""
 
+import contextlib
 import math
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -32,6 +34,22 @@ def test_neither_python_nor_a_library_is_heard(capfd: pytest.CaptureFixture[str]
     out = capfd.readouterr().out
     assert "talks" not in out
     assert [line in out for line in ("before", "after", "and the library")] == [True] * 3
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_other_threads_are_heard(capfd: pytest.CaptureFixture[str], nested: bool) -> None:
+    """They print to standard output of descriptor 1, as in a program; one print ends after the output is given back."""
+    with open(1, "w", closefd=False) as stdout, contextlib.redirect_stdout(stdout):
+        with silence(), silence() if nested else contextlib.nullcontext():
+            thread = threading.Thread(target=print, args=("another thread",))
+            thread.start()
+            thread.join()
+            print("this thread")
+            old, late = sys.stdout, threading.Thread(target=lambda: old.write("too late\n"))
+            os.write(1, b"a library\n")
+        late.start()
+        late.join()
+    assert capfd.readouterr().out == "another thread\ntoo late\n"
 
 
 def test_errors_are_still_heard(capfd: pytest.CaptureFixture[str]) -> None:

@@ -129,6 +129,12 @@ def test_what_is_the_cameras_is_not_called_not_flown() -> None:
     )
 
 
+@pytest.mark.parametrize("mark", [188, 189, 191, 600])
+def test_a_mark_is_flown_as_written(mark: int) -> None:
+    items = wp(0, 0), wp(0, 900), f"2 {mark} 0 0 0 0 0 0 0", wp(0, 1800)
+    assert route(*items).notes == ()
+
+
 def test_jumps_are_followed_as_often_as_they_say() -> None:
     corners = [wp(0, 0), wp(0, 900), wp(900, 900)]
     assert route(*corners, "2 177 2 2 0 0 0 0 0").items.tolist() == [1, 2, 3, 2, 3, 2, 3]
@@ -208,7 +214,7 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
         wp(0, 500, 150), "3 189 0 0 0 0 36.5 -84.2 0", wp(0, 1500, 60), wp(900, 1500, 0, command=21), wp(0, 0)
     )
     assert landed.positions[-1] == pytest.approx([900.0, 1500.0, 360.0], abs=0.02)
-    assert [note.split(":")[0] for note in landed.notes] == ["item 2", "item 4", "item 5"]
+    assert [note.split(":")[0] for note in landed.notes] == ["item 4", "item 5"]
     here = route(wp(0, 500), wp(0, 1500), "3 85 0 0 0 0 0 0 0")
     assert here.items.tolist() == [1, 2]
     assert "without a position" in here.notes[0]
@@ -217,9 +223,9 @@ def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     assert ignored.notes[0] == "item 3: NAV_RETURN_TO_LAUNCH without a home: not flown"
 
 
-# One line each of the commands that a fixed wing's mission may hold; none may go in silence.
+# One line each of the commands that a fixed wing's mission may hold; none but a mark may go in silence.
 @pytest.mark.parametrize(
-    "command", [17, 18, 19, 30, 31, 80, 82, 92, 93, 94, 112, 115, 183, 189, 201, 206, 530, 600, 2000, 50_000]
+    "command", [17, 18, 19, 30, 31, 80, 82, 92, 93, 94, 112, 115, 183, 201, 206, 530, 2000, 50_000]
 )
 def test_nothing_is_dropped_in_silence(command: int) -> None:
     flown = route(wp(0, 0), wp(0, 900, command=command), wp(900, 900), f"2 {command} 1 2 3 4 0 0 0")

@@ -253,3 +253,17 @@ def test_ends_have_the_numbers_of_their_stops() -> None:
     middle = np.linspace(scenario.start, scenario.destination, 5)
     labels = end_labels(scenario, middle, [0, 1, 1, 1, 2])
     assert [label.text for label in labels] == ["0 start", "2 destination"]
+
+
+def test_the_ends_of_a_mission_are_its_own_wherever_the_scenario_begins() -> None:
+    scenario = make_scenario()
+    mission = ROUTE + np.array([300.0, -200.0, 0.0])
+    made = map_json(flight_map(scenario, plan_waypoints=None, route_waypoints=mission, track=None, verdict=None))
+    ends = {
+        layer["name"]: (layer["x"], layer["y"]) for layer in made["layers"] if layer["name"] in ("start", "destination")
+    }
+    for name, end in (("start", mission[0]), ("destination", mission[-1])):
+        assert np.allclose(np.ravel(ends[name]), end[:2])
+    labels = {text: (x, y) for text, x, y, *_ in made["labels"]}
+    assert np.allclose(labels["0 start"], mission[0, :2])
+    assert np.allclose(labels[f"{len(mission) - 1} destination"], mission[-1, :2])

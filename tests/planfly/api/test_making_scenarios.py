@@ -19,8 +19,8 @@ COLUMNS = {
     "name": ["a", "b"],
     "east_m": np.array([900.0, 1500.0]),
     "north_m": np.array([90.0, -90.0]),
-    "kill_radius_m": np.array([60.0, np.nan]),
-    "kill_scale_m": np.array([20.0, np.nan]),
+    "kill_radius_m": np.array([60.0, 0.0]),
+    "kill_scale_m": np.array([20.0, 0.0]),
     "detection_radius_m": np.array([0.0, 300.0]),
 }
 
@@ -70,7 +70,7 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
         ({"threats": [[1.0, 2.0]]}, r"threats of shape \(1, 2\): expected a data frame"),
         ({"threats": np.zeros((4, 3))}, r"threats of shape \(4, 3\): expected a data frame .*array \(n, 4\)"),
         ({"threats": (0.0, 0.0, 100.0, 200.0)}, r"threats of shape \(4,\): expected a data frame"),
-        ({"threats": [[9.0, np.nan, 60.0, 0.0]]}, "threats row 0: north_m nan: expected a position"),
+        ({"threats": [[9.0, np.nan, 60.0, 0.0]]}, "threats row 0: north_m nan: expected a number"),
         ({"threats": [("a", 0, 100, 0)]}, "threats list: expected a data frame"),
         ({"threats": 7}, "threats int: expected a data frame"),
         (
@@ -79,8 +79,27 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
         ),
         (
             {"threats": {"lat_deg": [46.0, np.nan], "lon_deg": [8.0, 8.0], "kill_radius_m": [60.0, 60.0]}},
-            r"threats\.1: lat_deg: missing; a position needs lat_deg and lon_deg",
+            "threats row 1: lat_deg nan: expected a number",
         ),
+        (
+            {"threats": [[900.0, 90.0, 60.0, 0.0], [900.0, 90.0, np.nan, 300.0]]},
+            "^threats row 1: kill_radius_m nan: expected a number: 0 for no such zone, None for a value .* not stated$",
+        ),
+        ({"threats": {**COLUMNS, "detection_radius_m": np.array([np.nan, 300.0])}}, "row 0: detection_radius_m nan: "),
+        ({"threats": {**COLUMNS, "kill_scale_m": np.array([20.0, np.nan])}}, "row 1: kill_scale_m nan: "),
+        ({"threats": [ROWS[0], {**ROWS[1], "kill_radius_m": np.float32(np.nan)}]}, "row 1: kill_radius_m nan: "),
+        (
+            {"threats": [{**ROWS[0], "kill_radius_m": np.zeros((3, 3))}]},
+            "threats row 0: kill_radius_m ndarray: expected",
+        ),
+        ({"threats": np.array([[900.0, 90.0, 60j, 0.0]])}, "threats ndarray: expected a data frame"),
+        (
+            {"terrain": {"kind": "dem", "path": np.zeros((3, 3))}},
+            "terrain.path: expected a file's name, or a list of 1",
+        ),
+        ({"terrain": np.zeros((3, 3))}, "terrain: expected a table"),
+        ({"terrain": {"kind": np.zeros((3, 3))}}, "terrain.kind: "),
+        ({"area": {"east_m": np.array([-300.0, np.nan])}}, "area.east_m.1: nan: "),
         ({"threats": [{"kill_radius_m": 60.0}]}, r"threats\.0: position: missing; give east_m and north_m, or lat_deg"),
         ({"threats": [{"east_m": 900.0, "north_m": 90.0}]}, "a threat has a missile, a radar, or both"),
         ({"threats": [{**ROWS[0], "colour": "red"}]}, "colour"),
@@ -122,8 +141,27 @@ def test_a_scenario_from_nothing_is_refused_with_the_function_that_makes_one(val
 
 
 def test_a_field_of_a_wrong_type_is_refused() -> None:
-    with pytest.raises(planfly.PlanflyError, match="could not convert string to float: 'west'"):
-        replace(planfly.make_scenario("tight"), start="west")
+    scenario = planfly.make_scenario("tight")
+    for values, said in (
+        ({"start": "west"}, r"^Scenario: start: <U4 of shape \(\): expected an array \(3,\) of numbers: "),
+        ({"start": [0.0, np.nan, 75.0]}, r"start: \[0.0, nan, 75.0\]: expected"),
+        ({"start": [0j, 0j, 75j]}, r"start: \[0j, 0j, 75j\]: expected"),
+        ({"bounds": np.zeros((3, 3))}, r"bounds: float64 of shape \(3, 3\): expected an array \(2, 2\) of numbers: "),
+        ({"terrain": np.zeros((3, 3))}, "^Scenario: terrain: ndarray: expected a Terrain: planfly.make_scenario makes"),
+        ({"threats": np.zeros((3, 4))}, "^Scenario: threats: ndarray: expected a Threats: "),
+    ):
+        with pytest.raises(planfly.PlanflyError, match=said) as refused:
+            replace(scenario, **values)
+        assert "\n" not in str(refused.value)
+    assert replace(scenario, terrain=None).terrain is None
+
+
+def test_values_that_a_mask_hides_are_missing_and_arrays_are_lists() -> None:
+    hidden = np.ma.masked_array([[900.0, 90.0, 60.0, 300.0]], mask=[[0, 0, 1, 0]])
+    scenario = planfly.make_scenario("tight", threats=hidden, area={"east_m": np.array([-300.0, 2900.0])})
+    assert scenario.threats.kill_radius.tolist() == [0.0]
+    assert scenario.threats.detection_radius.tolist() == [300.0]
+    assert scenario.bounds[0].tolist() == [-300.0, 2900.0]
 
 
 def test_a_threats_column_of_text_is_named_with_its_value() -> None:

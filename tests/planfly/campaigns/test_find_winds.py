@@ -29,7 +29,7 @@ from planfly.campaigns.find_winds import (
 )
 from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
-from planfly.campaigns.report import unsettled_reasons, wind_lines, winds_answer
+from planfly.campaigns.report import wind_lines
 from planfly.campaigns.tables import WINDS_DATABASE, FlownFlight, RequestedFlight, StoreError
 from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
@@ -128,8 +128,8 @@ def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_ca
         search.add_result(RequestedFlight(number, direction, speed, number), outcome)
     found = search.result()
     assert found.calm is None
-    assert winds_answer(found) == "not judged"
-    assert unsettled_reasons(found)[2] == "10 flights of at least 150"
+    assert found.answer == "not judged"
+    assert found.reasons[2] == "10 flights of at least 150"
     lines = wind_lines(found)
     assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
     assert lines[1] == (
@@ -154,11 +154,12 @@ def test_flights_that_are_not_judged_in_full_are_no_failures(wind_base: Campaign
     assert found.undecided_counts() == [6, 1, 0, 0]
     assert found.failures[:2] == ((RuleFailures("loiter", 6, ((Place("waypoint", 4), 6),)),), ())
     assert found.calm is None
-    assert winds_answer(found) == "not judged"
-    assert unsettled_reasons(found)[:2] == [
+    assert found.answer == "not judged"
+    assert found.reasons[:2] == (
         "6 of 12 flights not judged in full",
         "1 of 151 flights not judged in full",
-    ]
+    )
+    assert found.judged == (False, False, False, False)
     lines = wind_lines(found)
     assert lines[0] == (
         "not judged: 7 of 163 flights are not judged in full, the first of them because of loiters (state the bank"
@@ -189,7 +190,7 @@ def test_a_search_that_ends_in_calm_air_reports_the_flights_flown(wind_base: Cam
 @pytest.mark.usefixtures("here")
 def test_a_mission_that_is_not_judged_in_calm_air_is_not_searched(wind_base: CampaignBase, tmp_path: Path) -> None:
     found = searched(wind_base, tmp_path, fly=undecided_flight)
-    assert winds_answer(found) == "not judged"
+    assert found.answer == "not judged"
     assert found.undecided == tuple((number, "loiters (a guess)") for number in range(3))
     lines = wind_lines(found)
     assert lines[0] == (

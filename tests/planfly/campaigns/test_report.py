@@ -20,9 +20,7 @@ from planfly.campaigns.report import (
     clear_campaign,
     finish_campaign,
     fly_row_again,
-    unsettled_reasons,
     wind_lines,
-    winds_answer,
     winds_suite,
     write_files,
     write_winds,
@@ -150,7 +148,7 @@ def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: 
     assert "not judged, 1 to 2 flights" in page
     assert "no limit found" not in page
     partly = replace(ESTIMATED, flights=ESTIMATED.flights[:-1])
-    assert repr(partly) == "<WindsResult 4 directions, 1 of them not judged, 7.0 m/s the lowest; 599 flights>"
+    assert repr(partly) == "<WindsResult 4 directions, 4 of them not judged, 7.0 m/s the lowest; 599 flights>"
     assert wind_lines(partly)[1].endswith("(the lowest; 6.5 to 7.5 m/s at 95 %), 9.0 m/s from 180°")
 
 
@@ -187,14 +185,14 @@ def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> No
     """Of 4 flights none that flies shows P < 0.9 (at most 0.49 at 95 %), one of which fails does not."""
     settled = tuple((k, 5.0, True) for k in range(4) for _ in range(MIN_FLIGHTS_PER_DIRECTION))
     narrow = tuple(WindBoundary(5.0, 4.9, 5.1, False) for _ in range(4))
-    assert winds_answer(FOUND) == "not judged"
+    assert FOUND.answer == "not judged"
     judged = replace(FOUND, flights=settled, boundaries=narrow)
-    assert winds_answer(judged) == "judged"
-    assert winds_answer(replace(judged, flights=settled[1:])) == "not judged in full"
+    assert judged.answer == "judged"
+    assert replace(judged, flights=settled[1:]).answer == "not judged in full"
     for failed, answer in ((4, "not flyable"), (1, "not judged"), (0, "not judged")):
-        assert winds_answer(replace(FOUND, calm=CalmFailures(0.0, 4, failed, ()))) == answer
+        assert replace(FOUND, calm=CalmFailures(0.0, 4, failed, ())).answer == answer
     # A boundary of 0 m/s whose interval is narrow, from 150 flights, is an answer, too.
-    assert winds_answer(replace(judged, calm=CalmFailures(0.0, 4, 1, ()))) == "not flyable"
+    assert replace(judged, calm=CalmFailures(0.0, 4, 1, ())).answer == "not flyable"
 
 
 def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, tmp_path: Path) -> None:
@@ -239,7 +237,9 @@ def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert wind_lines(fewer)[0].startswith("not judged: 1 of 1 direction has too few flights")
     flights = (*settled.flights, *((1, *flight[1:]) for flight in settled.flights))
     wide = replace(settled, boundaries=(boundary, WindBoundary(7.0, 6.5, 7.5, False)), flights=flights)
-    assert unsettled_reasons(wide) == ["", "an interval of 1.00 m/s; at most 0.5 m/s is required"]
+    assert wide.reasons == ("", "an interval of 1.00 m/s; at most 0.5 m/s is required")
+    assert (wide.judged, wide.answer) == ((True, False), "not judged in full")
+    assert repr(wide) == "<WindsResult 2 directions, 1 of them not judged, 7.0 m/s the lowest; 300 flights>"
     assert wind_lines(wide)[0].startswith("not judged in full: 1 of 2 directions has too few flights")
 
 

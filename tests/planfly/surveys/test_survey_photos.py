@@ -94,6 +94,8 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     assert front.endswith("75 % required: that needs photos at most 29 m apart there")
     assert side.endswith("65 % required: that needs lines at most 62 m apart there")
     assert pixels == "ground sampling distance 2.9 to 3.9 cm per pixel (120 m to 160 m above ground)"
+    lost = OverlapMeasure(CAMERA, **photos, **sides, unusable_fraction=0.042)  # type: ignore[arg-type]
+    assert overlap_lines(lost)[2] == "overlap not judged on 4 % of the lines' length, where no photo can be used"
     unknown = Camera(CAMERA.across, CAMERA.along, 0.3, 0.2)
     assert not any("sampling" in text for text in overlap_lines(OverlapMeasure(unknown, **photos)))  # type: ignore[arg-type]
 

@@ -111,6 +111,18 @@ def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did()
     assert "length" in told
 
 
+def test_an_end_with_a_loiter_makes_the_last_waypoint_one() -> None:
+    context, judged = judged_mission()
+    last = max(k for k, item in enumerate(judged.mission.items) if item.command == 16)
+    end = Place("waypoint", judged.setup.route.items.tolist().index(judged.mission.items[last].seq))
+    finding = make_finding("return", end, ok=False, reason="")
+    changed = apply_suggestion(context, judged, finding, (Change("end loiter", end, None, 17.0, ""),))
+    assert changed.items[last] == replace(judged.mission.items[last], command=17, params=(0.0,) * 4)
+    assert [item for k, item in enumerate(changed.items) if k != last] == [
+        item for k, item in enumerate(judged.mission.items) if k != last
+    ]
+
+
 def test_raises_of_neighbouring_legs_combine_by_the_larger() -> None:
     """Item 3 ends leg 1, which needs 30 m, and begins leg 2, which needs 50 m."""
     context, judged = judged_mission()

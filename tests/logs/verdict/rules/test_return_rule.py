@@ -242,6 +242,10 @@ def test_the_return_after_the_last_item_counts_as_an_items(
         assert [item.ok for item in found] == ([] if ok is None else [ok])
         assert verdict.flyable is not (ok is False), verdict.lines
         assert ok is not False or "the return after the last item hits the ground" in verdict.headline
+        # A loiter by time has a time, which a loiter without end could not keep.
+        is_mended = ok is False and lines == BEHIND_THE_HILL
+        offered = [change.what for item in found for one in item.suggestions for change in one]
+        assert offered == (["end loiter"] if is_mended else [])
 
 
 def test_the_return_of_a_mission_without_home_is_not_judged_and_the_first_line_says_so() -> None:

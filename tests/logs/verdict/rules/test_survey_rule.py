@@ -18,6 +18,9 @@ from flight.mission.route import RouteRules, make_route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.photo_lines import measure_overlap
+from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import failing, judge
 from tests.mission_lines import ORIGIN, setup_of, wp
@@ -299,10 +302,14 @@ def test_a_camera_takes_its_time(interval: float, front: float, ok: bool) -> Non
 def test_only_photos_that_can_be_used_overlap() -> None:
     """What is flown 80 m beside its line is lost, and was said to be: nothing is asked of the lines beside it."""
     setup = photographed()
-    side = overlaps(
-        judge(setup, fly_path(setup, radius=FITS, across=lambda s: np.where(s < LEAD + 0.5 * LENGTH, -80.0, 0.0)))
-    )
-    assert side["side overlap"].flown == pytest.approx(60.0, abs=0.3)
+    track = fly_path(setup, radius=FITS, across=lambda s: np.where(s < LEAD + 0.5 * LENGTH, -80.0, 0.0))
+    assert overlaps(judge(setup, track))["side overlap"].flown == pytest.approx(60.0, abs=0.3)
+    # Half of one of three lines.
+    requirements = route_requirements(setup)
+    (survey,) = judged_surveys(setup)
+    measure = measure_overlap(requirements, align_track(requirements, track), survey)
+    assert measure is not None
+    assert measure.unusable_fraction == pytest.approx(0.5 / 3.0, abs=0.01)
 
 
 def test_a_lost_line_is_not_compared() -> None:
