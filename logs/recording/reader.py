@@ -47,7 +47,7 @@ from logs.recording.state_channel import (
     state_class,
 )
 from logs.verdict.places import ReferenceFlights
-from logs.verdict.reference_flights import parse_reference_flights
+from logs.verdict.reference_attachment import parse_reference_flights
 from world.argument_types import checks_types
 from world.errors import LogError
 from world.files import missing_text

@@ -52,7 +52,7 @@ from logs.recording.state_channel import (
 )
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.places import ReferenceFlights
-from logs.verdict.reference_flights import reference_flights_json
+from logs.verdict.reference_attachment import reference_flights_json
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict, verdict_json
 from world.arrays import Ints

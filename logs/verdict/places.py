@@ -14,7 +14,7 @@ from world.json_schema import DocumentConfig
 # and "inclusion" are zones of airspace.
 PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"]
 
-# Quantity of a change.
+# Kind of a change: the quantity that it changes.
 # - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn",
 #   "radius" that a loiter's item states, "home altitude", "altitude frame" of the items below ground, "end loiter"
 #   instead of the last waypoint, "launch course" of the scenario.
@@ -24,7 +24,7 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 # - Changes by a factor: "battery" or "tank".
 # - Knowledge about the aircraft instead of changes of the plan: duration of a flight at "full throttle" or with "no
 #   throttle" that measures its ability, and a "stated climb" or a "stated bank" that the user should state.
-Quantity = Literal[
+ChangeKind = Literal[
     "length",
     "rise",
     "airspeed",
@@ -114,7 +114,7 @@ class RemainingFinding(DocumentConfig):
 class Change(DocumentConfig):
     """One change of the plan."""
 
-    what: Quantity
+    what: ChangeKind
     place: Place
     current: float | None
     """Current value; null if wanted is a step or a factor, or if the current value does not matter."""

@@ -91,19 +91,19 @@ class Presentation:
         """The findings that leave the verdict undecided."""
         return undecided_findings(self.findings)
 
-    def findings_to_list(self, max_open: int) -> list[tuple[int, Finding]]:
+    def findings_to_list(self, max_failed_and_undecided: int) -> list[tuple[int, Finding]]:
         """Return the findings to show in a short list, each with its index in `findings`.
 
         These are failed and undecided findings, then for each rule the passed finding closest to its limit.
 
-        max_open: maximum number of failed and undecided findings.
+        max_failed_and_undecided: maximum number of failed and undecided findings.
         """
-        is_open = {id(finding) for finding in self.undecided}
+        undecided = {id(finding) for finding in self.undecided}
         closest = {id(rule.closest) for rule in self.rules}
         numbered = list(enumerate(self.findings))
-        open_findings = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in is_open]
+        listed_findings = [(k, finding) for k, finding in numbered if finding.ok is False or id(finding) in undecided]
         closest_findings = [(k, finding) for k, finding in numbered if finding.ok is True and id(finding) in closest]
-        return [*open_findings[:max_open], *closest_findings]
+        return [*listed_findings[:max_failed_and_undecided], *closest_findings]
 
 
 def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:

@@ -33,7 +33,7 @@ from logs.verdict.measures.route_requirements import (
 )
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
-from logs.verdict.places import FLIGHT, MISSION, Change, Quantity, Suggestion
+from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Suggestion
 from logs.verdict.tolerances import (
     CALM_WIND_MPS,
     HOME_ERROR_M,
@@ -61,14 +61,14 @@ from world.terrain import Terrain
 # Shift of a path past a zone: the smallest shift of its legs that ends the violation.
 
 # Horizontal shifts of a path: name, coordinate, and sign of the shift.
-_HORIZONTAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (
+_HORIZONTAL_SHIFTS: tuple[tuple[ChangeKind, str, float], ...] = (
     ("north", "north", 1.0),
     ("east", "east", 1.0),
     ("south", "north", -1.0),
     ("west", "east", -1.0),
 )
 # Vertical shifts of a path, in the same form.
-_VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
+_VERTICAL_SHIFTS: tuple[tuple[ChangeKind, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
 def suggest_passing_zone(
@@ -166,7 +166,7 @@ def suggest_gentler_slope(
     if leg is None:
         return ()
     if finding.check == UNKNOWN_AIRCRAFT:
-        quantity: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
+        quantity: ChangeKind = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
         flight = (Change(quantity, finding.place, None, MIN_EVIDENCE_FLIGHT_S, "s"),)
         if quantity == "no throttle" or not requirements.setup.envelope.climb_guessed:
             return (flight,)
@@ -562,7 +562,7 @@ def suggest_using_less_energy(
     ratio = energy / finding.limit * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     if ratio <= 1.0:
         return ()
-    storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
+    storage: ChangeKind = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
     larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")
     # Shortened by 100 %, nothing would be left of the flight.

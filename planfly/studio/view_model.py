@@ -150,7 +150,7 @@ def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
         "path": _leg_paths(path.points, path.legs, 0, setup.route.legs),
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
-        "verdict": verdict_json(verdict),
+        "verdict": verdict_page_data(verdict),
         "findings": findings_json(verdict, ()),
         "profile": profile_json(context.scenario, setup),
         "total": {
@@ -269,7 +269,7 @@ def _state_pair(state: State) -> list[str]:
 # Data of the verdict.
 
 
-def verdict_json(verdict: Verdict) -> Json:
+def verdict_page_data(verdict: Verdict) -> Json:
     """Return page data of a verdict: state, answer, headline, lines, level and count of failures.
 
     The answer is that of the headline, as `planfly check` prints it, also for a flight that ended early.

@@ -22,7 +22,7 @@ from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.studio.changes import flight_results
 from planfly.studio.edit_context import EditContext
 from planfly.studio.states import place_states
-from planfly.studio.view_model import findings_json, round_to_json, states_json, verdict_json
+from planfly.studio.view_model import findings_json, round_to_json, states_json, verdict_page_data
 from planfly.studio.worker_process import Advance
 from planfly.workflow.airframe import Airframe
 from planfly.workflow.apply_suggestion import can_apply
@@ -57,7 +57,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     states = place_states(flight.requirements, flight.verdict.findings)
     seconds = round(float(flight.track.time[-1]), 1) if len(flight.track) else 0.0
     return {
-        "verdict": verdict_json(flight.verdict),
+        "verdict": verdict_page_data(flight.verdict),
         "findings": findings_json(flight.verdict, ()),
         "judged": pickle.dumps(judged_mission) if flight.verdict.failed else b"",
         "states": states_json(states, 0, setup.route.legs),

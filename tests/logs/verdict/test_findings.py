@@ -29,7 +29,7 @@ from logs.verdict.places import (
     Place,
     ReferenceFlights,
 )
-from logs.verdict.reference_flights import parse_reference_flights, reference_flights_json
+from logs.verdict.reference_attachment import parse_reference_flights, reference_flights_json
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import place_text, suggestions_text
