@@ -82,7 +82,7 @@ def test_every_rendering_shows_the_same_failures_in_the_same_order() -> None:
     cells = [[cell.text or "" for cell in row] for row in page.find("table/tbody") or ()]
     assert ["clearance", "1 of 3 ok", "", ""] in cells
     assert [row.counts for row in rule_rows(FINDINGS) if row.rule == "clearance"] == ["2 of 3 fail"]
-    listed = [(row["number"], row["ok"]) for row in findings_json(VERDICT) if row["kind"] == "leg"]
+    listed = [(row["number"], row["ok"]) for row in findings_json(VERDICT, ()) if row["kind"] == "leg"]
     assert listed == [(0, None), (1, False), (2, False), (3, False), (6, True)]
     suite = ElementTree.fromstring(VERDICT.to_junit("m"))[0]
     # Four findings failed, and the verdict.
