@@ -23,6 +23,7 @@ from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.shortening import MAX_MODELS, shorten_path
+from planner.seeding.side_routes import closest_places
 from planner.seeding.waypoint_fitting import move_all_waypoints
 from world.arrays import Flags, Floats, Ints
 from world.errors import ScenarioError
@@ -158,6 +159,7 @@ class Search:
     certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
+    narrow_places: places (3,) where shortened paths remain too close to missiles, deepest first for each path.
     budget_exhausted: True if the budget is too small for another shortening.
     is_closed: True if it is proven that no safe path exists.
     grace: remaining pauses of a search without a result, once it is asked to stop.
@@ -180,6 +182,7 @@ class Search:
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
+    narrow_places: list[Floats] = field(default_factory=list)
     budget_exhausted: bool = False
     is_closed: bool = False
     grace: int = GRACE_PAUSES
@@ -295,7 +298,7 @@ class Search:
         for extra_margin, corners_too, slope_margin in attempts:
             path = first if corners_too else path
             if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
-                return False
+                break
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
@@ -314,7 +317,8 @@ class Search:
                     self.improved(path)
                 return True
             if certificate.kill_distance < -MAX_SHORTENING_DEPTH_M:
-                return False
+                break
+        self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return False
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:

@@ -28,7 +28,7 @@ from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
 from planner.seeding.shortening import resample, shorten_path
-from planner.seeding.side_routes import optimistic_grid, side_routes
+from planner.seeding.side_routes import close_places, optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
 from world.arrays import Floats
 from world.geometry import path_length
@@ -159,6 +159,8 @@ CEILING_DEPTHS_M = (15.0, 40.0)
 SAME_PATH_DISTANCE_M = 20.0
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
+# Maximum number of times that a grid proposes routes, each time with more places closed.
+MAX_PROPOSALS = 4
 # Maximum cost of a route relative to the best path. With few courses, grid routes are some percent too long.
 MAX_COST_RATIO = 1.08
 # Maximum cost of a route relative to the straight line if no path is safe.
@@ -189,20 +191,48 @@ def search_other_sides(search: Search) -> None:
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3)."""
+    """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3).
+
+    Places where a shortened path remains too close to a missile are closed, and the grid proposes routes again.
+    """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
-        bound = straight_length * (MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO)
-        for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
-            if search.must_end():
-                return tried_paths
-            tried_paths.append(resample(frame.to_world(route.points), encoding.waypoints))
-            search.shorten(tried_paths[-1])
+        step = frame.length / grid.stages
+        for _ in range(MAX_PROPOSALS):
+            closed = places_apart(search.narrow_places, step)
+            bound = straight_length * (
+                MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO
+            )
+            closed_data = close_places(data, closed, (1.0 + shrink) * step - data.kill_margin)
+            for route in side_routes(closed_data, frame, grid, bound, MAX_ROUTES, search.pause):
+                path = resample(frame.to_world(route.points), encoding.waypoints)
+                if any(is_same_path(path, tried_path) for tried_path in tried_paths):
+                    continue
+                if search.must_end():
+                    return tried_paths
+                tried_paths.append(path)
+                search.shorten(path)
+            if len(places_apart(search.narrow_places, step)) == len(closed):
+                break
     return tried_paths
+
+
+def is_same_path(path: Floats, other: Floats) -> bool:
+    """Return True if two paths (w, 3) are so close on average that only one of them is tried."""
+    return bool(np.sqrt(((path - other) ** 2).sum(axis=1)).mean() <= SAME_PATH_DISTANCE_M)
+
+
+def places_apart(places: list[Floats], distance: float) -> Floats:
+    """Return those places (k, 3) that are not within a distance (m) of earlier ones."""
+    apart: list[Floats] = []
+    for place in places:
+        if all(math.dist(place, other) > distance for other in apart):
+            apart.append(place)
+    return np.array(apart).reshape(-1, 3)
 
 
 def _try_ceiling_routes(search: Search) -> list[Floats]:
@@ -220,9 +250,7 @@ def _try_ceiling_routes(search: Search) -> list[Floats]:
         if not len(route):
             continue
         path = resample(route, search.encoding.waypoints)
-        if all(
-            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE_M for tried_path in tried_paths
-        ):
+        if not any(is_same_path(path, tried_path) for tried_path in tried_paths):
             tried_paths.append(path)
             search.shorten(path)
     return tried_paths
