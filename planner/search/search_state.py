@@ -81,8 +81,8 @@ CORNER_MARGINS_M = (2.0, 5.0)
 # Additional margins of slopes, rad, of last attempts with a path that fails only by its slopes: if a leg climbs at the
 # limit, shortening ends some hundredths of a degree beyond it.
 SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
-# Depth inside a missile's sphere, m, beyond which a shortened path is not tried with other margins.
-MAX_SHORTENING_DEPTH_M = 15.0
+# Distance, m, that a shortened path may lack to missiles to be tried with other margins, which add at most as much.
+MAX_MISSING_DISTANCE_M = max(*EXTRA_MARGINS_M, *CORNER_MARGINS_M)
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
@@ -316,7 +316,7 @@ class Search:
                 if self.improved is not None:
                     self.improved(path)
                 return True
-            if certificate.kill_distance < -MAX_SHORTENING_DEPTH_M:
+            if certificate.kill_distance < self.required_distance - MAX_MISSING_DISTANCE_M:
                 break
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return False

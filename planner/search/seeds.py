@@ -196,7 +196,7 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     Places where a shortened path remains too close to a missile are closed, and the grid proposes routes again.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
-    frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
+    frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
@@ -204,11 +204,12 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
         step = frame.length / grid.stages
         for _ in range(MAX_PROPOSALS):
             closed = places_apart(search.narrow_places, step)
-            bound = straight_length * (
-                MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO
-            )
-            closed_data = close_places(data, closed, (1.0 + shrink) * step - data.kill_margin)
+            bound = _max_route_cost(search)
+            radius = (1.0 + shrink) * step - data.kill_margin
+            closed_data = close_places(data, closed, radius) if len(closed) else data
             for route in side_routes(closed_data, frame, grid, bound, MAX_ROUTES, search.pause):
+                if route.cost > _max_route_cost(search):
+                    break
                 path = resample(frame.to_world(route.points), encoding.waypoints)
                 if any(is_same_path(path, tried_path) for tried_path in tried_paths):
                     continue
@@ -219,6 +220,12 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
             if len(places_apart(search.narrow_places, step)) == len(closed):
                 break
     return tried_paths
+
+
+def _max_route_cost(search: Search) -> float:
+    """Return the cost, m, above which no route of a grid is followed."""
+    ratio = MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO
+    return ratio * math.dist(search.problem.space.start, search.problem.space.destination)
 
 
 def is_same_path(path: Floats, other: Floats) -> bool:
