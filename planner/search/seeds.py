@@ -22,6 +22,7 @@ from planner.evaluation.encoding import (
     route_encoding,
     sample_route,
 )
+from planner.evaluation.problem import ProblemArrays
 from planner.plan import Certificate
 from planner.search.search_state import Search, SearchEnded, are_safe, best_first, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
@@ -143,11 +144,12 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
 # Size of the area of highest ground, as a fraction of a step.
 GROUND_SPREAD_STEPS = 0.2
 # Grids: number of stages, reduction of the spheres, and spacing across as a fraction of a step. A route runs at up to
-# 63 degrees to the direct line on the first grid: a smaller angle would block paths near the ends.
-GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
+# 63 degrees to the direct line: a smaller angle would block paths near the ends. The most optimistic grid comes first:
+# the later one is closed where shortening has found its routes' gaps too narrow.
+GRIDS = ((50, 0.5, 2.0 / 3.0), (50, 0.2, 2.0 / 3.0))
 # Finer grids, with steeper and with more courses, used if no path is safe or the best path is long, as there is much to
 # gain.
-FINER_GRIDS = ((80, 0.3, 0.5), (80, 0.7, 1.0))
+FINER_GRIDS = ((80, 0.7, 1.0), (80, 0.3, 0.5))
 # Excess over the straight line above which a path is long, as a fraction.
 LONG_PATH_EXCESS_FRACTION = 0.06
 # Steps of routes at the altitude of the ceiling, m; they are tried together with the finer grids, as they may turn
@@ -159,8 +161,6 @@ CEILING_DEPTHS_M = (15.0, 40.0)
 SAME_PATH_DISTANCE_M = 20.0
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
-# Maximum number of times that a grid proposes routes, each time with more places closed.
-MAX_PROPOSALS = 4
 # Maximum cost of a route relative to the best path. With few courses, grid routes are some percent too long.
 MAX_COST_RATIO = 1.08
 # Maximum cost of a route relative to the straight line if no path is safe.
@@ -193,7 +193,7 @@ def search_other_sides(search: Search) -> None:
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
     """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3).
 
-    Places where a shortened path remains too close to a missile are closed, and the grid proposes routes again.
+    Later grids are closed at the places where a shortened path has remained too close to a missile.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame = rotated_frame(space.start, space.destination)
@@ -201,24 +201,14 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
-        step = frame.length / grid.stages
-        for _ in range(MAX_PROPOSALS):
-            closed = places_apart(search.narrow_places, step)
-            bound = _max_route_cost(search)
-            radius = (1.0 + shrink) * step - data.kill_margin
-            closed_data = close_places(data, closed, radius) if len(closed) else data
-            for route in side_routes(closed_data, frame, grid, bound, MAX_ROUTES, search.pause):
-                if route.cost > _max_route_cost(search):
-                    break
-                path = resample(frame.to_world(route.points), encoding.waypoints)
-                if any(is_same_path(path, tried_path) for tried_path in tried_paths):
-                    continue
-                if search.must_end():
-                    return tried_paths
-                tried_paths.append(path)
-                search.shorten(path)
-            if len(places_apart(search.narrow_places, step)) == len(closed):
+        closed_data = _close_narrow_places(search, frame.length / grid.stages, shrink)
+        for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.pause):
+            if route.cost > _max_route_cost(search):
                 break
+            if search.must_end():
+                return tried_paths
+            tried_paths.append(resample(frame.to_world(route.points), encoding.waypoints))
+            search.shorten(tried_paths[-1])
     return tried_paths
 
 
@@ -228,18 +218,17 @@ def _max_route_cost(search: Search) -> float:
     return ratio * math.dist(search.problem.space.start, search.problem.space.destination)
 
 
-def is_same_path(path: Floats, other: Floats) -> bool:
-    """Return True if two paths (w, 3) are so close on average that only one of them is tried."""
-    return bool(np.sqrt(((path - other) ** 2).sum(axis=1)).mean() <= SAME_PATH_DISTANCE_M)
+def _close_narrow_places(search: Search, step: float, shrink: float) -> ProblemArrays:
+    """Return the data of a search with its narrow places closed to the routes of a grid.
 
-
-def places_apart(places: list[Floats], distance: float) -> Floats:
-    """Return those places (k, 3) that are not within a distance (m) of earlier ones."""
-    apart: list[Floats] = []
-    for place in places:
-        if all(math.dist(place, other) > distance for other in apart):
-            apart.append(place)
-    return np.array(apart).reshape(-1, 3)
+    step: step of the grid, m; a closed sphere has this radius, so that no route steps over it.
+    shrink: reduction of the spheres of the grid.
+    """
+    data, places = search.problem.search, list[Floats]()
+    for place in search.narrow_places:
+        if all(math.dist(place, other) > step for other in places):
+            places.append(place)
+    return close_places(data, np.array(places), (1.0 + shrink) * step - data.kill_margin) if places else data
 
 
 def _try_ceiling_routes(search: Search) -> list[Floats]:
@@ -257,7 +246,9 @@ def _try_ceiling_routes(search: Search) -> list[Floats]:
         if not len(route):
             continue
         path = resample(route, search.encoding.waypoints)
-        if not any(is_same_path(path, tried_path) for tried_path in tried_paths):
+        if all(
+            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE_M for tried_path in tried_paths
+        ):
             tried_paths.append(path)
             search.shorten(path)
     return tried_paths
