@@ -159,6 +159,8 @@ class Search:
     certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
+    furthest_short: the certified path (w, 3) from shortening that is furthest from missiles among those outside all
+    spheres but closer than the goal allows, and its certificate.
     narrow_places: places (3,) where shortened paths remain too close to missiles, deepest first for each path.
     budget_exhausted: True if the budget is too small for another shortening.
     is_closed: True if it is proven that no safe path exists.
@@ -183,6 +185,7 @@ class Search:
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
     narrow_places: list[Floats] = field(default_factory=list)
+    furthest_short: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
     grace: int = GRACE_PAUSES
@@ -316,6 +319,9 @@ class Search:
                 if self.improved is not None:
                     self.improved(path)
                 return True
+            least_distance = 0.0 if self.furthest_short is None else self.furthest_short[1].kill_distance
+            if certificate.ok and certificate.kill_distance > least_distance:
+                self.furthest_short = path, certificate
             if certificate.kill_distance < self.required_distance - MAX_MISSING_DISTANCE_M:
                 break
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
@@ -427,9 +433,13 @@ class Search:
     def best_path(self) -> tuple[Floats, Certificate]:
         """Return the better of the archive's best path and the shortened path, with its certificate.
 
-        The shortened path is better if it is shorter, or the only one that meets the goal.
+        The shortened path is better if it is shorter, or the only one that meets the goal. If no path meets the goal,
+        the path furthest from missiles is the best.
         """
         path, certificate = self.best_certified()
+        if self.shortest is None and self.furthest_short is not None and not self.meets_goal(certificate):
+            is_further = self.furthest_short[1].kill_distance > certificate.kill_distance
+            return self.furthest_short if is_further or not certificate.ok else (path, certificate)
         if self.shortest is None or (
             self.meets_goal(certificate) and path_length(path) <= path_length(self.shortest[0])
         ):
