@@ -219,6 +219,17 @@ def test_a_gap_that_is_too_narrow_turns_the_routes_of_the_next_grid_to_other_sid
     assert plan.objectives[0] < ratio
 
 
+def test_a_plan_that_cannot_keep_its_distance_is_the_furthest_shortened_path(
+    make_limits: Callable[[Scenario], Limits],
+) -> None:
+    """All gaps are narrower than two margins of 10 m; before, 1.273 and 5.9 m were planned."""
+    scenario = wild_scenario(200039, "planfly")
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.safe, plan.certificate.problems
+    assert 8.0 < plan.certificate.kill_distance < CERTIFIED_KILL_MARGIN_M
+    assert plan.objectives[0] < 1.21
+
+
 def test_a_path_that_is_hopelessly_inside_a_missile_is_shortened_once(
     small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
 ) -> None:
