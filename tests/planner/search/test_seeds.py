@@ -211,7 +211,7 @@ def test_a_gap_that_is_too_narrow_turns_the_routes_of_the_next_grid_to_other_sid
 ) -> None:
     """The cheapest routes pass gaps that no path can keep its distance in; the best paths pass on other sides.
 
-    A reference that looks at hundreds of sides finds 1.135 and 1.183; with such gaps open, 1.151 and 1.176 were planned.
+    A reference that looks at hundreds of sides finds 1.135 and 1.183; with these gaps open, 1.151 and 1.176 were found.
     """
     scenario = wild_scenario(number, "planfly")
     plan = plan_path(scenario, make_limits(scenario), seed=1)
