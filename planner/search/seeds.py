@@ -201,7 +201,8 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
-        closed_data = _close_narrow_places(search, frame.length / grid.stages, shrink)
+        step = frame.length / grid.stages
+        closed_data = _close_narrow_places(search, step, (1.0 + shrink) * step - data.kill_margin)
         for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.pause):
             if route.cost > _max_route_cost(search):
                 break
@@ -218,30 +219,31 @@ def _max_route_cost(search: Search) -> float:
     return ratio * math.dist(search.problem.space.start, search.problem.space.destination)
 
 
-def _close_narrow_places(search: Search, step: float, shrink: float) -> ProblemArrays:
-    """Return the data of a search with its narrow places closed to the routes of a grid.
+def _close_narrow_places(search: Search, step: float, kill_radius: float) -> ProblemArrays:
+    """Return the data of a search with its narrow places closed to the routes of a grid or lattice.
 
-    step: step of the grid, m; a closed sphere has this radius, so that no route steps over it.
-    shrink: reduction of the spheres of the grid.
+    step: its step, m; places within a step of another are not closed again.
+    kill_radius: radius of a closed sphere, m, with which routes avoid it by a step, so that none steps over it.
     """
     data, places = search.problem.search, list[Floats]()
     for place in search.narrow_places:
         if all(math.dist(place, other) > step for other in places):
             places.append(place)
-    return close_places(data, np.array(places), (1.0 + shrink) * step - data.kill_margin) if places else data
+    return close_places(data, np.array(places), kill_radius) if places else data
 
 
 def _try_ceiling_routes(search: Search) -> list[Floats]:
     """Shorten routes at the altitude of the ceiling; return the routes as paths (w, 3).
 
-    There is one route for each step and depth.
+    There is one route for each step and depth; it keeps off places where a shortened path has remained too close to a
+    missile.
     """
-    data, space = search.problem.search, search.problem.space
-    frame = rotated_frame(space.start, space.destination)
+    frame = rotated_frame(search.problem.space.start, search.problem.space.destination)
     tried_paths: list[Floats] = []
     for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS_M):
         if search.must_end():
             break
+        data = _close_narrow_places(search, step, step + depth)
         route = ceiling_route(data, frame, step, depth, search.pause)
         if not len(route):
             continue

@@ -13,6 +13,7 @@ import numpy as np
 
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.problem import ProblemArrays, required_clearance
+from planner.evaluation.threat_index import make_missile_index
 from planner.seeding.grids import (
     MAX_SIDE,
     ROUTE_CELL,
@@ -387,14 +388,14 @@ def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats
 
 
 def close_places(data: ProblemArrays, places: Floats, radius: float) -> ProblemArrays:
-    """Return data in which missile spheres of a radius (m) around places (k, 3) close them to the routes of a grid."""
+    """Return data in which missile spheres of a radius (m) around places (k, 3) close them to grids and lattices."""
     closed = np.zeros(len(places), dtype=data.threats.dtype)
     closed["east"], closed["north"], closed["up"] = places.T
-    closed["kill_radius"] = radius
+    closed["kill_radius"] = closed["kill_scale"] = radius
     threats = np.concatenate([data.threats, closed])
     # Locked like a scenario's threats, because to compiled code an unlocked array has another type.
     threats.setflags(write=False)
-    return data._replace(threats=threats)
+    return data._replace(threats=threats, missiles=make_missile_index(threats))
 
 
 def optimistic_grid(

@@ -219,6 +219,16 @@ def test_a_gap_that_is_too_narrow_turns_the_routes_of_the_next_grid_to_other_sid
     assert plan.objectives[0] < ratio
 
 
+def test_a_gap_that_is_too_narrow_turns_routes_at_the_ceiling_to_other_sides(
+    make_limits: Callable[[Scenario], Limits],
+) -> None:
+    """A reference that looks at hundreds of sides finds 1.473; with such gaps open, nothing was found."""
+    scenario = wild_scenario(200328, "planfly")
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.certificate.kill_distance >= CERTIFIED_KILL_MARGIN_M
+    assert plan.objectives[0] < 1.473
+
+
 def test_a_plan_that_cannot_keep_its_distance_is_the_furthest_shortened_path(
     make_limits: Callable[[Scenario], Limits],
 ) -> None:
