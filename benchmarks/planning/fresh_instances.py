@@ -36,7 +36,7 @@ KEPT = Path("runs") / "fresh-instances.json"
 THREATS = 60
 FAMILIES = ("passable", "drawn", "wild")
 # Excess over the best known length above which a path is long, as a fraction.
-LONG = 0.02
+LONG = 0.01
 # CPU time above which a run is slow, s.
 SLOW = 1.0
 

@@ -1,5 +1,7 @@
 """Find reference paths of fresh instances: screen all sides of a fine lattice, and polish the best paths.
 
+Like the planner, the reference keeps the certificate's distance from missiles wherever any of its paths does.
+
 `benchmarks.planning.lattice_search.lattice_routes` proposes hundreds of combinations of sides of the missiles
 (the planner: some 15), without a frame, without stages and with all heights; then the paths found are cut and joined
 with each other.  Each is shortened in a millisecond or two, by the planner's own shortening but with the
@@ -15,6 +17,7 @@ import numpy as np
 from benchmarks.planning.lattice_search import lattice_routes
 from benchmarks.planning.smooth_search import Programme
 from benchmarks.task import Task, is_safe
+from planner.evaluation.certify import required_kill_distance
 from planner.evaluation.problem import SEARCH_KILL_MARGIN_M
 from planner.seeding.shortening import resample, shorten_path
 from world.arrays import Floats
@@ -38,13 +41,26 @@ NEAR = 300.0
 
 
 def reference_search(task: Task) -> tuple[float, Floats | None]:
-    """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one."""
+    """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one.
+
+    Paths closer to missiles than the planner's goal allows count only if all paths are.
+    """
     task = _with_least_margins(task)
-    pool = [found for route in lattice_routes(task, WAYS) if (found := _screened(task, route)) is not None]
+    routes, best = lattice_routes(task, WAYS), (math.inf, None)
+    for kill_distance in (required_kill_distance(task.problem), 0.0):
+        best = best if best[1] is not None else _best_of_routes(task, routes, kill_distance)
+    return best
+
+
+def _best_of_routes(task: Task, routes: list[Floats], kill_distance: float) -> tuple[float, Floats | None]:
+    """Return length ratio and waypoints of the best path near routes that keeps a distance from missiles, m."""
+    pool = [found for route in routes if (found := _screened(task, route, kill_distance)) is not None]
     for _ in range(ROUNDS):
         pool = _distinct(pool)[:POOL]
         joined = [
-            found for route in _joined([path for _, path in pool]) if (found := _screened(task, route)) is not None
+            found
+            for route in _joined([path for _, path in pool])
+            if (found := _screened(task, route, kill_distance)) is not None
         ]
         if not joined or min(joined, key=lambda item: item[0])[0] >= pool[0][0]:
             break
@@ -58,7 +74,7 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
     for _, path in pool[:POLISHED]:
         shorter = programme.shortened(path)
         ratio = task.length_ratio(shorter)
-        if ratio < best[0] and is_safe(task.certificate(shorter)):
+        if ratio < best[0] and _is_certified(task, shorter, kill_distance):
             best = ratio, shorter
     return best
 
@@ -77,16 +93,25 @@ def _with_least_margins(task: Task) -> Task:
     return replace(task, problem=replace(problem, search=tight))
 
 
-def _screened(task: Task, route: Floats) -> tuple[float, Floats] | None:
-    """Shorten a route (k, 3); return length ratio and waypoints, or None if the result is not safe."""
+def _is_certified(task: Task, path: Floats, kill_distance: float) -> bool:
+    """Return True if a path (w, 3) is safe and keeps a distance from missiles, m."""
+    certificate = task.certificate(path)
+    return is_safe(certificate) and certificate.kill_distance >= kill_distance
+
+
+def _screened(task: Task, route: Floats, kill_distance: float) -> tuple[float, Floats] | None:
+    """Shorten a route (k, 3); return length ratio and waypoints, or None if the result is not certified.
+
+    kill_distance: required distance from missiles, m.
+    """
     for margin in MARGINS:
         path = resample(route, task.encoding.waypoints)
         for _ in range(2):
             path, _ = shorten_path(task.problem.search, path, extra_margin=margin)
-            if is_safe(task.certificate(path)):
+            if _is_certified(task, path, kill_distance):
                 again, _ = shorten_path(task.problem.search, resample(path, len(path)), extra_margin=margin)
-                shorter = task.length_ratio(again) < task.length_ratio(path) and is_safe(task.certificate(again))
-                path = again if shorter else path
+                shorter = task.length_ratio(again) < task.length_ratio(path)
+                path = again if shorter and _is_certified(task, again, kill_distance) else path
                 return task.length_ratio(path), path
     return None
 

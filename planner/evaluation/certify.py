@@ -25,7 +25,7 @@ from planner.evaluation.certify_kernels import (
 )
 from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
-from planner.evaluation.problem import Problem, ProblemArrays
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, Problem, ProblemArrays
 from planner.plan import Certificate, path_digest
 from world.arrays import Floats
 from world.geometry import leg_runs, leg_slopes, turning_angles
@@ -71,6 +71,18 @@ def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
     The distance is inf without missiles.
     """
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
+
+
+def required_kill_distance(problem: Problem) -> float:
+    """Return the distance from missile spheres that a search demands of a path, m.
+
+    It is the certificate's margin, or slightly less than the distance of an end that is closer.
+    """
+    # A path is never further from missile spheres than its own ends.
+    ends = (problem.scenario.start, problem.scenario.destination)
+    return min(
+        CERTIFIED_KILL_MARGIN_M, *(kill_distance(problem.certified, np.stack([end, end])) - 1e-6 for end in ends)
+    )
 
 
 def least_height(data: ProblemArrays, waypoints: Floats) -> float:

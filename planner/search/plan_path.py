@@ -11,10 +11,10 @@ import numpy as np
 
 from aircraft.path_limits import Limits
 from planner.airspace.zone_limits import is_limited
-from planner.evaluation.certify import certify, kill_distance
+from planner.evaluation.certify import certify, required_kill_distance
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, make_problem
+from planner.evaluation.problem import make_problem
 from planner.plan import GIVEN_WAYPOINTS, Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
@@ -101,11 +101,6 @@ def plan_path(
     problem = make_problem(scenario, limits_for(found_algorithm, limits))
     cost = make_objective_cost(scenario, limits, problem)
     encoding = ENCODINGS[found_algorithm.encoding](problem.space, scenario.planner.waypoints)
-    # A path is never further from missile spheres than its own ends.
-    end_distance = min(
-        kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination)
-    )
-    required_distance = min(CERTIFIED_KILL_MARGIN_M, end_distance - 1e-6)
     search = Search(
         problem,
         found_algorithm,
@@ -114,7 +109,7 @@ def plan_path(
         progress,
         stop,
         first_safe,
-        required_distance,
+        required_kill_distance(problem),
         improved,
     )
     waypoints, certificate = search_cheapest_path(search, _search_repeatedly(search, previous), cost)

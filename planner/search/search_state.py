@@ -23,6 +23,7 @@ from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.shortening import MAX_MODELS, shorten_path
+from planner.seeding.side_routes import closest_places
 from planner.seeding.waypoint_fitting import move_all_waypoints
 from world.arrays import Flags, Floats, Ints
 from world.errors import ScenarioError
@@ -80,8 +81,8 @@ CORNER_MARGINS_M = (2.0, 5.0)
 # Additional margins of slopes, rad, of last attempts with a path that fails only by its slopes: if a leg climbs at the
 # limit, shortening ends some hundredths of a degree beyond it.
 SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
-# Depth inside a missile's sphere, m, beyond which a shortened path is not tried with other margins.
-MAX_SHORTENING_DEPTH_M = 15.0
+# Distance, m, that a shortened path may lack to missiles to be tried with other margins, which add at most as much.
+MAX_MISSING_DISTANCE_M = max(*EXTRA_MARGINS_M, *CORNER_MARGINS_M)
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
@@ -158,6 +159,9 @@ class Search:
     certificates: certificates by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
+    furthest_short: the certified path (w, 3) from shortening that is furthest from missiles among those outside all
+    spheres but closer than the goal allows, and its certificate.
+    narrow_places: places (3,) where shortened paths remain too close to missiles, deepest first for each path.
     budget_exhausted: True if the budget is too small for another shortening.
     is_closed: True if it is proven that no safe path exists.
     grace: remaining pauses of a search without a result, once it is asked to stop.
@@ -180,6 +184,8 @@ class Search:
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
+    narrow_places: list[Floats] = field(default_factory=list)
+    furthest_short: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
     grace: int = GRACE_PAUSES
@@ -295,7 +301,7 @@ class Search:
         for extra_margin, corners_too, slope_margin in attempts:
             path = first if corners_too else path
             if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
-                return False
+                break
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
@@ -313,8 +319,12 @@ class Search:
                 if self.improved is not None:
                     self.improved(path)
                 return True
-            if certificate.kill_distance < -MAX_SHORTENING_DEPTH_M:
-                return False
+            least_distance = 0.0 if self.furthest_short is None else self.furthest_short[1].kill_distance
+            if certificate.ok and certificate.kill_distance > least_distance:
+                self.furthest_short = path, certificate
+            if certificate.kill_distance < self.required_distance - MAX_MISSING_DISTANCE_M:
+                break
+        self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
         return False
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:
@@ -423,9 +433,13 @@ class Search:
     def best_path(self) -> tuple[Floats, Certificate]:
         """Return the better of the archive's best path and the shortened path, with its certificate.
 
-        The shortened path is better if it is shorter, or the only one that meets the goal.
+        The shortened path is better if it is shorter, or the only one that meets the goal. If no path meets the goal,
+        the path furthest from missiles is the best.
         """
         path, certificate = self.best_certified()
+        if self.shortest is None and self.furthest_short is not None and not self.meets_goal(certificate):
+            is_further = self.furthest_short[1].kill_distance > certificate.kill_distance
+            return self.furthest_short if is_further or not certificate.ok else (path, certificate)
         if self.shortest is None or (
             self.meets_goal(certificate) and path_length(path) <= path_length(self.shortest[0])
         ):

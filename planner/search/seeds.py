@@ -22,13 +22,14 @@ from planner.evaluation.encoding import (
     route_encoding,
     sample_route,
 )
+from planner.evaluation.problem import ProblemArrays
 from planner.plan import Certificate
 from planner.search.search_state import Search, SearchEnded, are_safe, best_first, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
 from planner.seeding.shortening import resample, shorten_path
-from planner.seeding.side_routes import optimistic_grid, side_routes
+from planner.seeding.side_routes import close_places, optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
 from world.arrays import Floats
 from world.geometry import path_length
@@ -143,11 +144,12 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
 # Size of the area of highest ground, as a fraction of a step.
 GROUND_SPREAD_STEPS = 0.2
 # Grids: number of stages, reduction of the spheres, and spacing across as a fraction of a step. A route runs at up to
-# 63 degrees to the direct line on the first grid: a smaller angle would block paths near the ends.
-GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
+# 63 degrees to the direct line: a smaller angle would block paths near the ends. The most optimistic grid comes first:
+# the later one is closed where shortening has found its routes' gaps too narrow.
+GRIDS = ((50, 0.5, 2.0 / 3.0), (50, 0.2, 2.0 / 3.0))
 # Finer grids, with steeper and with more courses, used if no path is safe or the best path is long, as there is much to
 # gain.
-FINER_GRIDS = ((80, 0.3, 0.5), (80, 0.7, 1.0))
+FINER_GRIDS = ((80, 0.7, 1.0), (80, 0.3, 0.5))
 # Excess over the straight line above which a path is long, as a fraction.
 LONG_PATH_EXCESS_FRACTION = 0.06
 # Steps of routes at the altitude of the ceiling, m; they are tried together with the finer grids, as they may turn
@@ -189,15 +191,21 @@ def search_other_sides(search: Search) -> None:
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3)."""
+    """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3).
+
+    Later grids are closed at the places where a shortened path has remained too close to a missile.
+    """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
-    frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
+    frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
-        bound = straight_length * (MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO)
-        for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
+        step = frame.length / grid.stages
+        closed_data = _close_narrow_places(search, step, (1.0 + shrink) * step - data.kill_margin)
+        for route in side_routes(closed_data, frame, grid, _max_route_cost(search), MAX_ROUTES, search.pause):
+            if route.cost > _max_route_cost(search):
+                break
             if search.must_end():
                 return tried_paths
             tried_paths.append(resample(frame.to_world(route.points), encoding.waypoints))
@@ -205,17 +213,37 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     return tried_paths
 
 
+def _max_route_cost(search: Search) -> float:
+    """Return the cost, m, above which no route of a grid is followed."""
+    ratio = MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO
+    return ratio * math.dist(search.problem.space.start, search.problem.space.destination)
+
+
+def _close_narrow_places(search: Search, step: float, kill_radius: float) -> ProblemArrays:
+    """Return the data of a search with its narrow places closed to the routes of a grid or lattice.
+
+    step: its step, m; places within a step of another are not closed again.
+    kill_radius: radius of a closed sphere, m, with which routes avoid it by a step, so that none steps over it.
+    """
+    data, places = search.problem.search, list[Floats]()
+    for place in search.narrow_places:
+        if all(math.dist(place, other) > step for other in places):
+            places.append(place)
+    return close_places(data, np.array(places), kill_radius) if places else data
+
+
 def _try_ceiling_routes(search: Search) -> list[Floats]:
     """Shorten routes at the altitude of the ceiling; return the routes as paths (w, 3).
 
-    There is one route for each step and depth.
+    There is one route for each step and depth; it keeps off places where a shortened path has remained too close to a
+    missile.
     """
-    data, space = search.problem.search, search.problem.space
-    frame = rotated_frame(space.start, space.destination)
+    frame = rotated_frame(search.problem.space.start, search.problem.space.destination)
     tried_paths: list[Floats] = []
     for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS_M):
         if search.must_end():
             break
+        data = _close_narrow_places(search, step, step + depth)
         route = ceiling_route(data, frame, step, depth, search.pause)
         if not len(route):
             continue

@@ -13,6 +13,7 @@ import numpy as np
 
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.problem import ProblemArrays, required_clearance
+from planner.evaluation.threat_index import make_missile_index
 from planner.seeding.grids import (
     MAX_SIDE,
     ROUTE_CELL,
@@ -367,6 +368,34 @@ def side_routes(
         if len(routes) == max_routes:
             break
     return routes
+
+
+def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats:
+    """Return the points (k, 3) of a path (w, 3) nearest to the missile spheres that it is too close to, deepest first.
+
+    distance: required distance from the spheres, m.
+
+    There is one point per leg and sphere.
+    """
+    threats = data.threats[data.threats["kill_radius"] > 0.0]
+    centres = np.column_stack([threats["east"], threats["north"], threats["up"]])
+    legs, offsets = np.diff(path, axis=0)[:, None], centres - path[:-1, None]
+    fractions = (offsets * legs).sum(axis=2) / np.maximum(1e-9, (legs**2).sum(axis=2))
+    points = path[:-1, None] + np.clip(fractions, 0.0, 1.0)[..., None] * legs
+    distances = np.sqrt(((points - centres) ** 2).sum(axis=2)) - threats["kill_radius"]
+    is_close = distances < distance
+    return np.asarray(points[is_close][np.argsort(distances[is_close], kind="stable")])
+
+
+def close_places(data: ProblemArrays, places: Floats, radius: float) -> ProblemArrays:
+    """Return data in which missile spheres of a radius (m) around places (k, 3) close them to grids and lattices."""
+    closed = np.zeros(len(places), dtype=data.threats.dtype)
+    closed["east"], closed["north"], closed["up"] = places.T
+    closed["kill_radius"] = closed["kill_scale"] = radius
+    threats = np.concatenate([data.threats, closed])
+    # Locked like a scenario's threats, because to compiled code an unlocked array has another type.
+    threats.setflags(write=False)
+    return data._replace(threats=threats, missiles=make_missile_index(threats))
 
 
 def optimistic_grid(

@@ -26,6 +26,8 @@ from planner.seeding.side_routes import (
     RIGHT,
     UNDER,
     cheapest_passings,
+    close_places,
+    closest_places,
     grid_costs,
     optimistic_grid,
     passing_side,
@@ -200,3 +202,31 @@ def test_an_optimistic_grid_sees_spheres_smaller(two_missiles: Problem) -> None:
     assert radius == pytest.approx([700.0 + data.kill_margin - 0.5 * step] * 2)
     costs = [side_routes(data, frame, grid, 2.0 * frame.length, 1)[0].cost for grid in (plain, free)]
     assert costs[1] < costs[0]
+
+
+def test_the_closest_places_of_a_path_are_its_feet_on_spheres_that_are_too_near(two_missiles: Problem) -> None:
+    # Centres at (2000, 60, 400) and (4000, 60, 400), radii of 700 m: level at 400 m and 60 m off both centres for the
+    # first leg, 690 m off the second centre at its foot on the second leg.
+    path = np.array([[0.0, 0.0, 400.0], [3000.0, 0.0, 400.0], [3000.0, -630.0, 400.0], [6000.0, -630.0, 400.0]])
+    places = closest_places(two_missiles.search, path, 10.0)
+    assert places[0] == pytest.approx([2000.0, 0.0, 400.0])
+    assert places[-1] == pytest.approx([4000.0, -630.0, 400.0])
+    assert len(closest_places(two_missiles.search, path, -700.0)) == 0
+    # Deepest first.
+    centres = np.array([[2000.0, 60.0, 400.0], [4000.0, 60.0, 400.0]])
+    depths = np.sqrt(((places[:, None] - centres) ** 2).sum(axis=2)).min(axis=1)
+    assert (np.diff(depths) >= 0.0).all()
+
+
+def test_the_routes_of_a_grid_keep_off_a_closed_place(two_missiles: Problem) -> None:
+    data = two_missiles.search
+    frame = rotated_frame(data.start, data.destination)
+    grid = make_grid(data, frame, SPAN, 36)
+    cheapest = side_routes(data, frame, grid, 2.0 * frame.length, 1)[0].points
+    stage = int(np.argmin(np.abs(cheapest[:, 0] - 2000.0)))
+    place = frame.to_world(cheapest[stage : stage + 1])
+    step = frame.length / 36
+    closed = close_places(data, place, step)
+    assert len(closed.threats) == len(data.threats) + 1
+    other = side_routes(closed, frame, grid, 2.0 * frame.length, 1)[0].points
+    assert math.dist(cheapest[stage], other[stage]) >= step
