@@ -392,6 +392,9 @@ def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
         if stated_aircraft is None:
             # The scenario names it, which the load of its airframe reports.
             return
+        if error.field:
+            # A wrong value in the aircraft's own file.
+            raise
         raise ArgumentError.of_argument("aircraft", name, str(error)) from error
     if airspeed is not None and not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
         allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"

@@ -93,7 +93,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
         allowed = "expected a folder with a name of 1 to 100 printable characters"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
     if folder.suffix == ".toml" or (folder.exists() and not folder.is_dir()):
-        raise PlanflyError(f"{folder}: is a file; expected the folder in which to write the scenario", file=folder)
+        raise PlanflyError(f"{folder}: expected the name of a folder, in which to write the scenario", file=folder)
     file = folder / f"{name}.toml"
     if folder.is_dir():
         check_output_file(file, overwrite)

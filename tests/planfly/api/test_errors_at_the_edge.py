@@ -94,7 +94,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "an airspeed": (
         lambda: planfly.plan("tight", airspeed=59.0),
-        _Known("tight", "flight.airspeed_mps", 59.0, "aerosonde flies "),
+        _Known("", "airspeed", 59.0, "aerosonde flies "),
     ),
     "a spread": (
         lambda: _spread('[mass]\ndistribution = "norm"\nloc = "one"\nsource = "a guess"'),

@@ -75,7 +75,8 @@ def test_an_aircraft_is_a_name_or_a_folder(tmp_path: Path, monkeypatch: pytest.M
     assert apply_options(scenario, FlightOptions(aircraft="c172x")).flight.aircraft == "c172x"
     monkeypatch.chdir(tmp_path)
     # A path is a folder even where it looks like a name.
-    assert apply_options(scenario, FlightOptions(aircraft=Path("c172x"))).flight.aircraft == str(tmp_path / "c172x")
+    with pytest.raises(planfly.ArgumentError, match=str(tmp_path / "c172x")):
+        apply_options(scenario, FlightOptions(aircraft=Path("c172x")))
 
 
 def test_a_value_that_no_scenario_may_have_is_refused() -> None:

@@ -51,7 +51,7 @@ def test_the_answer_counts_returns_by_outcome(mission: str, capsys: pytest.Captu
     returns = answer["returns"]
     assert returns["outcomes"]["ground"] > 0
     assert sum(returns["outcomes"].values()) == returns["returns"]
-    assert returns["line"].startswith(f"of {returns['returns']} returns {returns['outcomes']['ground']} hit the ground")
+    assert returns["line"].startswith(f"all {returns['outcomes']['ground']} returns hit the ground")
 
 
 @pytest.mark.parametrize(

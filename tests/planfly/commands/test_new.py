@@ -186,8 +186,8 @@ def test_what_lies_there_stays(here: Path, capsys: pytest.CaptureFixture[str]) -
     assert (here / "site" / "notes.txt").read_text(encoding="ascii") == "mine"
     for folder, said in (
         ("site", "site/site.toml: exists; --overwrite replaces it"),
-        ("site/notes.txt", "site/notes.txt: expected a folder"),
-        ("my.toml", "my.toml: expected a folder"),
+        ("site/notes.txt", "site/notes.txt: expected the name of a folder"),
+        ("my.toml", "my.toml: expected the name of a folder"),
         ("no/site", "no/site: its parent folder 'no' does not exist"),
     ):
         assert main(["new", folder, *ends]) == 2
