@@ -109,9 +109,9 @@ def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[st
         if readings:
             numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
             yield (
-                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: as {stated_as}"
-                f" {_heights_text([reading.height for reading in readings])};"
-                f" as {other} {_heights_text([reading.other_height for reading in readings])}"
+                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as stated, as {stated_as}:"
+                f" {_heights_text([reading.height for reading in readings])}; check the frame: as {other}"
+                f" {_heights_text([reading.other_height for reading in readings])}"
             )
 
 

@@ -200,7 +200,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     remaining = [finding for change in suggestion for finding in change.remaining]
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
-        f"then still {state}: {', '.join(texts)}"
+        f"afterwards {state}: {', '.join(texts)}"
         for state, fails in (("fails", True), ("undecided", False))
         if (texts := [_remaining_text(item) for item in remaining if item.fails is fails])
     ]

@@ -22,6 +22,7 @@ from planner.plan import Plan, parse_plan, plan_json
 from world.errors import PlanflyError
 from world.files import read_small_file, utf8_text
 from world.scenario import Scenario, scenario_from_spec
+from world.scenario_tables import names_folder
 
 _SCHEMA = "planfly.studio/1"
 # Maximum size of an autosave with two missions, a plan and the settings, bytes.
@@ -192,15 +193,22 @@ def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions)
         if options.get(option) is None:
             continue
         saved, opened = saved_spec.setdefault(table, {}), opened_spec.get(table, {})
-        if option == "aircraft" and saved.get("aircraft") != opened.get("aircraft"):
+        if option == "aircraft" and not _is_same_value(saved.get("aircraft"), opened.get("aircraft")):
             keys = (*keys, *_AIRCRAFT_KEYS)
         for key in keys:
             old_value, new_value = saved.pop(key, None), opened.get(key)
             if new_value is not None:
                 saved[key] = new_value
-            if old_value != new_value and key not in ("aircraft_by_default", "autopilot_from"):
+            if not _is_same_value(old_value, new_value) and key not in ("aircraft_by_default", "autopilot_from"):
                 replaced.append(f"{_key_text(key)} {_value_text(old_value)} \u2192 {_value_text(new_value)}")
     return replaced
+
+
+def _is_same_value(first: object, second: object) -> bool:
+    """Return True if two entries of a scenario are equal, or name the same folder."""
+    if isinstance(first, str) and isinstance(second, str) and names_folder(first) and names_folder(second):
+        return Path(first).resolve() == Path(second).resolve()
+    return first == second
 
 
 def _key_text(key: str) -> str:

@@ -364,13 +364,18 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
     calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if is_climb else 1]
-    wind_text = f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
-    if abs(crosswind) > abs(tailwind):
-        wind_text = f"{abs(crosswind):.0f} m/s crosswind"
+    wind_text = _wind_text(tailwind, crosswind)
     calm_text = f"at most {math.degrees(calm_limit):.1f}°" if math.isfinite(calm_limit) else "no slope"
     return (
         f"{condition} the aircraft can fly {calm_text} in calm air, but {math.degrees(limit):.1f}° in this {wind_text}"
     )
+
+
+def _wind_text(tailwind: float, crosswind: float) -> str:
+    """Name the larger component of a wind on a course, m/s, with its direction."""
+    if abs(crosswind) > abs(tailwind):
+        return f"{abs(crosswind):.0f} m/s crosswind"
+    return f"{abs(tailwind):.0f} m/s {'tailwind' if tailwind > 0.0 else 'headwind'}"
 
 
 def _distance_text(distance: float) -> str:
@@ -524,12 +529,17 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
         or -sign * measure.height_error <= _height_error_limit(measure)
     ):
         return []
-    speed = float(requirements.route.leg_airspeeds[leg])
-    return [
-        message(
-            f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s",
-        )
-    ]
+    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    speeds = requirements.setup.autopilot.speeds
+    rate = (speeds.climb_limit if sign > 0.0 else speeds.sink_limit).rate
+    calm_slope = math.asin(min(1.0, rate / speed))
+    text = (
+        f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(calm_slope):.1f}° at {speed:.1f} m/s"
+    )
+    tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
+    if math.hypot(tailwind, crosswind) >= CALM_WIND_MPS:
+        text += f" in calm air, but {math.degrees(slope):.1f}° in this {_wind_text(tailwind, crosswind)}"
+    return [message(text)]
 
 
 RULE = Rule(

@@ -96,10 +96,10 @@ export class Panel {
 
   sheet(sheet) {
     this.now = sheet;
-    // What was said of a file holds of the mission that is in it.
+    // Losses are those of the mission that was saved.
     if (this.file && this.file.rev !== sheet.rev) {
-      clear(this.lossBox).append(element("p", { class: "more" }, `${this.file.text}, before the last change.`));
-      this.file = undefined;
+      const state = sheet.unsaved ? ", without the changes since" : "";
+      clear(this.lossBox).append(element("p", { class: "more" }, `${this.file.text}${state}.`));
     }
     if (this.waysOf !== undefined && this.waysOf !== sheet.rev) {
       this.waysOf = undefined;

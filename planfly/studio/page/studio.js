@@ -361,7 +361,8 @@ function setAnswer(id, state, words, title) {
 }
 
 function showName(name, unsaved) {
-  $("name").textContent = name + (unsaved ? " \u2022" : "");
+  // The mark comes first, so that a long name does not hide it.
+  $("name").textContent = (unsaved ? "\u2022 " : "") + name;
   $("name").title = unsaved ? `${name}, not saved` : name;
   document.title = `${unsaved ? "\u2022 " : ""}${name} \u2013 planfly studio`;
 }

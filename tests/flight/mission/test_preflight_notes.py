@@ -206,8 +206,8 @@ def test_an_item_that_states_its_height_above_home_as_amsl_is_named() -> None:
     """The ground is at 100 m AMSL and home is on it: 80 m AMSL are 20 m below the ground, 180 m AMSL 80 m above it."""
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 80, frame=0), LAND)
     assert note == (
-        "item 3: as altitudes above mean sea level (frame 0) 20 m below ground;"
-        " as heights above home (frame 3) 80 m above ground"
+        "item 3: flown as stated, as altitudes above mean sea level (frame 0): 20 m below ground;"
+        " check the frame: as heights above home (frame 3) 80 m above ground"
     )
     # Above the ground in its own frame, and below the ground in both: nothing is said.
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 180, frame=0), LAND) == []
@@ -219,12 +219,12 @@ def test_a_mission_that_states_amsl_as_heights_above_home_is_named() -> None:
     raised = (wp(0, 0, 160, command=22), wp(0, 2000, 180), wp(1500, 2000, 180), wp(2500, 2000, 100, command=21))
     (note,) = notes(*raised)
     assert note == (
-        "items 1, 2, 3, 4: as heights above home (frame 3) 100 to 180 m above ground;"
-        " as altitudes above mean sea level (frame 0) 0 to 80 m above ground"
+        "items 1, 2, 3, 4: flown as stated, as heights above home (frame 3): 100 to 180 m above ground;"
+        " check the frame: as altitudes above mean sea level (frame 0) 0 to 80 m above ground"
     )
     # One item that is higher than the others by home's altitude, and one that is 1 m short of it.
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 160), LAND)
-    assert note.startswith("item 3: as heights above home (frame 3) 160 m above ground; as altitudes above mean sea ")
+    assert note.startswith("item 3: flown as stated, as heights above home (frame 3): 160 m above ground; check the ")
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 159), LAND) == []
     # A home near sea level does not tell the frames apart.
     low = make_gridded_terrain(np.full((3, 3), 20.0), *[np.array([-9e3, 0.0, 9e3])] * 2, source="", sha256="", datum="")

@@ -278,8 +278,10 @@ def test_what_is_said_of_a_saved_file_ends_with_the_next_change(page: Browser) -
     said = "document.querySelector('#panel-files [role=status]').textContent"
     page.wait_for(f"{said} === 'm.waypoints is downloaded by your browser. It contains the whole mission.'")
     drag(page, centre(page, ".mark .dot", 2), (40.0, 25.0))
-    page.wait_for(f"{said} === 'm.waypoints was downloaded by your browser, before the last change.'")
+    page.wait_for(f"{said} === 'm.waypoints was downloaded by your browser, without the changes since.'")
     undo_all(page)
+    # The mission is again the saved one.
+    page.wait_for(f"{said} === 'm.waypoints was downloaded by your browser.'")
 
 
 def test_a_save_leaves_the_view(page: Browser) -> None:

@@ -346,7 +346,9 @@ def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
     assert again.context.scenario.wind.speed != 9.0
 
 
-def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(tmp_path: Path) -> None:
+def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file, kept = tmp_path / "m.waypoints", tmp_path / "m.json"
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
     world = MissionOptions(scenario="jacksboro-air")
@@ -375,6 +377,15 @@ def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(tmp_p
     for part in ("aircraft aerosonde \u2192 own", "airspeed 26 \u2192 25", "parameter WP_RADIUS 55"):
         assert part in other.replaced_text
     assert other.settings_json()["wind_speed"] == 9.0
+    # The same folder by another path is the same aircraft, whose airspeed is kept.
+    other.change_settings(messages.Settings.model_validate({"kind": "settings", "airspeed": 24.0}))
+    other.autosave(kept)
+    monkeypatch.chdir(tmp_path)
+    again, _ = open_session(
+        str(file), world | MissionOptions(aircraft=Path("own"), params=tmp_path / "mine.parm"), kept
+    )
+    assert again.settings_json()["airspeed"] == 24.0
+    assert again.replaced_text == ""
     # The settings of one scenario are not those of another.
     third, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert not restored
