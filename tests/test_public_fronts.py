@@ -24,11 +24,11 @@ from benchmarks.planning.public_fronts import (
     BUDGET,
     BudgetSpentError,
     CountedScores,
+    gain_shares,
     make_methods,
     published_hypervolume,
     route_vectors,
     run,
-    share_boxes,
 )
 
 
@@ -144,10 +144,16 @@ def test_published_map_is_read(tmp_path: Path) -> None:
 
 
 def test_hypervolumes() -> None:
-    """A quarter; two points of which each covers 11 of 121, and both 1."""
-    assert published_hypervolume(np.array([[2200.0, 2200.0], [5000.0, 1.0]])) == pytest.approx(0.25)
-    fronts = [np.array([[0.0, 10.0]]), np.array([[0.0, 10.0], [10.0, 0.0]])]
-    assert share_boxes(fronts) == pytest.approx([11.0 / 121.0, 21.0 / 121.0])
+    """A quarter of the square; beside it a point that adds (4400 - 3300) (2200 - 1100), a sixteenth of the square."""
+    middle, low = [2200.0, 2200.0], [3300.0, 1100.0]
+    assert published_hypervolume(np.array([middle, [5000.0, 1.0]])) == pytest.approx(1.0 / 4.0)
+    assert published_hypervolume(np.array([middle, low])) == pytest.approx(5.0 / 16.0)
+
+
+def test_gain_shares() -> None:
+    """The straight path covers 1/16, the fronts 4/16 and 3/16, both together 5/16: gains of 3 and 2 out of 4."""
+    fronts = [np.array([[2200.0, 2200.0]]), np.array([[3300.0, 1100.0]])]
+    assert gain_shares(fronts, np.array([3300.0, 3300.0])) == pytest.approx([3.0 / 4.0, 2.0 / 4.0])
 
 
 def test_paths_after_the_budget_and_sharp_turns_do_not_count() -> None:

@@ -12,10 +12,10 @@ the control points of each child sorted by east or by north.  "From our paths" a
 search begins with 20 routes over the cells, the cheapest for 20 weights of height (`route_vectors`).  "plan --front"
 plans a front over the map as a scenario (`make_scenario`); its own budget is larger, and its objectives are not these.
 
-Of all paths that a method evaluates, the 20 that together cover most are its front.  Two hypervolumes are printed, both
-as the median over the seeds: the published one, whose box ends at 4,400 for both objectives, so that all methods look
-alike; and the share of the box between the best and the worst values of the front of all methods together, one tenth
-longer.  Every front is stored in ``--kept FILE``, and not computed again.
+Of all paths that a method evaluates, the 20 that together cover most are its front.  Two figures are printed, both as
+the median over the seeds: the published hypervolume, whose box ends at 4,400 for both objectives, so that all methods
+look alike; and the share of the gain, which is 0 for the straight path alone and 1 for all fronts of all methods
+together.  Every front is stored in ``--kept FILE``, and not computed again.
 """
 
 import argparse
@@ -60,7 +60,7 @@ FRONT_SIZE = 20
 BUDGET = (GENERATION_COUNT + 1) * FRONT_SIZE
 # Corner of the published hypervolume, for both objectives.
 PUBLISHED_REFERENCE = 1.1 * 4000.0
-# Length of the box of the shares, relative to the range of the values of all fronts.
+# Length of the box that a front's paths are chosen for, relative to the range of their values.
 BOX_FACTOR = 1.1
 # Objectives beyond this multiple of those of the straight line are ignored by the front search.
 REFERENCE_RATIO = 1.5
@@ -337,34 +337,31 @@ def run(method: Method, environment: Environment, seed: int) -> dict[str, Any]:
     return {"front": scores.front().tolist(), "evaluations": min(scores.spent, BUDGET), "seconds": seconds}
 
 
-def share_boxes(fronts: list[Floats]) -> list[float]:
-    """Return the share of the common box that each front (n, 2) covers.
-
-    The box begins at the best values of all fronts; the ends of their common front are ten elevenths of it away.
-    """
-    values = np.unique(np.concatenate(fronts), axis=0)
-    common = values[values[:, 1] < np.minimum.accumulate(np.append(np.inf, values[:-1, 1]))]
-    ideal, width = common.min(axis=0), BOX_FACTOR * np.maximum(np.ptp(common, axis=0), 1e-9)
-    return [hypervolume((front - ideal) / width, np.ones(2)) for front in fronts]
-
-
 def published_hypervolume(front: Floats) -> float:
     """Return the published hypervolume of a front (n, 2): the part of a square of 4,400 that it covers."""
     return hypervolume(front / PUBLISHED_REFERENCE, np.ones(2))
 
 
-def print_tables(names: list[str], environments: list[str], fronts: dict[tuple[str, str], list[Floats]]) -> None:
-    """Print both hypervolumes of each method on each environment, and each method's wins and mean rank."""
+def gain_shares(fronts: list[Floats], straight: Floats) -> list[float]:
+    """Return the gain of each front (n, 2) over the straight path (2,), relative to that of all fronts together."""
+    least, most = published_hypervolume(straight[None]), published_hypervolume(np.concatenate(fronts))
+    return [(published_hypervolume(front) - least) / (most - least) for front in fronts]
+
+
+def print_tables(
+    names: list[str], environments: list[Environment], fronts: dict[tuple[str, str], list[Floats]]
+) -> None:
+    """Print both figures of each method on each environment, and each method's wins and mean rank."""
     published = np.zeros((len(environments), len(names)))
     shares = np.zeros_like(published)
     for row, environment in enumerate(environments):
-        every = [front for name in names for front in fronts[environment, name]]
-        covered = iter(share_boxes(every))
+        every = [front for name in names for front in fronts[environment.name, name]]
+        gains = iter(gain_shares(every, straight_values(environment)))
         for column, name in enumerate(names):
-            found = fronts[environment, name]
-            shares[row, column] = np.median([next(covered) for _ in found])
+            found = fronts[environment.name, name]
+            shares[row, column] = np.median([next(gains) for _ in found])
             published[row, column] = np.median([published_hypervolume(front) for front in found])
-    for title, table in (("published hypervolume", published), ("share of the common box", shares)):
+    for title, table in (("published hypervolume", published), ("share of the gain", shares)):
         print(f"\n{title}, median of the seeds")
         for name, values in zip(names, table.T, strict=True):
             print(f"{name:32s}" + "".join(f"{value:9.4f}" for value in values))
@@ -408,7 +405,7 @@ def main() -> None:
                 seconds[name].append(known[key]["seconds"])
             args.kept.write_text(json.dumps(known) + "\n", encoding="utf-8")
     print(", ".join(environment.name for environment in environments))
-    print_tables(names, [environment.name for environment in environments], fronts)
+    print_tables(names, environments, fronts)
     for name in names:
         print(f"{name:32s} CPU {np.median(seconds[name]):.2f} s")
 
