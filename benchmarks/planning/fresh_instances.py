@@ -4,7 +4,8 @@ No tuning has used these instances of 60 threats.  ``--family passable``: draws 
 coarse grid; ``drawn``: the first draw of each seed, with or without a path; ``wild``: instances of
 `benchmarks.planning.wild_instances`.  ``--autopilot`` names the autopilot of the plans.  Best known is the shortest
 certified path of `benchmarks.planning.reference_search` and of all measurements here.  The results of the reference,
-which takes the longest, are stored in ``--kept FILE``.
+which takes the longest, are stored in ``--kept FILE``.  An algorithm named "NAME without generations" ends with its
+seeds, so that the difference is what its distribution adds.
 """
 
 import argparse
@@ -18,7 +19,7 @@ import numpy as np
 
 from benchmarks.planning.reference_search import reference_search
 from benchmarks.planning.wild_instances import wild_scenario
-from benchmarks.task import Task
+from benchmarks.task import Task, with_planner
 from planfly.workflow.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import make_problem
@@ -37,6 +38,8 @@ THREATS = 60
 FAMILIES = ("passable", "drawn", "wild")
 # Excess over the best known length above which a path is long, as a fraction.
 LONG = 0.01
+# End of the name of an algorithm that runs no generations.
+WITHOUT_GENERATIONS = " without generations"
 # CPU time above which a run is slow, s.
 SLOW = 1.0
 
@@ -83,9 +86,12 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
     seconds = np.zeros(ratios.shape)
     for at, task in enumerate(tasks):
         for row, name in enumerate(algorithms):
+            whole = not name.endswith(WITHOUT_GENERATIONS)
+            scenario = task.scenario if whole else with_planner(task.scenario, generations=0)
+            algorithm = name.removesuffix(WITHOUT_GENERATIONS)
             for run in range(runs):
                 began = time.process_time()
-                plan = plan_path(task.scenario, task.problem.limits, seed=run + 1, algorithm=name)
+                plan = plan_path(scenario, task.problem.limits, seed=run + 1, algorithm=algorithm)
                 seconds[row, at, run] = time.process_time() - began
                 if plan.safe:
                     ratios[row, at, run] = plan.objectives[Objective.LENGTH_RATIO]
@@ -96,7 +102,7 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
         f" {solvable.sum()} by any method"
     )
     print(
-        f"  {'method':<16}{'solved':>9}{'and more':>9}{'/ best: median':>16}{'90 %':>8}{'worst':>8}"
+        f"  {'method':<32}{'solved':>9}{'and more':>9}{'/ best: median':>16}{'90 %':>8}{'worst':>8}"
         f"{f'over {LONG:.0%}':>9}{'CPU s':>8}{'most':>7}"
     )
     record: dict[str, Any] = {"instances": len(tasks), "runs": runs, "solvable": int(solvable.sum())}
@@ -120,7 +126,7 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
             "seconds": spent.round(3).tolist(),
         }
         print(
-            f"  {name:<16}{entry['solved']:>5}/{entry['of']:<3}{entry['more']:>9}{entry['median']:>16.4f}"
+            f"  {name:<32}{entry['solved']:>5}/{entry['of']:<3}{entry['more']:>9}{entry['median']:>16.4f}"
             f"{entry['p90']:>8.4f}{entry['worst']:>8.4f}{entry['long']:>9}{entry['cpu_s']:>8.2f}"
             f"{entry['cpu_s_most']:>7.2f}",
             flush=True,
