@@ -57,6 +57,15 @@ def test_a_throw_that_falls_to_the_ground_states_what_was_flown() -> None:
     assert "in 100 m" not in reason
 
 
+def test_the_start_states_the_throw_of_a_hand_launch() -> None:
+    """The default throw: 10 m/s after 2 m are 10^2 / (2 * 2) = 25 m/s^2; a stated one: 6^2 / (2 * 1.5) = 12 m/s^2."""
+    for launch, throw in (
+        (Launch("hand", 1.5), "10.0 m/s after 2.0 m, 25.0 m/s²"),
+        (Launch("hand", 1.5, 6.0, 1.5), "6.0 m/s after 1.5 m, 12.0 m/s²"),
+    ):
+        assert circuit(launch, STRIP).started.startswith(f"NAV_TAKEOFF (item 1): launched by hand ({throw}) at home, ")
+
+
 @pytest.mark.parametrize(
     ("from_deg", "method", "wanted"),
     # The launch is on 90 degrees.
