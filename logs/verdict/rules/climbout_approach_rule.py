@@ -338,10 +338,8 @@ def _launch_finding(
     if not min_obstacles.is_clear:
         fault = min_obstacles.obstacle_message(subject, "from home")
         climb_text = _climb_text(gentlest, launch, item_text, end_height)
-        if not is_certain:
-            climb_text += f"; of the steepest climb, {_degrees_text(steepest.slope)},"
-            climb_text += f" {_degrees_text(max(0.0, certain_slope))} is certain for this aircraft"
-        fault = replace(fault, text=f"{fault.text} ({climb_text})")
+        limit_text = "" if is_certain else _certain_climb_text(steepest.slope, certain_slope)
+        fault = replace(fault, text=f"{fault.text} ({climb_text}{limit_text})")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding(
         "climbout",
@@ -365,6 +363,12 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
             f" home after {climb.length:.0f} m"
         )
     return text
+
+
+def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
+    """Return a clause on the part of the steepest climb that is certain; slopes in m per m."""
+    certain_text = _degrees_text(max(0.0, certain_slope))
+    return f"; of the steepest climb, {_degrees_text(max_slope)}, {certain_text} is certain for this aircraft"
 
 
 def _degrees_text(slope: float) -> str:
