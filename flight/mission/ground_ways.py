@@ -69,11 +69,13 @@ class TakeOff:
 
     def description(self) -> str:
         """Return a description of the start of the flight."""
-        method_text = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
+        throw_text = f"{self.speed:.1f} m/s after {self.launch.effective_length:.1f} m, {self.acceleration:.1f} m/s²"
+        method_texts = {"catapult": "from a catapult", "hand": f"by hand ({throw_text})", "runway": "on a runway"}
         course = math.degrees(self.course) % 360.0
         return (
-            f"NAV_TAKEOFF (item {self.item}): launched {method_text} at home, {self.home[2]:.1f} m AMSL, on course"
-            f" {course:.0f} degrees; the first leg begins above {self.end_altitude:.1f} m AMSL"
+            f"NAV_TAKEOFF (item {self.item}): launched {method_texts[self.launch.method]} at home,"
+            f" {self.home[2]:.1f} m AMSL, on course {course:.0f} degrees;"
+            f" the first leg begins above {self.end_altitude:.1f} m AMSL"
         )
 
 

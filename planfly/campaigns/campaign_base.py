@@ -40,6 +40,7 @@ from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
 from world.files import write_atomically
 from world.forecast.scenario_wind import shift_wind
+from world.frames import to_map
 from world.scenario import Scenario
 from world.terrain import Terrain
 
@@ -313,16 +314,19 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     wind: mean wind that the draw varies; None for the wind of the scenario.
     """
     values = draw.values
-    scenario = _with_drawn_wind(base.scenario, values, wind)
+    scenario, mission, placed = _with_drawn_wind(base.scenario, values, wind), base.mission, base.placed
     if scenario.terrain is not None:
         strip_error = _draw_strip_error(scenario.landing, draw.seed)
         terrain = vary_terrain(scenario.terrain, values["terrain_height"], scenario.landing, strip_error)
         scenario = replace(scenario, terrain=terrain)
+        home_error = _terrain_error_at_home(base, terrain)
+        if home_error:
+            mission, placed = _with_moved_home(base, home_error)
     battery = base.airframe.battery * values["battery"]
     draws = base.dispersions.draws
     limits = _limits_in_wind(base.airframe, scenario, is_drawn=draws is not None)
     airframe = replace(base.airframe, limits=limits, battery=battery)
-    setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
+    setup = make_setup(scenario, airframe, mission, draw.seed, plan=base.plan, placed=placed)
     properties = () if draws is None else draws.properties(draw.seed)
     variation = Variation(
         mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties
@@ -379,6 +383,35 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
     blend_factors = np.clip((distances - surveyed_distance) / _SURVEY_BLEND_DISTANCE_M, 0.0, 1.0)
     errors = strip_error + blend_factors * (error - strip_error)
     return replace(terrain, heights=(terrain.heights + errors).astype(np.float32))
+
+
+def _terrain_error_at_home(base: CampaignBase, varied_terrain: Terrain) -> float:
+    """Return the height error of a campaign's terrain at home, m; 0 if home is off the terrain.
+
+    varied_terrain: terrain of a flight.
+    """
+    terrain, home = base.scenario.terrain, base.placed.itinerary.home
+    if terrain is None or varied_terrain is terrain:
+        return 0.0
+    east, north = to_map(base.scenario.origin, home.lat_deg, home.lon_deg)
+    error = float(varied_terrain.height(east, north)) - float(terrain.height(east, north))
+    return 0.0 if math.isnan(error) else error
+
+
+def _with_moved_home(base: CampaignBase, home_error: float) -> tuple[Mission, PlacedMission]:
+    """Return a campaign's mission, and the same mission placed, with the altitude of home corrected by an error.
+
+    An autopilot measures the altitude of home where it is armed.  Heights above home keep their distance from this
+    altitude.  ArduPlane also corrects its terrain data by their error at home (`AP_Terrain::update_reference_offset`),
+    so that heights above terrain move as far.  Altitudes AMSL stay.
+    home_error: m.
+    """
+    mission, terrain = base.mission, base.scenario.terrain
+    if mission.home is not None:
+        mission = replace(mission, home=replace(mission.home, alt=mission.home.alt + home_error))
+    if terrain is not None:
+        terrain = replace(terrain, heights=terrain.heights + np.float32(home_error))
+    return mission, place_stops(mission, base.scenario.origin, terrain, vertical_legs=base.plan is None)
 
 
 def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -> Limits:

@@ -538,7 +538,7 @@ def _answer_text(summary: CampaignSummary) -> str:
 def _drivers_text(entry: DecidingRule) -> str:
     """Return a clause on the quantities that explain most of the variance of a deciding rule's margin."""
     if not entry.sensitivities:
-        return f"what the margin depends on is known from {MIN_FLIGHTS_FOR_INDEX} flights that this rule judges"
+        return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to say what it depends on"
     if not entry.drivers:
         return "no dispersed quantity significantly explains the margin"
     return "of the margin's variance " + ", ".join(

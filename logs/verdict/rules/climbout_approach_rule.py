@@ -13,6 +13,7 @@ The approach is the glide that the autopilot lays out (`GroundRules.glide`).
 """
 
 import math
+from dataclasses import replace
 from itertools import groupby
 from typing import NamedTuple
 
@@ -48,6 +49,8 @@ from logs.verdict.wording import place_text
 from world.frames import to_map
 from world.geometry import wrap
 
+# Smallest slope of a climb that is checked for obstacles, m per m.
+_MIN_CLIMB_SLOPE = 1e-3
 # Step between the launch courses that `_clear_courses_text` tries, deg.
 _COURSE_STEP_DEG = 10
 
@@ -123,7 +126,7 @@ def climbout_findings(
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
         launch = _find_launch(requirements)
-        course, distance, slope = launch.course, launch.leg_length, launch.slope
+        course = launch.course
     else:
         course, distance = (
             math.atan2(first_point[0] - start[0], first_point[1] - start[1]),
@@ -146,22 +149,19 @@ def climbout_findings(
     if takeoff_altitude <= ground_altitude:
         reason = f"the take-off ends {ground_altitude - takeoff_altitude:.0f} m below the ground at home"
         return [_unjudged_finding("climbout", place, reason, is_undecided=True)]
-    obstacles, obstacles_at_min_climb = (
-        _find_obstacles(
-            requirements,
-            straight_path(start, course, _takeoff_profile(ground_altitude, takeoff_altitude, distance, slope, climb)),
-        )
-        for climb in (max_slope, max(1e-3, MIN_CLIMB_FRACTION * certain_slope))
+    steepest, gentlest = (
+        _take_off_climb(requirements, start, launch, (ground_altitude, takeoff_altitude), slope)
+        for slope in (max_slope, max(_MIN_CLIMB_SLOPE, MIN_CLIMB_FRACTION * certain_slope))
     )
     return [
         _launch_finding(
             requirements,
-            launch.course_text,
+            launch,
             place,
-            obstacles,
-            obstacles_at_min_climb,
+            steepest,
+            gentlest,
             (start, ground_altitude, takeoff_altitude),
-            certain_slope == max_slope,
+            certain_slope,
         )
     ]
 
@@ -208,6 +208,35 @@ def _find_launch(requirements: RouteRequirements) -> _Launch:
     if abs(float(wrap(stated_launch.course - first_leg.course))) <= PLAN_TOLERANCE_RAD:
         return first_leg._replace(course_text=course_text)
     return _Launch(stated_launch.course, math.inf, 0.0, course_text)
+
+
+class _Climb(NamedTuple):
+    """Straight climb of a take-off from home.
+
+    slope: m per m.
+    length: horizontal distance of its end from home, m.
+    """
+
+    slope: float
+    length: float
+    obstacles: _Obstacles
+
+
+def _take_off_climb(
+    requirements: RouteRequirements,
+    start: tuple[float, float],
+    launch: _Launch,
+    altitudes: tuple[float, float],
+    slope: float,
+) -> _Climb:
+    """Return the climb of a take-off with a slope (m per m).
+
+    start: east and north of home, m.
+    altitudes: altitudes of the ground at home and of the end of the take-off, m AMSL.
+    """
+    profile = _takeoff_profile(*altitudes, launch.leg_length, launch.slope, slope)
+    obstacles = _find_obstacles(requirements, straight_path(start, launch.course, profile))
+    return _Climb(slope, profile[-1][0], obstacles)
 
 
 def _climb_profile(ground_altitude: float, waypoint_altitude: float, distance: float, climb: float) -> Profile:
@@ -271,60 +300,80 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
 
 def _launch_finding(
     requirements: RouteRequirements,
-    course_text: str,
+    launch: _Launch,
     place: Place,
-    obstacles: _Obstacles,
-    obstacles_at_min_climb: _Obstacles,
-    launch: tuple[tuple[float, float], float, float],
-    is_climb_certain: bool,
+    steepest: _Climb,
+    gentlest: _Climb,
+    start: tuple[tuple[float, float], float, float],
+    certain_slope: float,
 ) -> Finding:
     """Judge the climb of a mission that takes off, towards its next waypoint or on a launch course.
 
-    course_text: description of the launch course, "" if the scenario states no course.
-    obstacles: obstacles at the steepest climb.
-    obstacles_at_min_climb: obstacles at the minimum climb.
-    launch: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
-    is_climb_certain: True if the aircraft's maximum climb slope has no uncertainty.
+    steepest, gentlest: the steepest climb, and the climb that every aircraft of this model flies at least.
+    start: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
+    certain_slope: steepest climb reduced by the uncertainty of the aircraft's model, m per m.
     """
-    to_item = requirements.leg(0).to_item
-    direction_text = f"towards {('the next waypoint' if to_item is None else f'item {to_item}')}"
-    subject = f"the climb from home {course_text or direction_text}"
+    to_item, obstacles = requirements.leg(0).to_item, steepest.obstacles
+    item_text = "the next waypoint" if to_item is None else f"item {to_item}"
+    direction_text = launch.course_text or f"towards {item_text}"
+    subject = f"the climb from home {direction_text}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason = message(f"the terrain below {subject} is unknown")
         return _path_finding("climbout", place, obstacles, None, reason)
+    is_certain, end_height = certain_slope == steepest.slope, start[2] - start[1]
     if not obstacles.is_clear:
         fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
-        other_courses_text = _clear_courses_text(requirements, *launch)
-        fault = message(fault.brief, fault.text[len(fault.brief) :] + other_courses_text)
+        climb_text = _climb_text(steepest, launch, item_text, end_height)
+        text = f"{fault.text} ({climb_text}){_clear_courses_text(requirements, *start)}"
+        fault = replace(fault, text=text)
         return _path_finding(
-            "climbout",
-            place,
-            obstacles,
-            False if is_climb_certain else None,
-            fault,
-            "" if is_climb_certain else GROUND_PATH,
+            "climbout", place, obstacles, False if is_certain else None, fault, "" if is_certain else GROUND_PATH
         )
-    min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest climb,"
-    if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered_hazard:
-        return _path_finding(
-            "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the terrain is unknown")
-        )
-    if not obstacles_at_min_climb.is_clear:
-        return _path_finding(
-            "climbout",
-            place,
-            obstacles,
-            None,
-            obstacles_at_min_climb.obstacle_message(min_climb_text, "from home"),
-            GROUND_PATH,
-        )
+    certain_text = "" if is_certain else "certain "
+    subject += f", at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest {certain_text}climb,"
+    min_obstacles = gentlest.obstacles
+    if math.isnan(min_obstacles.clearance) and not min_obstacles.entered_hazard:
+        reason = message(f"{subject} leads to where the terrain is unknown")
+        return _path_finding("climbout", place, obstacles, None, reason)
+    if not min_obstacles.is_clear:
+        fault = min_obstacles.obstacle_message(subject, "from home")
+        climb_text = _climb_text(gentlest, launch, item_text, end_height)
+        limit_text = "" if is_certain else _certain_climb_text(steepest.slope, certain_slope)
+        fault = replace(fault, text=f"{fault.text} ({climb_text}{limit_text})")
+        return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding(
         "climbout",
         place,
         obstacles,
         True,
-        message(f"{subject.removeprefix('the climb from home ')}: {_clearance_text(obstacles)}"),
+        message(f"{direction_text}: {_clearance_text(obstacles)}"),
     )
+
+
+def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: float) -> str:
+    """Describe the slope of a climb, and its end if it is beyond the item that the climb leads to.
+
+    end_height: height of the take-off's end above home, m.
+    """
+    text = _degrees_text(climb.slope)
+    # The take-off holds its course until it has reached its height.
+    if climb.length > launch.leg_length:
+        text += (
+            f", straight on past {item_text}, {launch.leg_length:.0f} m from home, until it is {end_height:.0f} m above"
+            f" home after {climb.length:.0f} m"
+        )
+    return text
+
+
+def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
+    """Return a clause on the part of the steepest climb that is certain; slopes in m per m."""
+    certain_text = _degrees_text(max(0.0, certain_slope))
+    return f"; of the steepest climb, {_degrees_text(max_slope)}, {certain_text} is certain for this aircraft"
+
+
+def _degrees_text(slope: float) -> str:
+    """Return a slope (m per m) as an angle, such as "1.7°"."""
+    return f"{math.degrees(math.atan(slope)):.1f}°"
 
 
 def _clear_courses_text(

@@ -28,6 +28,7 @@ from logs.verdict.tolerances import (
 )
 from logs.verdict.wording import gentle_launch_text
 from world.arrays import Floats
+from world.terrain import Terrain
 
 
 def launch_findings(
@@ -73,7 +74,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     entered_hazard = first_hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
-    notes = _describe_take_off(take_off, track, distances, clearance)
+    notes = _describe_take_off(take_off, track, distances, clearance, requirements.setup.scenario.terrain)
     undecided_messages = []
     if not faults and LAUNCH_CLEARANCE_M <= clearance < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
@@ -138,7 +139,9 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
     return take_off.launch.effective_length - math.dist(last[:2], take_off.home[:2])
 
 
-def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clearance: float) -> list[str]:
+def _describe_take_off(
+    take_off: TakeOff, track: Track, distances: Floats, clearance: float, terrain: Terrain | None
+) -> list[str]:
     """Describe course, launch method, climb and minimum height above ground (m) of a take-off, in a list of phrases."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     notes = [f"launched on a runway on {course}°"]
@@ -146,15 +149,25 @@ def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clear
         method_text = "from a catapult" if method == "catapult" else "by hand"
         notes = [f"launched {method_text} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
     if distances[-1] > 1.0:
-        altitude_gain = float(track.position[-1, 2] - track.position[0, 2])
-        verb = "climbs" if altitude_gain >= 0.0 else "sinks"
-        course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
-        notes.append(
-            f"{verb} {abs(100.0 * altitude_gain / distances[-1]):.0f} m in 100 m, finally on a course of {course}°"
-        )
+        notes.append(_describe_climb(track, distances, terrain))
     if math.isfinite(clearance):
         notes.append(f"at least {clearance:.0f} m above ground more than {LAUNCH_RUN_M:.0f} m from the launch")
     return notes
+
+
+def _describe_climb(track: Track, distances: Floats, terrain: Terrain | None) -> str:
+    """Describe the climb after a launch: its slope, or the height that was lost and the distance flown.
+
+    distances: distance of each row along the track, m, (t,).
+    """
+    position = track.position
+    altitude_gain, distance = float(position[-1, 2] - position[0, 2]), float(distances[-1])
+    course_text = f"finally on a course of {round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360}°"
+    if altitude_gain >= 0.0:
+        return f"climbs {100.0 * altitude_gain / distance:.0f} m in 100 m, {course_text}"
+    ground = math.nan if terrain is None else float(terrain.height(float(position[-1, 0]), float(position[-1, 1])))
+    end_text = course_text if math.isnan(ground) else f"down to {position[-1, 2] - ground:.1f} m above ground"
+    return f"sinks {-altitude_gain:.1f} m in the {distance:.0f} m flown, {end_text}"
 
 
 RULE = Rule(

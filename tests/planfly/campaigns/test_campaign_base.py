@@ -9,10 +9,12 @@ import pytest
 
 from aircraft.catalog import copy_aircraft_folder, load_aircraft, read_aircraft
 from aircraft.data_sheet import DataSheet
+from flight.mission.items import Home
 from planfly.campaigns.campaign_base import (
     CampaignBase,
     GivenWind,
     _draw_strip_error,
+    _terrain_error_at_home,
     check_level_flight_at_medians,
     open_campaign,
     vary_flight,
@@ -29,9 +31,10 @@ from planfly.campaigns.dispersions import (
 )
 from planfly.workflow.data_sheets import make_data_sheet_folder
 from planfly.workflow.open_flight import open_flight
-from tests.planfly.campaigns.made_campaigns import write_short
+from tests.planfly.campaigns.made_campaigns import MISSION, write_short
 from world.airfield import LandingStrip
 from world.errors import MissionError
+from world.frames import to_geo
 from world.scenario import load_scenario
 
 
@@ -249,6 +252,34 @@ def test_the_terrain_error_at_a_surveyed_strip_is_that_of_the_survey() -> None:
     assert float(everywhere.height(strip.east, strip.north) - terrain.height(strip.east, strip.north)) == pytest.approx(
         10.0, abs=1e-3
     )
+
+
+@pytest.mark.parametrize(("frame", "altitude"), [(0, 180.0), (3, 187.0), (10, 187.0)])
+def test_heights_above_home_and_terrain_move_with_home(tmp_path: Path, frame: int, altitude: float) -> None:
+    """Ground and home at 100 m, 7 m too low: the autopilot measures home where it stands, and altitudes AMSL stay."""
+    mission, scenario = write_short(tmp_path)
+    item_altitude = 180 if frame == 0 else 80
+    mission.write_text(MISSION.replace("\t0\t16", f"\t{frame}\t16").replace("\t180\t", f"\t{item_altitude}\t"))
+    made = open_campaign(str(mission), default_dispersions(), {"scenario": scenario})
+    nominal, varied = (vary_flight(made, drawn(terrain_height=error)).setup for error in (0.0, 7.0))
+    np.testing.assert_allclose(nominal.route.positions[:, 2], 180.0)
+    np.testing.assert_allclose(varied.route.positions[:, 2], altitude)
+    np.testing.assert_array_equal(varied.route.positions[:, :2], nominal.route.positions[:, :2])
+    assert varied.mission.home is not None
+    assert varied.mission.home.alt == pytest.approx(107.0)
+
+
+def test_home_at_a_surveyed_strip_has_the_error_of_the_survey(base: CampaignBase) -> None:
+    """The survey is 0.5 m wrong and the map 10 m; 4 km from the strip home has the error of the map."""
+    scenario = load_scenario("jacksboro")
+    strip, terrain = scenario.landing, scenario.terrain
+    assert strip is not None
+    assert terrain is not None
+    for distance, error in ((0.0, 0.5), (4000.0, 10.0)):
+        lat, lon = to_geo(scenario.origin, strip.east + distance, strip.north)
+        itinerary = replace(base.placed.itinerary, home=Home(float(lat), float(lon), 300.0))
+        made = replace(base, scenario=scenario, placed=replace(base.placed, itinerary=itinerary))
+        assert _terrain_error_at_home(made, vary_terrain(terrain, 10.0, strip, 0.5)) == pytest.approx(error, abs=1e-3)
 
 
 def test_strip_errors_have_the_stated_deviation_and_do_not_change_the_other_draws() -> None:

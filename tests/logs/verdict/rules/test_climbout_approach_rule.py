@@ -122,7 +122,26 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
     failed, verdict = judged("climbout", wall(500.0, steepest + 30.0), *TAKEOFF)
     assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
-    assert ", 30 m below the surface 500 m from home, even at the steepest climb; a launch on " in failed.reason
+    assert ", 30 m below the surface 500 m from home, even at the steepest climb (14.1°); a launch on " in failed.reason
+
+
+@pytest.mark.parametrize("deviation_deg", [0.0, 3.1])
+def test_a_climb_past_its_item_states_its_angle_and_its_end(deviation_deg: float) -> None:
+    """An item 300 m away, a wall of 80 m after 400 m, and 100 m to climb: with 0.7 of 14.1°, or of 9.0°."""
+    setup = over(wall(400.0, 180.0), "3 22 15 0 0 0 0 0 100", wp(0, 300, 100), wp(1500, 300, 100))
+    envelope = replace(setup.envelope, climb_sd=math.radians(deviation_deg))
+    found = of(judge_geometry(replace(setup, limits=replace(setup.limits, envelope=envelope))), "climbout")
+    # 95 % of the aircraft climb more steeply than 1.645 standard deviations below the mean.
+    certain = math.degrees(math.atan(climb())) - 1.645 * deviation_deg
+    slope = 0.7 * math.tan(math.radians(certain))
+    certain_text, reason = "certain " if deviation_deg else "", "; of the steepest climb, 14.1°, 9.0° is certain"
+    assert found.ok is None
+    assert found.reason == (
+        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground,"
+        f" {80.0 - 400.0 * slope:.0f} m below the surface 400 m from home ({math.degrees(math.atan(slope)):.1f}°,"
+        f" straight on past item 2, 300 m from home, until it is 100 m above home after {100.0 / slope:.0f} m"
+        f"{f'{reason} for this aircraft' if deviation_deg else ''})"
+    )
 
 
 def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:

@@ -1,6 +1,7 @@
 """Take-offs as flown: what passes, a motor that never starts, height lost, ground and a zone in the climb."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +41,29 @@ def test_a_flight_whose_motor_never_started_says_so_and_not_that_it_landed_badly
     assert "less than TKOFF_THR_MINACC 15: the motor never starts" in one.reason
     assert "it must reach 60 m" in one.reason
     assert found(flown.setup, flown.track, "touchdown", flown.flight.ended).ok is None
+
+
+def test_a_throw_that_falls_to_the_ground_states_what_was_flown() -> None:
+    """Released 1.8 m above level ground at 3 m/s, it falls for 0.6 s and gets a few metres far."""
+    flown = fly(circuit(Launch("hand", math.pi / 2.0, 3.0, 2.0, 0.0), STRIP))
+    reason = found(flown.setup, flown.track, "launch", flown.flight.ended).reason
+    assert flown.flight.ended == "ground contact"
+    told = re.search(r"sinks (\d\.\d) m in the (\d) m flown, down to (\d\.\d) m above ground", reason)
+    assert told is not None, reason
+    assert 1 <= int(told[2]) <= 4
+    # Released 1.8 m above ground.
+    assert float(told[1]) + float(told[3]) == pytest.approx(1.8, abs=0.1)
+    assert float(told[3]) < 0.3
+    assert "in 100 m" not in reason
+
+
+def test_the_start_states_the_throw_of_a_hand_launch() -> None:
+    """The default throw: 10 m/s after 2 m are 10^2 / (2 * 2) = 25 m/s^2; a stated one: 6^2 / (2 * 1.5) = 12 m/s^2."""
+    for launch, throw in (
+        (Launch("hand", 1.5), "10.0 m/s after 2.0 m, 25.0 m/s²"),
+        (Launch("hand", 1.5, 6.0, 1.5), "6.0 m/s after 1.5 m, 12.0 m/s²"),
+    ):
+        assert circuit(launch, STRIP).started.startswith(f"NAV_TAKEOFF (item 1): launched by hand ({throw}) at home, ")
 
 
 @pytest.mark.parametrize(
