@@ -75,7 +75,9 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
-    arc_faults = _steep_arc_faults(requirements, leg)
+    is_finished = measure is not None and measure.is_finished
+    arc_faults, arc_facts = _steep_arc_messages(requirements, leg, is_flown=is_finished)
+    facts += arc_facts
     ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
     if ground is not None:
         planned_slope, limit, source = ground.slope, ground.limit, ground.source
@@ -98,7 +100,7 @@ def _leg_finding(
     if not faults and uncertainty:
         ok, check = None, UNKNOWN_AIRCRAFT
     facts = [uncertainty, *facts] if uncertainty else facts
-    if measure is not None and not measure.is_finished:
+    if measure is not None and not is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
     judged = planned_slope if fit is None else fit.value
@@ -275,18 +277,26 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
     )
 
 
-def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
-    """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, otherwise []."""
+def _steep_arc_messages(
+    requirements: RouteRequirements, leg: int, *, is_flown: bool
+) -> tuple[list[Message], list[str]]:
+    """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, and facts.
+
+    On a flown arc that takes no more height than the tolerance of a leg, the steepness is only a fact: the other rules
+    judge the speed and the height above ground that it cost.
+    """
     arc = steep_arc(requirements, leg)
     if arc is None:
-        return []
+        return [], []
     corner = leg + 1
     place = requirements.waypoint(corner)
     length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
+    slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
+    if is_flown and missing_height <= HEIGHT_ERROR_LIMIT_M:
+        return [], [f"the arc at {place_text(place)} is too steep by {missing_height:.1f} m only"]
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     first, second = requirements.leg(leg).number, requirements.leg(corner).number
-    slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
         f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {first} "
         f"and {second} have {slopes}: the fly-by arc is shorter than the "
@@ -298,11 +308,8 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
         f" {missing_height:.0f} m {side} its end"
     )
     # A headline names the waypoint, not its item.
-    return [
-        Message(
-            arc_text + limit, arc_text if place.item is None else f"the arc at {place_text(replace(place, item=None))}"
-        )
-    ]
+    brief = arc_text if place.item is None else f"the arc at {place_text(replace(place, item=None))}"
+    return [Message(arc_text + limit, brief)], []
 
 
 def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
