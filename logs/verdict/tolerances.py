@@ -93,6 +93,8 @@ SLOPE_TOLERANCE_RAD = math.radians(0.5)
 HEIGHT_ERROR_LIMIT_M = 10.0
 # m.  Largest height error of a leg without any part outside the blends.
 SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
+# rad.  The pitch is at the autopilot's limit from this far below it on.
+PITCH_LIMIT_TOLERANCE_RAD = math.radians(1.0)
 # rad.  A leg with a smaller slope is level.
 LEVEL_SLOPE_RAD = math.radians(0.5)
 # m/s.  Less wind than this is called calm air in a reason about the wind's effect on a slope.
