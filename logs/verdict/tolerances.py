@@ -317,6 +317,9 @@ FIELD_RADIUS_M = 2000.0
 RUNWAY_COURSE_TOLERANCE_RAD = math.radians(10.0)
 # m.  Within this of its contact height above ground the aircraft has touched down: rows are 1/60 s apart.
 CONTACT_HEIGHT_M = 0.02
+# m.  A flight with landing gear that ends on its way below this height above ground has met the ground, with its wheels
+# or belly before its center of gravity.
+MAX_GEAR_HEIGHT_M = 1.0
 # m.  Error of a simulated touch-down along the strip: 5 touch-downs of ArduPlane in steady wind were within 15 m of the
 # simulated ones, and 38 of 42 in light turbulence within 30 m.  The strip must be this much longer at either end.
 TOUCHDOWN_ERROR_M = 30.0
