@@ -160,6 +160,8 @@ class SpeedRules:
     max_throttle: upper limit of the throttle in flight, 0..1; 1 for full throttle.
     max_throttle_name: parameter of this limit with its value in the autopilot's unit; "" for full throttle.
     climb_limit, sink_limit: largest rates at which the autopilot changes its altitude.
+    max_pitch: largest pitch that the autopilot demands, rad; inf without a limit.
+    max_pitch_name: parameter of this limit with its value; "" without a limit.
     """
 
     limits: SpeedLimits | None = None
@@ -170,6 +172,8 @@ class SpeedRules:
     max_throttle_name: str = ""
     climb_limit: RateLimit = _NO_RATE_LIMIT
     sink_limit: RateLimit = _NO_RATE_LIMIT
+    max_pitch: float = math.inf
+    max_pitch_name: str = ""
 
     def true_airspeed_factor(self, amsl: float) -> float:
         """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""
@@ -657,6 +661,7 @@ class Deviations:
     altitude_parameter: name of the parameter of the altitude tolerance, outside which the autopilot circles at a
         waypoint; "" if it always flies on.
     altitude_candidates, track_candidates: parameters that may cause an altitude or a track to fail.
+    pitch_candidates: parameters that may cause an altitude to fail if the flight reached the limit of the pitch.
     """
 
     tracking_error: TrackingErrorFunction = _no_tracking_error
@@ -666,3 +671,4 @@ class Deviations:
     altitude_parameter: str = ""
     altitude_candidates: tuple[Candidate, ...] = ()
     track_candidates: tuple[Candidate, ...] = ()
+    pitch_candidates: tuple[Candidate, ...] = ()

@@ -10,6 +10,10 @@ from world.json_schema import DocumentConfig
 
 # Fact of a slope finding: the largest error of the height above ground that its leg follows.
 GROUND_FOLLOWING_ERROR = "error of the height above ground"
+# Fact of a slope finding: how long the pitch was at the autopilot's limit.
+PITCH_LIMIT_TIME = "pitch at its limit"
+# Fact of a slope finding: the steepest slope that the aircraft can fly, where the leg or its arc exceeds it.
+AIRCRAFT_SLOPE = "steepest slope of the aircraft"
 
 # Values of `Finding.check` for unjudged findings that leave the verdict undecided.
 # The aircraft is not known well enough.

@@ -26,7 +26,7 @@ from logs.verdict.judge_geometry import (
 from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
-from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
+from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
 from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
@@ -139,7 +139,9 @@ def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ..
     """Return the airframe's answer, by the reference flight, with its disagreements with the flight."""
     failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
     airframe_findings = [
-        replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed) for finding in flight_findings
+        replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed)
+        for finding in flight_findings
+        if finding.rule not in GROUND_RULES
     ]
     disagreements = _disagreements("airframe", airframe_findings, flight_findings)
     # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.

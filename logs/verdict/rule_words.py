@@ -93,6 +93,9 @@ FRONT_OVERLAP = "front overlap"
 # Check of the rule "survey" that judges the overlap of photos across the lines.
 SIDE_OVERLAP = "side overlap"
 
+# Rules of take-off and landing, which the airframe's reference flight does not fly.
+GROUND_RULES = ("takeoff", "climbout", "launch", "landing", "approach", "touchdown")
+
 # The words of every rule by its name, in the order in which a verdict judges and lists the rules.
 RULE_WORDS: dict[str, RuleWords] = {
     words.name: words

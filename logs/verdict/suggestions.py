@@ -514,23 +514,30 @@ def suggest_flying_lower(
     return ((Change("descent", finding.place, None, excess, "m"),),)
 
 
-def suggest_launch_into_wind(
+def suggest_better_launch(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a launch into the wind, or on the runway's other course, for a launch with a tailwind."""
+    """Suggest a launch into the wind, or on the runway's other course, if there is a tailwind, and a faster throw.
+
+    A faster throw or catapult reaches the lowest airspeed of level flight.
+    """
     ground = requirements.ground_phases
     take_off = None if ground is None else ground.procedures.take_off
     if take_off is None:
         return ()
     wind_east, wind_north = requirements.setup.scenario.wind.velocity_at(take_off.home_altitude)
     tailwind = wind_east * math.sin(take_off.course) + wind_north * math.cos(take_off.course)
+    suggestions: list[Suggestion] = []
+    speed = float(math.ceil(requirements.setup.envelope.level_speeds(take_off.home_altitude)[0] + tailwind))
+    if take_off.launch.method != "runway" and take_off.speed < speed:
+        suggestions.append((Change("launch speed", finding.place, take_off.speed, speed, "m/s"),))
     if tailwind < CALM_WIND_MPS:
-        return ()
+        return tuple(suggestions)
     course = math.atan2(-wind_east, -wind_north)
     if take_off.launch.method == "runway":
         course = take_off.course + math.pi
     current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (take_off.course, course))
-    return ((Change("launch course", finding.place, current, wanted, "deg"),),)
+    return ((Change("launch course", finding.place, current, wanted, "deg"),), *suggestions)
 
 
 def suggest_staying_inside(

@@ -10,10 +10,12 @@ from flight.autopilots.parameter_set import ParameterSet
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
 from logs.verdict.findings import (
+    AIRCRAFT_SLOPE,
     APART_FROM_FLIGHT,
     GROUND_FOLLOWING_ERROR,
     NO_HOME,
     NOT_FLOWN,
+    PITCH_LIMIT_TIME,
     UNKNOWN_AIRCRAFT,
     UNKNOWN_PATH,
     Finding,
@@ -21,7 +23,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
-from logs.verdict.rule_words import RULE_WORDS, RuleWords
+from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, RuleWords
 from logs.verdict.suggestions import home_height
 from logs.verdict.tolerances import HOME_ERROR_M, NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
@@ -258,7 +260,10 @@ def summary_lines(
     levels: answers of all levels; the last answer is the verdict's own, whose headline is the first line.
     """
     *other_answers, own_answer = levels
-    lines = [own_answer.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
+    lines = [own_answer.headline]
+    if _is_covered_by_airframe(findings):
+        lines += _airframe_or_autopilot_lines(levels, deciding, setup)
+    lines += _pitch_limit_lines(findings, setup)
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, is_flown=level == "flown")]
     lines += _parameter_lines(setup, is_flown=level == "flown")
@@ -332,6 +337,34 @@ def _airframe_or_autopilot_lines(
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if flew_program else ''}"
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
+
+
+def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
+    """Return True if the airframe's flight shows something about every failure.
+
+    It flies no take-off and no landing, and it does not help where the aircraft itself cannot fly the slope.
+    """
+    failed_findings = [finding for finding in findings if finding.ok is False]
+    return not any(
+        finding.rule in GROUND_RULES or any(fact.what == AIRCRAFT_SLOPE for fact in finding.facts)
+        for finding in failed_findings
+    )
+
+
+def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
+    """Return a line on the failed leg on which the pitch was longest at the autopilot's limit, otherwise []."""
+    failed_places = {finding.place for finding in findings if finding.ok is False}
+    times = [
+        (fact.value, finding.place)
+        for finding in findings
+        for fact in finding.facts
+        if fact.what == PITCH_LIMIT_TIME and finding.place in failed_places
+    ]
+    if not times:
+        return []
+    time, place = max(times, key=lambda pair: pair[0])
+    limit_name = setup.autopilot.speeds.max_pitch_name
+    return [f"Pitch: at its limit {limit_name} for {time:.0f} s on {place_text(place)}"]
 
 
 def _misspelling_lines(parameters: ParameterSet) -> list[str]:

@@ -93,6 +93,8 @@ SLOPE_TOLERANCE_RAD = math.radians(0.5)
 HEIGHT_ERROR_LIMIT_M = 10.0
 # m.  Largest height error of a leg without any part outside the blends.
 SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
+# rad.  The pitch is at the autopilot's limit from this far below it on.
+PITCH_LIMIT_TOLERANCE_RAD = math.radians(1.0)
 # rad.  A leg with a smaller slope is level.
 LEVEL_SLOPE_RAD = math.radians(0.5)
 # m/s.  Less wind than this is called calm air in a reason about the wind's effect on a slope.
@@ -315,6 +317,9 @@ FIELD_RADIUS_M = 2000.0
 RUNWAY_COURSE_TOLERANCE_RAD = math.radians(10.0)
 # m.  Within this of its contact height above ground the aircraft has touched down: rows are 1/60 s apart.
 CONTACT_HEIGHT_M = 0.02
+# m.  A flight with landing gear that ends on its way below this height above ground has met the ground, with its wheels
+# or belly before its center of gravity.
+MAX_GEAR_HEIGHT_M = 1.0
 # m.  Error of a simulated touch-down along the strip: 5 touch-downs of ArduPlane in steady wind were within 15 m of the
 # simulated ones, and 38 of 42 in light turbulence within 30 m.  The strip must be this much longer at either end.
 TOUCHDOWN_ERROR_M = 30.0

@@ -140,6 +140,8 @@ def _other_change_text(change: Change) -> str:
             return f"end with a loiter: make item {change.place.item} a NAV_LOITER_UNLIM (or add a landing)"
         case "launch course":
             return f"launch on a course of {requested_value:.0f}° instead of {change.current:.0f}°, against the wind"
+        case "launch speed":
+            return f"launch at {requested_value:.0f} m/s over the ground instead of {change.current:.1f} m/s"
         case "duration":
             return f"shorten the flight by {requested_value:.0f} %"
         case "full throttle" | "no throttle":

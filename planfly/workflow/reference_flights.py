@@ -11,7 +11,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_FOLLOWING_ERROR, Finding
+from logs.verdict.findings import GROUND_FOLLOWING_ERROR, PITCH_LIMIT_TIME, Finding
 from logs.verdict.judge_flight import judge_flight, with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
@@ -45,7 +45,8 @@ def find_passing_parameter(
     findings: findings of the flight that failed.
     passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
 
-    Candidates for the kind of the failure, vertical or lateral, are tried first.  The farthest value of each candidate
+    Candidates for the kind of the failure, vertical or lateral, are tried first; limits of the pitch are tried before
+    the other vertical ones, and only if the flight reached them.  The farthest value of each candidate
     is flown first; if it passes, bisection finds the nearest passing value.  The returned value was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
@@ -65,6 +66,8 @@ def find_passing_parameter(
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
     deviations = autopilot.deviations
     vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
+    if any(fact.what == PITCH_LIMIT_TIME for finding in findings for fact in finding.facts):
+        vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
     for name, step, farthest, unit, min_value in (
         (*vertical_candidates, *lateral_candidates)
         if failed_finding.rule in _VERTICAL_RULES

@@ -369,8 +369,10 @@ class SuggestionTrials:
                 return self.judged.mission, replace(setup, battery=change.wanted * setup.battery)
             case (Change(what="duration") as change,):
                 return self.judged.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
-            case (Change(what="launch course") as change,) if setup.scenario.launch is not None:
-                launch = replace(setup.scenario.launch, course=math.radians(change.wanted))
+            case (Change(what="launch course" | "launch speed") as change,) if setup.scenario.launch is not None:
+                launch = replace(setup.scenario.launch, speed=change.wanted)
+                if change.what == "launch course":
+                    launch = replace(setup.scenario.launch, course=math.radians(change.wanted))
                 return self.judged.mission, replace(setup, scenario=replace(setup.scenario, launch=launch))
         mission = apply_suggestion(self.context, self.judged, finding, suggestion)
         return mission, self.context.setup(mission)

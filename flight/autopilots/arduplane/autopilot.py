@@ -25,6 +25,7 @@ from flight.autopilots.arduplane.open_settings import describe_open_settings
 from flight.autopilots.arduplane.parameters import (
     CLIMB_BEFORE_TURN,
     HEIGHT_CANDIDATES,
+    MAX_TRIED_PITCH_DEG,
     SIDE_CANDIDATES,
     ArduPilotParameters,
 )
@@ -33,6 +34,7 @@ from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parts import (
+    Candidate,
     Cause,
     ControlLaw,
     Deviations,
@@ -265,6 +267,8 @@ class ArduPlane(Autopilot):
             max_throttle_name=f"THR_MAX {100.0 * parameters.throttle_max:g} %" if parameters.throttle_max < 1.0 else "",
             climb_limit=RateLimit.of_parameters(TECS_CLMB_MAX=parameters.tecs_climb_max),
             sink_limit=RateLimit.of_parameters(TECS_SINK_MAX=parameters.tecs_sink_max),
+            max_pitch=self._max_pitch + parameters.pitch_trim,
+            max_pitch_name=f"{self._max_pitch_parameter} {math.degrees(self._max_pitch):g}°",
         )
 
     @property
@@ -444,7 +448,28 @@ class ArduPlane(Autopilot):
             gust_rise=height_in_updrafts,
             altitude_candidates=HEIGHT_CANDIDATES,
             track_candidates=SIDE_CANDIDATES,
+            pitch_candidates=self._pitch_candidates,
         )
+
+    @property
+    def _max_pitch(self) -> float:
+        """Largest pitch that TECS demands, without PTCH_TRIM_DEG, rad."""
+        parameters = self.parameters
+        return min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf)
+
+    @property
+    def _max_pitch_parameter(self) -> str:
+        """Name of the parameter of the largest pitch."""
+        return "PTCH_LIM_MAX_DEG" if self._max_pitch == self.parameters.pitch_limit_max else "TECS_PITCH_MAX"
+
+    @property
+    def _pitch_candidates(self) -> tuple[Candidate, ...]:
+        """The parameter of the largest pitch, up to the value at which the other parameter becomes the limit."""
+        parameters, name = self.parameters, self._max_pitch_parameter
+        other_limit = parameters.pitch_limit_max if name == "TECS_PITCH_MAX" else parameters.tecs_pitch_max or math.inf
+        max_tried = min(MAX_TRIED_PITCH_DEG, math.degrees(other_limit))
+        is_raised = max_tried > math.degrees(self._max_pitch)
+        return (Candidate(name, 1.0, max_tried, "deg"),) if is_raised else ()
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
         """Return the simulated ArduPlane with the given parameters changed, also for a program."""

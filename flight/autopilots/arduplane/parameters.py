@@ -584,6 +584,8 @@ HEIGHT_CANDIDATES = (
     Candidate("TECS_TIME_CONST", 0.2, 3.0, "s"),
     Candidate("THR_MAX", 5.0, 100.0, "%"),
 )
+# Largest value of a pitch limit that is tried, degrees.
+MAX_TRIED_PITCH_DEG = 30.0
 SIDE_CANDIDATES = (
     Candidate("NAVL1_PERIOD", 1.0, 10.0, "s"),
     Candidate("WP_RADIUS", 5.0, 30.0, "m"),

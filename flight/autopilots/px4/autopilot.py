@@ -15,6 +15,7 @@ from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
+    Candidate,
     Cause,
     ControlLaw,
     Deviations,
@@ -35,7 +36,13 @@ from flight.autopilots.px4.failsafes import failsafe_causes, link_loss_reactions
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE_M
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
 from flight.autopilots.px4.open_settings import describe_open_settings
-from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
+from flight.autopilots.px4.parameters import (
+    HEIGHT_CANDIDATES,
+    MAX_TRIED_PITCH_RAD,
+    PITCH_CANDIDATE,
+    SIDE_CANDIDATES,
+    Px4Parameters,
+)
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.items import LANDINGS, Command
@@ -417,6 +424,8 @@ class Px4(Autopilot):
             max_throttle_name=f"FW_THR_MAX {max_throttle:g}" if max_throttle < 1.0 else "",
             climb_limit=self._rate_limit("FW_T_CLMB_R_SP", "FW_T_CLMB_MAX"),
             sink_limit=self._rate_limit("FW_T_SINK_R_SP", "FW_T_SINK_MAX"),
+            max_pitch=self.parameters["FW_P_LIM_MAX"],
+            max_pitch_name=f"FW_P_LIM_MAX {math.degrees(self.parameters['FW_P_LIM_MAX']):g}°",
         )
 
     def _rate_limit(self, *names: str) -> RateLimit:
@@ -560,9 +569,17 @@ class Px4(Autopilot):
             gust_rise=height_in_updrafts,
             altitude_miss_probability=partial(altitude_miss_probability, self.parameters["NAV_FW_ALT_RAD"]),
             altitude_parameter="NAV_FW_ALT_RAD",
-            altitude_candidates=HEIGHT_CANDIDATES,
+            altitude_candidates=(*self._climb_candidates, *HEIGHT_CANDIDATES),
             track_candidates=SIDE_CANDIDATES,
+            pitch_candidates=() if self.parameters["FW_P_LIM_MAX"] >= MAX_TRIED_PITCH_RAD else (PITCH_CANDIDATE,),
         )
+
+    @property
+    def _climb_candidates(self) -> tuple[Candidate, ...]:
+        """FW_T_CLMB_MAX, up to FW_T_CLMB_R_SP, if it is the smaller limit of the climb rate."""
+        largest_rate = self.parameters["FW_T_CLMB_R_SP"]
+        is_smaller = self.parameters["FW_T_CLMB_MAX"] < largest_rate
+        return (Candidate("FW_T_CLMB_MAX", 0.5, largest_rate, "m/s"),) if is_smaller else ()
 
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"

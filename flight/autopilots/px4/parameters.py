@@ -353,6 +353,9 @@ HEIGHT_CANDIDATES = (
     Candidate("FW_T_ALT_TC", 0.5, 2.0, "s"),
     Candidate("FW_THR_MAX", 0.05, 1.0, ""),
 )
+# Largest value of FW_P_LIM_MAX that is tried, rad.
+MAX_TRIED_PITCH_RAD = math.radians(45.0)
+PITCH_CANDIDATE = Candidate("FW_P_LIM_MAX", 1.0, math.degrees(MAX_TRIED_PITCH_RAD), "deg")
 SIDE_CANDIDATES = (
     Candidate("NAV_ACC_RAD", 5.0, 60.0, "m"),
     Candidate("NAV_ACC_RAD", 5.0, 90.0, "m"),

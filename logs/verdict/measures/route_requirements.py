@@ -646,11 +646,12 @@ class SteepArc:
     """Fly-by arc that is steeper than the aircraft can climb or sink.
 
     tangent: tangent of the arc's slope.  limit: tangent of the aircraft's limit, averaged over both legs' courses;
-    positive.
+    positive.  missing_height: height by which a climb or descent at the limit misses the arc's end, m.
     """
 
     tangent: float
     limit: float
+    missing_height: float
 
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
@@ -752,4 +753,5 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
     limit, speed = float(np.tan(limits).mean()), float(requirements.route.leg_airspeeds[leg])
-    return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > SPEED_TOLERANCE_MPS else None
+    missing_height = (abs(tangent) - limit) * length
+    return SteepArc(tangent, limit, missing_height) if GRAVITY * missing_height / speed > SPEED_TOLERANCE_MPS else None

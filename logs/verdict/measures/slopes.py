@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_slope
-from flight.simulation.track import THROTTLE
+from flight.simulation.track import PITCH, THROTTLE
 from logs.verdict.measures.ground_following import demanded_altitudes, follows_ground
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, project_onto_leg
@@ -28,6 +28,7 @@ from logs.verdict.tolerances import (
     MIN_COURSE_STRETCH_M,
     MIN_SLOPE_STRETCH_M,
     MIN_STRETCH_TIME_S,
+    PITCH_LIMIT_TOLERANCE_RAD,
     ROUGH_COURSE_ERROR_RAD,
     ROUGH_SLOPE_ERROR_RAD,
     SATURATED_FRACTION,
@@ -196,6 +197,7 @@ class SlopeMeasure:
     full_throttle_time, idle_throttle_time: time with the throttle at its limits, s.
     speed_loss, speed_gain: largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
         these limits, m/s, without the part that a gust explains.
+    pitch_limit_time: time with the pitch at the autopilot's upper limit, s.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     is_finished: True if the leg was flown to its end.
     """
@@ -207,6 +209,7 @@ class SlopeMeasure:
     idle_throttle_time: float = 0.0
     speed_loss: float = 0.0
     speed_gain: float = 0.0
+    pitch_limit_time: float = 0.0
     ability: Ability | None = None
     is_finished: bool = False
 
@@ -226,6 +229,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
         idle_throttle_time=idle_time,
         speed_loss=speed_loss,
         speed_gain=speed_gain,
+        pitch_limit_time=_pitch_limit_time(requirements, aligned, leg),
         ability=measure_ability(requirements, aligned, leg),
         is_finished=bool(aligned.passed[leg + 1]),
     )
@@ -295,6 +299,15 @@ def _saturation_times(
     speed_loss = _max_mean_in_mask(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
     speed_gain = _max_mean_in_mask(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
     return float(is_at_full.sum() * tick), float(is_at_idle.sum() * tick), speed_loss, speed_gain
+
+
+def _pitch_limit_time(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> float:
+    """Return the time with the pitch at the autopilot's upper limit on a leg, s; 0 for an imported flight."""
+    if requirements.setup.source is not None:
+        return 0.0
+    pitch = aligned.track.attitude[aligned.leg_rows(leg), PITCH]
+    min_pitch = requirements.setup.autopilot.speeds.max_pitch - PITCH_LIMIT_TOLERANCE_RAD
+    return float((pitch >= min_pitch).sum() * aligned.tick)
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:

@@ -75,8 +75,8 @@ POINT_MASS_ERROR_M = 10.0
 POINT_MASS_POSITION_ERROR_M = 35.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
-# Height lost in the turn of a return, m.  A return that begins below the required height above ground, as after a
-# take-off, has to keep its starting height minus this loss.
+# Height lost in the turn of a return, m.  A return that begins where the flight itself is below the required height
+# above ground, as after a take-off, has to keep the flight's height minus this loss.
 TURN_HEIGHT_LOSS_M = 2.0
 # Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
 _LOW_START_FRACTION = 0.5
@@ -680,10 +680,12 @@ def simulate_judged_returns(
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the required height above ground of the RTL from each start, m, (n,).
 
-    This is the limit, or a height that depends on the start if the start is lower.
+    This is the limit, or a height that depends on the start if the flight itself is or soon gets lower, as in a landing
+    sequence.
     """
     start_heights = heights_above_ground(world, starts)
-    air_heights = np.where(start_heights < world.limit, start_heights - TURN_HEIGHT_LOSS_M, world.limit)
+    flight_heights = start_heights - starts.height_loss
+    air_heights = np.where(flight_heights < world.limit, flight_heights - TURN_HEIGHT_LOSS_M, world.limit)
     return np.where(starts.is_low, np.minimum(_LOW_START_FRACTION * start_heights, world.limit), air_heights)
 
 

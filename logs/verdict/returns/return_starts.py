@@ -22,6 +22,10 @@ from world.kernels import Records
 _VELOCITY_WINDOW_S = 1.0
 # Height lost at the beginning of a return from a final approach with the motor off, before the aircraft climbs, m.
 SINK_HEIGHT_LOSS_M = 10.0
+# Time between the positions of the planned path at which its height above ground is taken, s.
+_PATH_INTERVAL_S = 1.0
+# Time in which a return from a descent stops sinking, s: the default of ArduPlane's TECS_TIME_CONST.
+SINK_TIME_S = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +38,7 @@ class ReturnStarts:
     is_flown: True for a flown track, False for the planned path.
     is_low: True for a start in a flown take-off or landing that is lower above ground than the required clearance plus
         `SINK_HEIGHT_LOSS_M`, (n,).
+    height_loss: height above ground that the flight itself loses in the `SINK_TIME_S` after the start, m, (n,).
     grounded_count: number of omitted samples where the aircraft is too slow to fly: at its launch, or after landing.
     """
 
@@ -42,6 +47,7 @@ class ReturnStarts:
     energy_used: Floats
     is_flown: bool
     is_low: Flags
+    height_loss: Floats
     grounded_count: int = 0
 
     def __len__(self) -> int:
@@ -51,7 +57,9 @@ class ReturnStarts:
     def subset(self, indices: NDArray[np.intp]) -> "ReturnStarts":
         """Return the starts with these indices."""
         arrays = (self.time[indices], self.rows[indices], self.energy_used[indices])
-        return ReturnStarts(*arrays, self.is_flown, self.is_low[indices], self.grounded_count)
+        return ReturnStarts(
+            *arrays, self.is_flown, self.is_low[indices], self.height_loss[indices], self.grounded_count
+        )
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
@@ -82,12 +90,29 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     energy = track.energy[start_rows].astype(np.float64)
     times = track.time[start_rows]
     records = _start_records(times, track.position[start_rows], velocity, np.nan_to_num(roll))
-    return ReturnStarts(times, records, energy, True, is_low_start, int(is_slow.sum()))
+    height_loss = _height_losses(setup, time, track.position[usable_rows], times)
+    return ReturnStarts(times, records, energy, True, is_low_start, height_loss, int(is_slow.sum()))
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
     """Return a `ReturnStarts` without any start."""
-    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, np.zeros(0, dtype=np.bool_))
+    is_low = np.zeros(0, dtype=np.bool_)
+    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, is_low, np.zeros(0))
+
+
+def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_times: Floats) -> Floats:
+    """Return the height above ground that a flight loses in the `SINK_TIME_S` after each start, m, (n,); 0 if unknown.
+
+    time, position: times of the flight, s, (t,), and its positions, m, (t, 3).
+    start_times: s, (n,), within these times.
+    """
+    if setup.scenario.terrain is None:
+        return np.zeros(len(start_times))
+    heights = position[:, 2] - setup.scenario.terrain.height(position[:, 0], position[:, 1])
+    first_rows = np.searchsorted(time, start_times, side="right") - 1
+    end_rows = np.searchsorted(time, start_times + SINK_TIME_S, side="right")
+    losses = [heights[first] - heights[first:end].min() for first, end in zip(first_rows, end_rows, strict=True)]
+    return np.nan_to_num(np.array(losses, dtype=np.float64))
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
@@ -145,7 +170,9 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
     move_energy = leg_energy[moves["leg"]] * moves["lasts"] / np.maximum(1e-9, leg_duration[moves["leg"]])
     energy = np.cumsum(move_energy)[move_numbers] - (1.0 - fraction) * move_energy[move_numbers]
     is_low = np.zeros(len(times), dtype=np.bool_)
-    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low)
+    path_times, _, _, path_position = _sample_positions(moves, min(interval, _PATH_INTERVAL_S))
+    height_loss = _height_losses(setup, path_times, path_position, times)
+    return ReturnStarts(times, _start_records(times, position, velocity, bank), energy, False, is_low, height_loss)
 
 
 def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floats]:
@@ -201,7 +228,7 @@ def flown_end(track: Track) -> ReturnStarts:
     roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
     records = _start_records(track.time[row], track.position[row], _ground_velocities(track, row), roll)
     is_low = np.zeros(1, dtype=np.bool_)
-    return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low)
+    return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low, np.zeros(1))
 
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
@@ -211,7 +238,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     velocity = speed * np.array([[math.sin(course), math.cos(course), slope]])
     time, energy = requirements.path.times[-1:], np.array([predicted_energy(requirements)[0]])
     records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
-    return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_))
+    return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_), np.zeros(1))
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:

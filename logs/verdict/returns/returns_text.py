@@ -350,7 +350,7 @@ def _range_outcome_text(
                 f" {POINT_MASS_POSITION_ERROR_M:.0f} m in distance from a missile's sphere"
             )
     if worst_return.required_height < returns.limit:
-        height_text += " (taking off or landing: the return begins below the required height)"
+        height_text += " (taking off or landing: the flight itself is below the required height)"
     energy_text = (
         "" if math.isnan(worst_return.energy_left) else f", {quantity_text(worst_return.energy_left, 'Wh')} left"
     )

@@ -17,7 +17,7 @@ from logs.verdict.measures.ground_paths import GroundPath, first_hazard_on_path,
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import Rule
-from logs.verdict.suggestions import suggest_launch_into_wind
+from logs.verdict.suggestions import suggest_better_launch
 from logs.verdict.tolerances import (
     CLIMB_MODEL_ERROR_M,
     CONTACT_HEIGHT_M,
@@ -183,5 +183,5 @@ RULE = Rule(
         "ROUNDING_M",
     ),
     judge=launch_findings,
-    suggest=suggest_launch_into_wind,
+    suggest=suggest_better_launch,
 )

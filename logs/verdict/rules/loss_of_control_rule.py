@@ -10,7 +10,12 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Rule
-from logs.verdict.tolerances import MAX_CONTROLLED_BANK_RAD, MIN_CONTROLLED_AIRSPEED_MPS, MIN_CONTROLLED_STALL_RATIO
+from logs.verdict.tolerances import (
+    MAX_CONTROLLED_BANK_RAD,
+    MAX_GEAR_HEIGHT_M,
+    MIN_CONTROLLED_AIRSPEED_MPS,
+    MIN_CONTROLLED_STALL_RATIO,
+)
 from logs.verdict.wording import place_text
 from world.arrays import Floats
 from world.wording import count_text
@@ -43,8 +48,11 @@ def departure_findings(
         limit_text = f", more than the limit of {math.degrees(MAX_CONTROLLED_BANK_RAD):.0f}°"
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s", limit_text))
     faults += airspeed_faults
-    if (aligned.clearance <= 0.0).any():
-        k = int(np.argmax(aligned.clearance <= 0.0))
+    is_contact = aligned.clearance <= 0.0
+    if requirements.ground_phases is not None and not aligned.passed[-1]:
+        is_contact[-1] |= aligned.clearance[-1] <= MAX_GEAR_HEIGHT_M
+    if is_contact.any():
+        k = int(np.argmax(is_contact))
         time = track.time[k] + aligned.clearance_fraction[k] * (track.time[k + 1] - track.time[k])
         faults.append(
             message(
@@ -123,6 +131,7 @@ RULE = Rule(
         "MAX_CONTROLLED_BANK_RAD",
         "MIN_CONTROLLED_AIRSPEED_MPS",
         "MIN_CONTROLLED_STALL_RATIO",
+        "MAX_GEAR_HEIGHT_M",
         "MAX_PLAUSIBLE_POSITION_M",
         "MAX_PLAUSIBLE_SPEED_MPS",
         "MAX_PLAUSIBLE_VALUE",

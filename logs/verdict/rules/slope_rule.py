@@ -8,7 +8,9 @@ import numpy as np
 
 from aircraft.envelope import ground_slope
 from logs.verdict.findings import (
+    AIRCRAFT_SLOPE,
     GROUND_FOLLOWING_ERROR,
+    PITCH_LIMIT_TIME,
     UNKNOWN_AIRCRAFT,
     Fact,
     Finding,
@@ -19,7 +21,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.acceptance import step_height
 from logs.verdict.measures.ground_following import follows_ground, steepest_ground
-from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
+from logs.verdict.measures.route_requirements import RouteRequirements, SteepArc, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import LogNeeds, Rule
@@ -75,12 +77,13 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
-    arc_faults = _steep_arc_faults(requirements, leg)
+    arc_faults = _steep_arc_faults(requirements, leg, measure)
     ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
     if ground is not None:
         planned_slope, limit, source = ground.slope, ground.limit, ground.source
         sign = math.copysign(1.0, planned_slope)
         faults = [_steep_ground_message(requirements, leg, ground)]
+    aircraft_facts = _aircraft_slope_facts(requirements, leg) if arc_faults or (faults and source == "aircraft") else []
     # A fault of the plan states the planned slope itself.
     facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
@@ -101,7 +104,6 @@ def _leg_finding(
     if measure is not None and not measure.is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
-    judged = planned_slope if fit is None else fit.value
     return make_finding(
         "slope",
         requirements.leg(leg),
@@ -114,11 +116,11 @@ def _leg_finding(
         at_least=sign < 0.0,
         source=source,
         tolerance=math.degrees(PLAN_TOLERANCE_RAD if fit is None else fit.tolerance),
-        margin=math.degrees(limit - sign * judged),
+        margin=math.degrees(limit - sign * (planned_slope if fit is None else fit.value)),
         unit="deg",
         method=method,
         check=check,
-        facts=_measured_facts(requirements, leg, measure),
+        facts=(*_measured_facts(requirements, leg, measure), *aircraft_facts),
     )
 
 
@@ -275,18 +277,18 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
     )
 
 
-def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
+def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Message]:
     """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, otherwise []."""
     arc = steep_arc(requirements, leg)
-    if arc is None:
+    if arc is None or (measure is not None and _is_arc_kept(arc, measure)):
         return []
     corner = leg + 1
     place = requirements.waypoint(corner)
     length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
+    slope = math.degrees(math.atan(abs(arc.tangent)))
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     first, second = requirements.leg(leg).number, requirements.leg(corner).number
-    slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
         f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {first} "
         f"and {second} have {slopes}: the fly-by arc is shorter than the "
@@ -295,14 +297,19 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     side = "below" if arc.tangent > 0.0 else "above"
     limit = (
         f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, and leaves the arc"
-        f" {missing_height:.0f} m {side} its end"
+        f" {arc.missing_height:.0f} m {side} its end"
     )
     # A headline names the waypoint, not its item.
-    return [
-        Message(
-            arc_text + limit, arc_text if place.item is None else f"the arc at {place_text(replace(place, item=None))}"
-        )
-    ]
+    brief = arc_text if place.item is None else f"the arc at {place_text(replace(place, item=None))}"
+    return [Message(arc_text + limit, brief)]
+
+
+def _is_arc_kept(arc: SteepArc, measure: SlopeMeasure) -> bool:
+    """Return True if a flown arc takes no more height than the tolerance of a leg.
+
+    The other rules judge the airspeed and the height above ground that it cost.
+    """
+    return measure.is_finished and arc.missing_height <= HEIGHT_ERROR_LIMIT_M
 
 
 def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
@@ -410,6 +417,13 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         for name, duration, _, _ in _throttle_times(measure)
         if duration >= 1.0
     ]
+    if measure.pitch_limit_time >= SATURATED_TIME_S:
+        limit_name = requirements.setup.autopilot.speeds.max_pitch_name
+        facts.append(("pitch", f"pitch at its limit {limit_name} for {measure.pitch_limit_time:.0f} s"))
+    arc = steep_arc(requirements, leg)
+    if arc is not None and _is_arc_kept(arc, measure):
+        place = place_text(requirements.waypoint(leg + 1))
+        facts.append(("arc", f"the arc at {place} is too steep by {arc.missing_height:.1f} m only"))
     return facts
 
 
@@ -428,7 +442,15 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
             if duration > 0.0
             else []
         )
+    if measure.pitch_limit_time >= SATURATED_TIME_S:
+        facts.append(Fact(PITCH_LIMIT_TIME, measure.pitch_limit_time, "s"))
     return facts
+
+
+def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fact]:
+    """Return the steepest climb or descent that the aircraft can fly on a leg, which a failed finding exceeds."""
+    limits = requirements.climb if float(requirements.slopes[leg]) >= 0.0 else requirements.dive
+    return [Fact(AIRCRAFT_SLOPE, math.degrees(float(limits[leg])), "deg")]
 
 
 def _flown_faults(
@@ -555,6 +577,7 @@ RULE = Rule(
             "SHORT_LEG_HEIGHT_ERROR_LIMIT_M",
         ),
         *(
+            "PITCH_LIMIT_TOLERANCE_RAD",
             "LEVEL_SLOPE_RAD",
             "UNDECIDED_FRACTION",
             "CALM_WIND_MPS",

@@ -1,6 +1,7 @@
 """Places are values: equal by what they hold, usable as keys, and not to be changed."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -27,8 +28,9 @@ from logs.verdict.places import (
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
 from tests.logs.verdict.judging import judge, leg
+from tests.logs.verdict.rules.flown_circuits import flown_circuit, moved
 from tests.mission_lines import setup_of, wp
-from tests.synthetic import bump, fly_path, make_setup
+from tests.synthetic import bump, edited, fly_path, make_setup
 
 
 def test_places_of_the_same_data_are_one_key() -> None:
@@ -111,6 +113,42 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
     undecided = aside(autopilot, 70.0, ReferenceFlights(PASSED))
     assert undecided.lines[1].endswith("cannot: the flight fails with every parameter value that was tried")
+
+
+@pytest.mark.parametrize(
+    ("pitch_deg", "seconds", "is_named"), [(14.2, 5.2, True), (13.8, 8.0, False), (14.2, 4.8, False)]
+)
+def test_a_pitch_at_its_limit_is_named_where_the_flight_fails(
+    autopilot: FlightSetup, pitch_deg: float, seconds: float, is_named: bool
+) -> None:
+    """TECS_PITCH_MAX is 15 degrees; within 1 degree of it the pitch is at its limit, and from 5 s on that is said."""
+    track = fly_path(autopilot, across=bump(4500.0, 70.0, 150.0))
+    attitude = np.array(track.attitude)
+    attitude[np.abs(track.time - 180.0) < 0.5 * seconds, 1] = math.radians(pitch_deg)
+    verdict = judge_flight(autopilot, edited(track, attitude=attitude), "completed", reference=ReferenceFlights(PASSED))
+    line = "Pitch: at its limit TECS_PITCH_MAX 15° for 5 s on leg 1, to item 2"
+    assert (line in verdict.lines) is is_named
+
+
+def test_a_slope_beyond_the_aircrafts_is_not_the_autopilots_fault(autopilot: FlightSetup) -> None:
+    """The aircraft climbs 12.3 degrees at this airspeed, and the legs are flown as drawn."""
+    for slope_deg, is_autopilot in ((11.8, True), (12.8, False)):
+        top = 500.0 + 2000.0 * math.tan(math.radians(slope_deg))
+        points = [[0, 0, 500], [0, 1000, 500], [0, 3000, top], [0, 6000, top]]
+        setup = replace(make_setup(points, limits={"corridor_m": 60.0}), autopilot=autopilot.autopilot)
+        said = aside(setup, 70.0, ReferenceFlights(PASSED)).lines[1]
+        assert said.startswith("The aircraft can fly this mission, but ArduPlane") is is_autopilot
+
+
+def test_a_launch_that_fails_is_not_the_autopilots_fault() -> None:
+    """The airframe's flight begins in the air; the launch sinks 3 m where 1 m is allowed."""
+    flown = flown_circuit()
+    low = moved(flown.track, slice(20, 60), up=-3.0)
+    verdict = judge_flight(flown.setup, low, "completed", reference=ReferenceFlights(PASSED))
+    assert "launch" in {finding.rule for finding in verdict.failed}
+    assert not any(line.startswith("The aircraft can fly") for line in verdict.lines)
+    (airframe,) = [level for level in verdict.levels if level.name == "airframe"]
+    assert "launch" not in {disagreement.rule for disagreement in airframe.disagreements}
 
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:

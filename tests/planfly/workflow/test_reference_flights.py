@@ -18,7 +18,7 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
-from logs.verdict.findings import Fact, Finding, make_finding
+from logs.verdict.findings import PITCH_LIMIT_TIME, Fact, Finding, make_finding
 from logs.verdict.places import Place, ReferenceFlights
 from logs.verdict.verdict import verdict_json
 from logs.verdict.wording import deciding_text
@@ -101,6 +101,47 @@ def test_a_throttle_limit_that_is_too_low_is_named(
     found = find_passing_parameter(law, (LOW, HEIGHTS), lambda other: other.speeds.max_throttle > 0.81)
     assert found is not None
     assert (found.name, found.current, found.passing, found.unit) == (name, *values, unit)
+
+
+PITCHED = make_finding("slope", LEG, ok=True, reason="", facts=[Fact(PITCH_LIMIT_TIME, 20.0, "s")])
+
+
+@pytest.mark.parametrize(
+    ("values", "name", "present", "passing"),
+    [
+        # Of two limits the smaller one is the limit, up to the other.
+        ({"TECS_PITCH_MAX": 15.0, "PTCH_LIM_MAX_DEG": 20.0}, "TECS_PITCH_MAX", 15.0, 18.0),
+        ({"TECS_PITCH_MAX": 0.0, "PTCH_LIM_MAX_DEG": 12.0}, "PTCH_LIM_MAX_DEG", 12.0, 18.0),
+        ({"TECS_PITCH_MAX": 19.0, "PTCH_LIM_MAX_DEG": 16.0}, "PTCH_LIM_MAX_DEG", 16.0, 18.0),
+        ({"TECS_PITCH_MAX": 17.0, "PTCH_LIM_MAX_DEG": 17.0}, "", 0.0, 0.0),
+    ],
+)
+def test_a_pitch_limit_that_the_flight_reached_is_named(
+    values: dict[str, float], name: str, present: float, passing: float
+) -> None:
+    def climbs(law: Autopilot) -> bool:
+        return law.speeds.max_pitch > math.radians(17.5)
+
+    law = ArduPlane(ArduPilotParameters.defaults()).with_parameters(**values)
+    found = find_passing_parameter(law, (LOW, HEIGHTS, PITCHED), climbs)
+    assert (found is not None) is bool(name)
+    if found is not None:
+        assert (found.name, found.current, found.passing, found.unit) == (name, present, passing, "deg")
+    # A flight that did not reach its limit is not flown with another one.
+    assert find_passing_parameter(law, (LOW, HEIGHTS), climbs) is None
+
+
+def test_the_limits_of_px4s_pitch_and_climb_are_tried() -> None:
+    law = Px4(Px4Parameters.defaults("1.17"))
+    found = find_passing_parameter(
+        law, (LOW, HEIGHTS, PITCHED), lambda other: other.speeds.max_pitch > math.radians(32.5)
+    )
+    assert found is not None
+    assert (found.name, found.current, found.passing, found.unit) == ("FW_P_LIM_MAX", 30.0, 33.0, "deg")
+    slow = law.with_parameters(FW_T_CLMB_MAX=2.0, FW_T_CLMB_R_SP=5.0)
+    found = find_passing_parameter(slow, (LOW, HEIGHTS), lambda other: other.speeds.climb_limit.rate > 3.2)
+    assert found is not None
+    assert (found.name, found.current, found.passing) == ("FW_T_CLMB_MAX", 2.0, 3.5)
 
 
 @pytest.mark.parametrize(("present", "passing"), [(30.0, 35.0), (40.0, 41.0)])

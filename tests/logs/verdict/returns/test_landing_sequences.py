@@ -8,7 +8,7 @@ import pytest
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.drawn_returns import min_safe_altitudes
-from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world
+from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world, required_heights
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
 from logs.verdict.returns.suggest_returns import meets_return_limits, suggest_parameters, suggest_rally_points
@@ -66,6 +66,42 @@ def test_the_approach_after_the_first_item_may_be_low_but_not_in_the_ground(
     assert {one.kind for one in found.each if 1500.0 < one.start[0] < 2500.0} == {kind}
     # The hill before the first item is judged as before.
     assert reaches(found, "ground") >= 700.0
+
+
+# From 100 m at 6 km down to 20 m at 7 km, where 30 m are required and the ground is at 0 m.
+THROUGH_THE_LIMIT = WAY + row(3, 189) + row(4, 16, 6000.0, 100.0) + row(5, 16, 7000.0, 20.0) + row(6, 21, 8000.0, 1.0)
+
+
+def test_no_more_height_is_required_in_a_landing_sequence_than_the_sequence_itself_has(tmp_path: Path) -> None:
+    """It loses 8 m in 100 m, and so in 5 s at ground speed v 0.4 v; a return loses 2 m more in its turn."""
+    setup = hill_setup(tmp_path, "", THROUGH_THE_LIMIT)
+    starts = planned_starts(setup, 1.0)
+    heights = required_heights(make_return_world(setup), starts)
+    checked = 0
+    for start, height in zip(starts.rows, heights.tolist(), strict=True):
+        if 6150.0 < start["east"] < 6800.0:
+            own = 100.0 - 0.08 * (float(start["east"]) - 6000.0) - 0.4 * float(start["velocity_east"])
+            if abs(own - 30.0) > 1.0:
+                assert height == pytest.approx(30.0 if own > 30.0 else own - 2.0, abs=1.0)
+                checked += 1
+    assert checked > 15
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_no_return_is_too_low_where_a_landing_sequence_passes_the_required_height(
+    tmp_path: Path, autopilot: str
+) -> None:
+    setup = hill_setup(tmp_path, f'[flight]\nautopilot = "{autopilot}"\n', THROUGH_THE_LIMIT)
+    world, starts = make_return_world(setup), planned_starts(setup, 0.25)
+    if autopilot == "ardupilot":
+        world = world.with_parameters(RTL_AUTOLAND=2)
+    east, up = starts.rows["east"], starts.rows["up"]
+    in_sequence = starts.subset(np.flatnonzero((east > 6100.0) & (up > 25.0) & (up < 40.0)))
+    found = judge_returns(world, in_sequence, 0.25)
+    assert len(found.each) > 20
+    assert {one.kind for one in found.each} == {"safe"}
+    # Some of them sink below 30 m from above.
+    assert any(one.clearance < 30.0 < one.start[2] for one in found.each)
 
 
 @pytest.mark.parametrize("value", [1, 2])

@@ -13,7 +13,7 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.flown_phases import flown_phases
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.suggestions import suggest_launch_into_wind
+from logs.verdict.suggestions import suggest_better_launch
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved, with_hole
 from world.airfield import Launch
@@ -90,9 +90,33 @@ def test_a_launch_with_a_tailwind_is_offered_the_course_against_it(
     scenario = replace(flown.setup.scenario, wind=Wind(9.0, math.radians(from_deg)))
     setup = replace(flown.setup, scenario=scenario)
     windy = replace(requirements, setup=setup, ground_phases=replace(ground, procedures=procedures))
-    changes = [change for (change,) in suggest_launch_into_wind(windy, None, finding)]
+    changes = [change for (change,) in suggest_better_launch(windy, None, finding) if change.what == "launch course"]
     assert [change.wanted for change in changes] == ([] if wanted is None else [wanted])
     assert all(change.current == 90.0 for change in changes)
+
+
+@pytest.mark.parametrize(
+    ("thrown", "wind", "wanted"), [(6.0, 0.0, 14.0), (13.9, 0.0, 14.0), (14.0, 0.0, None), (6.0, 3.0, 11.0)]
+)
+def test_a_throw_that_is_too_slow_is_offered_the_speed_of_level_flight(
+    thrown: float, wind: float, wanted: float | None
+) -> None:
+    """Level flight takes 13.5 m/s of airspeed; the launch is to the east, and so much of it is a wind from there."""
+    flown = flown_circuit()
+    requirements, _ = flown_phases(route_requirements(flown.setup), flown.track)
+    finding, ground = found(flown.setup, flown.track, "launch"), requirements.ground_phases
+    assert ground is not None
+    assert ground.procedures.take_off is not None
+    take_off = replace(ground.procedures.take_off, launch=replace(RAIL, method="hand"), speed=thrown)
+    scenario = replace(flown.setup.scenario, wind=Wind(wind, math.radians(90.0)))
+    least = replace(flown.setup.envelope, level_speed_min=np.full_like(flown.setup.envelope.level_speed_min, 13.5))
+    setup = replace(flown.setup, scenario=scenario, limits=replace(flown.setup.limits, envelope=least))
+    thrown_ground = replace(ground, procedures=replace(ground.procedures, take_off=take_off))
+    calm = replace(requirements, setup=setup, ground_phases=thrown_ground)
+    changes = [change for (change,) in suggest_better_launch(calm, None, finding)]
+    assert [(change.what, change.wanted) for change in changes] == (
+        [] if wanted is None else [("launch speed", wanted)]
+    )
 
 
 def test_a_climb_over_unknown_ground_is_not_judged() -> None:

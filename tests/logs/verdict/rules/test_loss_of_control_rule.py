@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.logs.verdict.judging import judge, of
+from tests.logs.verdict.rules.flown_circuits import flown_circuit, found, moved
 from tests.synthetic import (
     copied,
 )
@@ -46,3 +48,17 @@ def test_the_first_row_of_each_departure_is_told(setup: FlightSetup, track: Trac
     columns = copied(track)
     columns["position"][3000:3600, 2] = -5.0
     assert "ground contact at 50.0 s" in of(judge(setup, Track(**columns)), "departure").reason
+
+
+@pytest.mark.parametrize(("height", "ok"), [(0.95, False), (1.05, True)])
+def test_an_aircraft_with_landing_gear_meets_the_ground_before_its_center_of_gravity_does(
+    height: float, ok: bool
+) -> None:
+    """The circuit is flown over level ground at 0 m; the track ends on the way, at its last row so high."""
+    flown = flown_circuit()
+    row = int(np.argmax(flown.track.time > 40.0))
+    track = flown.track.rows(0, row + 1)
+    low = moved(track, slice(row, row + 1), up=height - float(track.position[row, 2]))
+    item = found(flown.setup, low, "departure", "ground contact")
+    assert item.ok is ok
+    assert ("ground contact at 40.0 s on leg" in item.reason) is not ok

@@ -127,6 +127,32 @@ def test_an_arc_may_take_a_metre_a_second_of_speed(lost: float, steep: bool) -> 
     assert (steep_arc(route_requirements(make_setup(points)), 0) is not None) is steep
 
 
+@pytest.mark.parametrize(
+    ("missing", "is_finished", "ok"),
+    [(3.0, True, True), (3.0, False, False), (9.8, True, True), (10.2, True, False)],
+)
+def test_a_flown_arc_may_take_ten_metres_of_height(
+    missing: float, is_finished: bool, ok: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By geometry all of them fail: 2.6 m are 1 m/s at 25 m/s.  The legs are within 7.8 degrees."""
+    turn = math.radians(120.0)
+    arc = bank_radius() * turn
+    steeper = 2.0 * bank_radius() * math.tan(0.5 * turn) / arc
+    drop = 2000.0 * (missing / arc + math.tan(math.radians(7.8))) / steeper
+    points = [
+        [0.0, 0.0, 1500.0],
+        [0.0, 2000.0, 1500.0 - drop],
+        [2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn), 1500.0 - 2.0 * drop],
+    ]
+    setup = make_setup(points)
+    requirements = route_requirements(setup)
+    assert slope_findings(requirements, None, geometric=True)[0].ok is False
+    monkeypatch.setattr(slope_rule, "measure_slope", lambda *_: SlopeMeasure(is_finished=is_finished))
+    item = slope_findings(requirements, align_track(requirements, fly_path(setup)))[0]
+    assert item.ok is ok
+    assert (f"the arc at waypoint 1 (item 1) is too steep by {missing:.1f} m only" in item.reason) is ok
+
+
 @pytest.mark.parametrize(("slope", "ok"), [(8.71, True), (8.82, None), (-6.10, True), (-6.21, None)])
 def test_a_slope_is_decided_up_to_1_645_deviations_from_the_limit(slope: float, ok: bool | None) -> None:
     """13.7 less 1.645 x 3 is 8.765 degrees of climb; 7.8 less 1.645 x 1 is 6.155 of descent."""
