@@ -33,6 +33,7 @@ from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
     count_taken_photos,
+    is_line_unknown,
     is_line_usable,
     line_text,
     lines_headline,
@@ -84,9 +85,18 @@ class SurveyResult:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return all(is_line_usable(line) for lines in self.lines for line in lines) and all(
-            not overlap_faults(overlap) for overlap in self.overlaps
-        )
+        return not self.lost and not self.unknown_lines
+
+    @property
+    def unknown_lines(self) -> int:
+        """Number of photo lines that cannot be judged because too much of them lies outside the terrain data."""
+        return sum(is_line_unknown(line) for lines in self.lines for line in lines)
+
+    @property
+    def lost(self) -> bool:
+        """True if too much of a line is lost, or photos overlap less than required; False for unknown lines."""
+        lines = [line for lines in self.lines for line in lines if not is_line_unknown(line)]
+        return not all(map(is_line_usable, lines)) or any(overlap_faults(overlap) for overlap in self.overlaps)
 
     @property
     def headline(self) -> str:
@@ -119,6 +129,13 @@ class SurveyResult:
     @property
     def no_remedy_lines(self) -> tuple[str, ...]:
         """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
+        if self.unknown_lines:
+            terrain = self.setup.scenario.terrain
+            source = "the terrain data" if terrain is None else terrain.source
+            return (
+                f"nothing was tried: {count_text(self.unknown_lines, 'photo line')} outside the data of {source} cannot"
+                " be judged; an elevation file of the whole survey is needed (--terrain)",
+            )
         texts = [
             "nothing was found that would help: no distance between photos, turn-around, gates, order, course,"
             " parameter or airspeed alone, and no longer turn-arounds combined with a parameter or a lower airspeed"
@@ -226,7 +243,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
         flight = fly_and_judge(setup, None, advance, reference="never")
     result = _measure_survey(flight.requirements, flight.track, flight.verdict)
-    if not suggest or result.usable:
+    if not suggest or result.usable or result.unknown_lines:
         return result
     with stage("looking for what would help") as advance:
         step_counter = count(1)

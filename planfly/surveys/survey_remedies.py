@@ -14,6 +14,7 @@ from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
 from flight.mission.surveys import with_photo_spacing
 from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import GROUND_PATH, Finding
 from logs.verdict.measures.photo_lines import measure_overlap
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS
@@ -145,17 +146,18 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
     """Return the number of usable photo lines and the number of all photo lines, according to a verdict."""
-    lines = [finding.ok for finding in verdict.findings if finding.rule == "survey" and not finding.check]
+    lines = [finding.ok for finding in _line_findings(verdict)]
     return sum(is_usable is True for is_usable in lines), len(lines)
 
 
 def _usable_parts(verdict: Verdict) -> list[float]:
-    """Return the usable part of each photo line that was measured, %; 0 for a line that was not flown."""
-    return [
-        0.0 if finding.flown is None else finding.flown
-        for finding in verdict.findings
-        if finding.rule == "survey" and not finding.check
-    ]
+    """Return the usable part of each photo line that was measured, %; 0 for a line that was not flown or judged."""
+    return [0.0 if finding.flown is None else finding.flown for finding in _line_findings(verdict)]
+
+
+def _line_findings(verdict: Verdict) -> list[Finding]:
+    """Return the findings on the photo lines of a flight, without those on the overlap of their photos."""
+    return [finding for finding in verdict.findings if finding.rule == "survey" and finding.check in ("", GROUND_PATH)]
 
 
 def _success_key(verdict: Verdict) -> tuple[int, float, int]:

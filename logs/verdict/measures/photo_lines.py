@@ -31,16 +31,17 @@ class LineMeasure:
     """One photo line as flown.
 
     length: m.
-    usable, off_line, banked, off_height, camera_off: fractions of the length, which add up to 1.  An unusable part
-        belongs to the first condition that it fails.  off_line: not flown along, or too far to the side.  banked: too
-        much bank.  off_height: too large a height error.
-    lost_at_start, lost_at_end: unusable length at either end of the line, m.
+    usable, off_line, banked, off_height, camera_off, unknown: fractions of the length, which add up to 1.  A part that
+        is not usable belongs to the first condition that it fails.  off_line: not flown along, or too far to the side.
+        banked: too much bank.  off_height: too large a height error.  unknown: no other fault, but the terrain data do
+        not cover the ground, so the height error is unknown.
+    lost_at_start, lost_at_end: lost length at either end of the line, m; an unknown part is not lost.
     max_lateral_offset: maximum distance to the side of the line, m.
-    max_height_error: maximum height error, m, positive above.
+    max_height_error: maximum height error, m, positive above; NaN if unknown everywhere.
     photos, missed_photos: number of planned photos, and of those not taken; 0 if no distance between photos is stated.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
-    lost_spans: start and end of each unusable part, m from the line's start.
+    lost_spans, unknown_spans: start and end of each lost part and of each unknown part, m from the line's start.
     """
 
     length: float
@@ -58,6 +59,26 @@ class LineMeasure:
     lateral_tolerance: float
     min_height_tolerance: float
     lost_spans: tuple[tuple[float, float], ...] = ()
+    unknown: float = 0.0
+    unknown_spans: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def ok(self) -> bool | None:
+        """True if enough of the line is usable, False if too much is lost, None if that depends on unknown ground."""
+        return is_covered(self.usable, self.unknown)
+
+
+def is_covered(usable: float, unknown: float) -> bool | None:
+    """Return True if enough of a photo line is usable, False if too much is lost, None if unknown parts decide.
+
+    usable, unknown: fractions of the length of the line.
+
+    >>> is_covered(0.96, 0.04), is_covered(0.9, 0.0), is_covered(0.4, 0.6), is_covered(0.4, 0.5)
+    (True, False, None, False)
+    """
+    if usable >= PHOTO_COVERAGE_FRACTION:
+        return True
+    return None if usable + unknown >= PHOTO_COVERAGE_FRACTION else False
 
 
 def lateral_tolerance(requirements: RouteRequirements, survey: Survey) -> float:
@@ -101,8 +122,10 @@ def _line_rows(
     conditions = {
         "off_line": np.abs(across) <= lateral_tolerance(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
-        "off_height": np.abs(height_error) <= height_tolerance,
+        # An unknown height error is not too large.
+        "off_height": ~(np.abs(height_error) > height_tolerance),
         "camera_off": _camera_on_rows(requirements, line, axis, position, is_ahead),
+        "unknown": np.isfinite(height_error),
     }
     return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
 
@@ -115,15 +138,16 @@ def measure_line(
     if rows is None:
         return None
     length, along, is_ahead = rows.axis.length, rows.along, rows.is_ahead
-    is_good, meets_conditions, lost_fractions = np.ones(0, dtype=np.bool_), is_ahead, {}
+    is_good, meets_conditions, lost_fractions = np.ones(1, dtype=np.bool_), is_ahead, {}
     for name, is_met in rows.conditions.items():
-        meets_conditions = meets_conditions & is_met
-        previous_fraction = float(is_good.mean()) if is_good.size else 1.0
+        meets_conditions, is_kept = meets_conditions & is_met, is_good
         is_good = _line_steps(along, meets_conditions, length)
-        lost_fractions[name] = previous_fraction - float(is_good.mean())
-    good_steps = np.flatnonzero(is_good)
+        lost_fractions[name] = float(is_kept.mean()) - float(is_good.mean())
+    # `is_kept`: steps that are usable, or unknown.
+    kept_steps = np.flatnonzero(is_kept)
     step = length / len(is_good)
     is_on_line = is_ahead & (along >= 0.0) & (along <= length)
+    height_errors = rows.height_error[is_on_line & rows.conditions["unknown"]]
     photos, missed = _count_photos(
         line, _line_steps(along, is_ahead & rows.conditions["off_line"] & rows.conditions["camera_off"], length), length
     )
@@ -131,15 +155,16 @@ def measure_line(
         length=length,
         usable=float(is_good.mean()),
         **lost_fractions,
-        lost_at_start=float(good_steps[0] * step) if good_steps.size else length,
-        lost_at_end=float((len(is_good) - 1 - good_steps[-1]) * step) if good_steps.size else length,
+        lost_at_start=float(kept_steps[0] * step) if kept_steps.size else length,
+        lost_at_end=float((len(is_good) - 1 - kept_steps[-1]) * step) if kept_steps.size else length,
         max_lateral_offset=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
-        max_height_error=float(max(rows.height_error[is_on_line], key=abs, default=0.0)),
+        max_height_error=float(max(height_errors, key=abs, default=math.nan if is_on_line.any() else 0.0)),
         photos=photos,
         missed_photos=missed,
         lateral_tolerance=lateral_tolerance(requirements, survey),
-        min_height_tolerance=float(rows.height_tolerance.min(initial=math.inf)),
-        lost_spans=_runs_of_set_steps(~is_good, step),
+        min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
+        lost_spans=_runs_of_set_steps(~is_kept, step),
+        unknown_spans=_runs_of_set_steps(is_kept & ~is_good, step),
     )
 
 
@@ -254,7 +279,8 @@ class OverlapMeasure:
     line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
         and height above ground, m.
     min_height, max_height: heights above ground of the usable photos, m; NaN if none is usable.
-    unusable_fraction: fraction of the length of all lines without a usable photo, where no overlap is judged.
+    unusable_fraction, unknown_fraction: fractions of the length of all lines where no overlap is judged, because no
+        photo is usable, or because the terrain data do not cover the ground.
     """
 
     camera: Camera
@@ -270,6 +296,7 @@ class OverlapMeasure:
     min_height: float = math.nan
     max_height: float = math.nan
     unusable_fraction: float = 0.0
+    unknown_fraction: float = 0.0
 
     @property
     def needed_photo_spacing(self) -> float | None:
@@ -304,7 +331,7 @@ class _Strip(NamedTuple):
     """Points of a photo line, with a flag for usable points.
 
     positions: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
-    usable_fraction: fraction of the line's length with usable points.
+    usable_fraction, unknown_fraction: fractions of the line's length with usable points, and over unknown ground.
     """
 
     positions: Floats
@@ -312,6 +339,7 @@ class _Strip(NamedTuple):
     speeds: Floats
     is_usable: Flags
     usable_fraction: float = 1.0
+    unknown_fraction: float = 0.0
 
 
 def measure_overlap(
@@ -326,14 +354,18 @@ def measure_overlap(
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
     kept_strips = [
-        None if strip is None or strip.usable_fraction < PHOTO_COVERAGE_FRACTION else strip for strip in strips
+        None if strip is None or is_covered(strip.usable_fraction, strip.unknown_fraction) is False else strip
+        for strip in strips
     ]
     lengths = [LineAxis(requirements.points[line.first : line.last + 1]).length for line in survey.lines]
-    unusable_fractions = [1.0 if strip is None else 1.0 - strip.usable_fraction for strip in strips]
+    unknown_fractions = [0.0 if strip is None else strip.unknown_fraction for strip in strips]
+    kept_fractions = [0.0 if strip is None else strip.usable_fraction + strip.unknown_fraction for strip in strips]
     used_heights = [strip.heights[strip.is_usable] for strip in strips if strip is not None]
     heights = np.concatenate(used_heights) if used_heights else np.empty(0)
     measure = OverlapMeasure(
-        plan.camera, unusable_fraction=float(np.average(unusable_fractions, weights=lengths)) if strips else 0.0
+        plan.camera,
+        unusable_fraction=1.0 - float(np.average(kept_fractions, weights=lengths)),
+        unknown_fraction=float(np.average(unknown_fractions, weights=lengths)),
     )
     if heights.size:
         measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()))
@@ -353,20 +385,23 @@ def _line_strip(
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
         positions, speeds = axis.points_at(along), requirements.ground_speed[legs]
-        return _Strip(
-            positions, heights_over_ground(requirements, positions), speeds, np.ones(len(along), dtype=np.bool_)
-        )
+        heights = heights_over_ground(requirements, positions)
+        is_known = np.isfinite(heights)
+        known_fraction = float(is_known.mean())
+        return _Strip(positions, heights, speeds, is_known, known_fraction, 1.0 - known_fraction)
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    meets_conditions = rows.is_ahead
-    for is_met in rows.conditions.values():
-        meets_conditions = meets_conditions & is_met
-    usable_fraction = float(_line_steps(rows.along, meets_conditions, rows.axis.length).mean())
+    is_kept = rows.is_ahead & np.all([met for name, met in rows.conditions.items() if name != "unknown"], axis=0)
+    meets_conditions = is_kept & rows.conditions["unknown"]
+    kept_fraction, usable_fraction = (
+        float(_line_steps(rows.along, is_met, rows.axis.length).mean()) for is_met in (is_kept, meets_conditions)
+    )
     is_usable = meets_conditions & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
     speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
     heights = heights_over_ground(requirements, rows.position)
-    return _Strip(rows.position, heights, speeds, is_usable, usable_fraction)
+    unknown_fraction = kept_fraction - usable_fraction
+    return _Strip(rows.position, heights, speeds, is_usable, usable_fraction, unknown_fraction)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:

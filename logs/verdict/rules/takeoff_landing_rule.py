@@ -147,11 +147,13 @@ def _slope_finding(
 ) -> Finding:
     """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
 
+    A slope after a loiter begins where the route leaves the loiter's circle.
+
     rule: "takeoff" or "landing".
     An altitude is None if the terrain there is unknown.
     """
     waypoint_place = requirements.waypoint(last)
-    distance = float(requirements.runs[first:last].sum())
+    distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())
     if first_altitude is None or last_altitude is None:
         return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, distance)

@@ -54,7 +54,7 @@ def test_each_line_is_told_and_what_would_help_is_flown(
     [lines] = answer["surveys"]
     assert [(one["first_item"], one["last_item"]) for one in lines] == [(2, 4), (6, 8), (10, 12), (14, 16)]
     for one in lines:
-        parts = sum(one[name] for name in ("usable", "away", "banked", "high", "dark"))
+        parts = sum(one[name] for name in ("usable", "away", "banked", "high", "dark", "unknown"))
         assert parts == pytest.approx(1.0, abs=0.001)
         assert sum(high - low for low, high in one["lost_m"]) == pytest.approx(500.0 * (1.0 - one["usable"]), abs=2.0)
     assert (tmp_path / "better" / "survey.png").read_bytes().startswith(b"\x89PNG")

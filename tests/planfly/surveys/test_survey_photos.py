@@ -112,7 +112,7 @@ def test_a_camera_that_is_too_slow_takes_fewer_photos(tmp_path: Path) -> None:
 def test_the_first_line_names_an_overlap_that_is_too_small(tmp_path: Path) -> None:
     setup = setup_with(tmp_path, survey_of(75.0))
     [survey] = judged_surveys(setup)
-    usable: Any = SimpleNamespace(usable=1.0, photos=14, missed_photos=0)
+    usable: Any = SimpleNamespace(ok=True, usable=1.0, photos=14, missed_photos=0)
     lines = tuple(itertools.repeat(usable, len(survey.lines)))
     overlap = OverlapMeasure(CAMERA, 0.348, photo_spacing=75.0)
     verdict: Any = None
