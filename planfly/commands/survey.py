@@ -138,6 +138,7 @@ def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
             for survey, lines in zip(result.surveys, result.lines, strict=True)
         ],
         photos=result.photos,
+        line_photos=result.line_photos,
         overlaps=[None if overlap is None else overlap_entry(overlap) for overlap in result.overlaps],
         remedies=[survey_remedy_entry(remedy) for remedy in result.remedies],
         nearest=None if result.nearest is None else near_miss_entry(result.nearest),

@@ -79,12 +79,16 @@ def survey_text(survey: Survey) -> str:
     return f"{count_text(len(survey.lines), 'line')}, {survey.spacing:.0f} m apart, the first on course {course}°"
 
 
-def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
+def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> tuple[str, ...]:
     """Return texts on the photo overlap along and across the lines, or on why it is not judged.
+
+    is_flown: True if at least one line was flown.
 
     >>> overlap_lines(None)
     ('overlap not judged: the camera is unknown (--camera)',)
     """
+    if not is_flown:
+        return ("photos not judged: no line was flown",)
     if measure is None:
         return ("overlap not judged: the camera is unknown (--camera)",)
     texts = [overlap_text(measure, check) for check in (FRONT_OVERLAP, SIDE_OVERLAP)]
@@ -137,17 +141,13 @@ def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
     }
 
 
-def count_taken_photos(survey: Survey, lines: Sequence[LineMeasure | None], overlap: OverlapMeasure | None) -> int:
-    """Return the number of photos taken on the lines of a survey; 0 if the distance between photos is not stated.
+def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
+    """Return the number of photos taken on lines; 0 if the distance between photos is not stated.
 
-    A camera that cannot follow the trigger distance takes photos in its shortest interval.
+    >>> count_line_photos([None])
+    0
     """
-    count = 0.0
-    for line, measure in zip(survey.lines, lines, strict=True):
-        taken = 0 if measure is None else measure.photos - measure.missed_photos
-        is_limited = overlap is not None and overlap.is_camera_limited
-        count += taken * line.photo / overlap.photo_spacing if overlap is not None and is_limited else taken
-    return round(count)
+    return sum(0 if measure is None else measure.photos - measure.missed_photos for measure in lines)
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:

@@ -96,7 +96,9 @@ class SurveyAnswer:
     conditions: Conditions
     surveys: list[list[PhotoLineEntry]]
     photos: int
-    """Number of photos taken on all lines; 0 if no item states the distance between photos."""
+    """Number of photos taken over the whole flight while the camera is on; 0 if no item states their distance."""
+    line_photos: int
+    """Number of those photos taken on the lines."""
     overlaps: list[OverlapEntry | None]
     """Overlaps of each survey; null if its camera is not known."""
     remedies: list[SurveyRemedyEntry]

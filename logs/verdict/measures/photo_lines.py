@@ -1,5 +1,6 @@
 """Measure how much of a photo line was flown usably for photos, and how much its photos overlap."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Camera, Command
-from flight.mission.surveys import LineAxis, PhotoLine, Survey, survey_plan
+from flight.mission.items import Camera, Command, Mission
+from flight.mission.surveys import LineAxis, PhotoLine, Survey, camera_spacing, survey_plan
 from flight.simulation.track import ROLL
 from logs.verdict.measures.acceptance import acceptance_condition, position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -38,7 +39,8 @@ class LineMeasure:
     lost_at_start, lost_at_end: lost length at either end of the line, m; an unknown part is not lost.
     max_lateral_offset: maximum distance to the side of the line, m.
     max_height_error: maximum height error, m, positive above; NaN if unknown everywhere.
-    photos, missed_photos: number of planned photos, and of those not taken; 0 if no distance between photos is stated.
+    photos, missed_photos: number of planned photos, and of those not taken, also because the camera is too slow; 0 if
+        no distance between photos is stated.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
     lost_spans, unknown_spans: start and end of each lost part and of each unknown part, m from the line's start.
@@ -148,9 +150,16 @@ def measure_line(
     step = length / len(is_good)
     is_on_line = is_ahead & (along >= 0.0) & (along <= length)
     height_errors = rows.height_error[is_on_line & rows.conditions["unknown"]]
-    photos, missed = _count_photos(
-        line, _line_steps(along, is_ahead & rows.conditions["off_line"] & rows.conditions["camera_off"], length), length
+    is_taken = _line_steps(along, is_ahead & rows.conditions["off_line"] & rows.conditions["camera_off"], length)
+    step_middles = (np.arange(len(is_taken)) + 0.5) * step
+    order = np.argsort(along[is_ahead])
+    speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)[is_ahead][order]
+    spacing = _photo_spacing(
+        requirements.setup.mission,
+        line.photo,
+        np.interp(step_middles, along[is_ahead][order], speeds) if speeds.size else np.zeros(len(step_middles)),
     )
+    photos, missed = _count_photos(line, is_taken, length, spacing)
     return LineMeasure(
         length=length,
         usable=float(is_good.mean()),
@@ -251,13 +260,49 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
     return np.cumsum(marks[:-1]) > 0
 
 
-def _count_photos(line: PhotoLine, is_taken: Flags, length: float) -> tuple[int, int]:
-    """Return the number of planned photos on a line, and the number of missed photos."""
+def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floats) -> tuple[int, int]:
+    """Return the number of planned photos on a line, and the number of those that are not taken.
+
+    spacing: distance between photos that the camera can take on each step of the line, m.
+    """
     if line.photo <= 0.0:
         return 0, 0
-    count = int(length / line.photo) + 1
-    steps = np.minimum((np.arange(count) * line.photo / length * len(is_taken)).astype(int), len(is_taken) - 1)
-    return count, int(np.count_nonzero(~is_taken[steps]))
+    count, step_count = int(length / line.photo) + 1, len(is_taken)
+    photos_before_edge = np.concatenate([[0.0], np.cumsum(length / step_count / spacing)])
+    # A millionth of a photo is rounding.
+    numbers = np.arange(int(photos_before_edge[-1] + 1e-6) + 1)
+    steps = np.minimum(np.interp(numbers, photos_before_edge, np.arange(step_count + 1)).astype(int), step_count - 1)
+    return count, count - int(np.count_nonzero(is_taken[steps]))
+
+
+def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Floats:
+    """Return the distances between photos that the camera can take at some ground speeds, m, (n,).
+
+    photo_spacing: distance between photos that the items state, m.
+    speeds: m/s, (n,).
+    """
+    plan = survey_plan(mission, photo_spacing)
+    interval = 0.0 if plan is None or plan.camera is None else plan.camera.interval
+    return np.maximum(photo_spacing, interval * speeds)
+
+
+def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) -> int:
+    """Return the number of photos that the camera takes over a whole flight, on the lines and beside them.
+
+    The camera takes the first photo where it is switched on.  Items that state no distance between photos add none.
+    """
+    setup, track, photo_count = requirements.setup, aligned.track, 0
+    spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
+    for spacing, group in itertools.groupby(range(len(spacings)), spacings.__getitem__):
+        legs = list(group)
+        rows = slice(int(aligned.rows[legs[0]]), int(aligned.rows[legs[-1] + 1]) + 1)
+        # A distance of NaN is not positive.
+        if not spacing > 0.0 or not aligned.passed[legs[0]] or rows.stop - rows.start < 2:
+            continue
+        lengths = np.hypot(*np.diff(track.position[rows, :2], axis=0).T)
+        speeds = np.hypot(*track.velocity[rows, :2].T)[1:]
+        photo_count += int(float((lengths / _photo_spacing(setup.mission, spacing, speeds)).sum()) + 1e-6) + 1
+    return photo_count
 
 
 # ----------------------------------------------------------------------
@@ -349,7 +394,7 @@ def measure_overlap(
 
     Return None if no camera is known.
     """
-    plan = survey_plan(requirements.setup.mission, survey)
+    plan = survey_plan(requirements.setup.mission, survey.lines[0].photo)
     if plan is None or plan.camera is None:
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]

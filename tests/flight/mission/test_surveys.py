@@ -292,9 +292,9 @@ def test_a_plan_is_its_surveys_by_the_way_between_photos() -> None:
     [found] = find_surveys(route, camera_spacing(read, route))
     mine, other, any_ = SurveyPlan(25.0000004, 30.0), SurveyPlan(20.0, 10.0), SurveyPlan(None)
     for plans, expected in (((other, mine), mine), ((other,), None), ((other, any_), any_), ((any_, mine), mine)):
-        assert survey_plan(replace(read, survey_plans=plans), found) == expected
+        assert survey_plan(replace(read, survey_plans=plans), found.lines[0].photo) == expected
     # Two of one way between photos that differ are nobody's.
-    assert survey_plan(replace(read, survey_plans=(mine, replace(mine, turn_around=5.0))), found) is None
+    assert survey_plan(replace(read, survey_plans=(mine, replace(mine, turn_around=5.0))), found.lines[0].photo) is None
 
 
 def test_two_surveys_of_one_mission() -> None:
