@@ -219,23 +219,30 @@ def _camera_on_rows(
     The camera is on from the row that reaches the waypoint where it is switched on, to the row that reaches the
     waypoint where it is switched off.  Both waypoints may be beyond the line's ends, and each is optional.
     """
-    follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(position))
-    along = axis.project(position)[0]
+    rows, along = np.arange(len(position)), axis.project(position)[0]
 
     def first_row_at(waypoint: int, first_row: int = 0) -> int:
         """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
         point = requirements.points[waypoint]
         distances = np.hypot(*(position[:, :2] - point[:2]).T)
-        # An autopilot that follows a path is at a waypoint where the path passes it, and a gate is passed at its plane.
-        is_exact = follows_path or _is_gate(requirements, waypoint)
-        radius = 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
-        is_at_waypoint = (distances <= radius) | (along >= axis.project(point[None])[0][0])
+        is_at_waypoint = (distances <= _switch_radius(requirements, waypoint)) | (
+            along >= axis.project(point[None])[0][0]
+        )
         indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
 
     on_row = first_row_at(line.camera_on_at) if line.camera_on_at >= 0 else 0
     off_row = first_row_at(line.camera_off_at, on_row) if line.camera_off_at >= 0 else len(along)
     return (rows >= on_row) & (rows <= off_row)
+
+
+def _switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
+    """Return the distance before a waypoint at which the items after it switch the camera, m.
+
+    An autopilot that follows a path is at a waypoint where the path passes it, and a gate is passed at its plane.
+    """
+    is_exact = requirements.setup.autopilot.turns.follows_path or _is_gate(requirements, waypoint)
+    return 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
 
 
 def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
@@ -286,6 +293,14 @@ def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Fl
     return np.maximum(photo_spacing, interval * speeds)
 
 
+def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> int:
+    """Return the row at which the items after a waypoint switch the camera; the last row before it if not passed."""
+    first, last = int(aligned.rows[max(0, waypoint - 1)]), int(aligned.rows[waypoint]) + 1
+    offsets = aligned.track.position[first:last, :2] - requirements.points[waypoint, :2]
+    indices = np.flatnonzero(np.hypot(*offsets.T) <= _switch_radius(requirements, waypoint))
+    return first + int(indices[0]) if indices.size else last - 1
+
+
 def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) -> int:
     """Return the number of photos that the camera takes over a whole flight, on the lines and beside them.
 
@@ -295,7 +310,7 @@ def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) 
     spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
     for spacing, group in itertools.groupby(range(len(spacings)), spacings.__getitem__):
         legs = list(group)
-        rows = slice(int(aligned.rows[legs[0]]), int(aligned.rows[legs[-1] + 1]) + 1)
+        rows = slice(*(_switch_row(requirements, aligned, waypoint) for waypoint in (legs[0], legs[-1] + 1)))
         # A distance of NaN is not positive.
         if not spacing > 0.0 or not aligned.passed[legs[0]] or rows.stop - rows.start < 2:
             continue

@@ -106,8 +106,8 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
 
 @pytest.mark.parametrize(("interval", "photos"), [(0.0, 21), (3.0, 14), (1.0, 21)])
 def test_the_camera_takes_photos_while_it_is_on_and_no_faster_than_it_can(interval: float, photos: int) -> None:
-    """One photo every 50 m of 1,000 m, the first at once; in 3 s at 25 m/s it flies 75 m, in 1 s only 25 m."""
-    setup = setup_of(wp(0, 0), wp(0, 500), "2 206 50 0 1 0 0 0 0", wp(0, 1500), "2 206 0 0 1 0 0 0 0", wp(0, 2500))
+    """One photo every 50 m of 1,010 m, the first at once; in 3 s at 25 m/s it flies 75 m, in 1 s only 25 m."""
+    setup = setup_of(wp(0, 0), wp(0, 500), "2 206 50 0 1 0 0 0 0", wp(0, 1510), "2 206 0 0 1 0 0 0 0", wp(0, 2500))
     plan = SurveyPlan(50.0, 0.0, replace(CAMERA, interval=interval))
     setup = replace(setup, mission=replace(setup.mission, survey_plans=(plan,)))
     requirements = route_requirements(setup)
