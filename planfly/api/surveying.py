@@ -149,7 +149,8 @@ class SurveyResult:
             )
         texts = [
             "nothing was found that would help: no distance between photos, turn-around, gates, order, course,"
-            " parameter or airspeed alone, and no longer turn-arounds combined with a parameter or a lower airspeed"
+            " parameter or airspeed alone, and no longer turn-arounds combined with gates, a parameter or a lower"
+            " airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:

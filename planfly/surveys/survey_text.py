@@ -211,6 +211,6 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             # A mission that is too slow is made faster by its items, not by an option.
             option_text = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
-    if remedy.kind in ("parameter", "airspeed") and not math.isnan(remedy.turn_around):
+    if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"
