@@ -147,10 +147,8 @@ def _slope_finding(
 ) -> Finding:
     """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
 
-    A slope after a loiter begins where the route leaves the loiter's circle.
-
     rule: "takeoff" or "landing".
-    An altitude is None if the terrain there is unknown.
+    An altitude is None if the terrain there is unknown.  After a loiter the slope begins where its circle is left.
     """
     waypoint_place = requirements.waypoint(last)
     distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())

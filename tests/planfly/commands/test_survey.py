@@ -71,7 +71,7 @@ def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.Captur
     of_flight, of_log = planfly.survey(flown), planfly.survey(tmp_path / "f.mcap")
     assert of_flight.survey_lines == of_log.survey_lines
     assert repr(of_log) == f"<SurveyResult field.waypoints: {of_log.headline}>"
-    assert of_log.survey_lines[1] == "overlap not judged: the camera is unknown (--camera)"
+    assert of_log.survey_lines[2] == "overlap not judged: the camera is unknown (--camera)"
     # 120 m up: 176 m by 117 m, a photo each 20 m; lines 60 m apart, each within 20 m of where it is drawn.
     [seen] = planfly.survey(flown, camera=(23.5, 15.6, 16.0)).overlaps
     assert seen is not None

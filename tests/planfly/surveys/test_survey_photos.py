@@ -14,7 +14,7 @@ from flight.mission.items import Camera, Command, Mission, SurveyPlan
 from flight.mission.surveys import PhotoLine, camera_notes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.photo_lines import OverlapMeasure, _count_photos, count_flight_photos
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, _count_photos, count_flight_photos
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Place
@@ -145,3 +145,25 @@ def test_the_first_line_names_an_overlap_that_is_too_small(tmp_path: Path) -> No
     assert result.headline == "3 of 3 photo lines can be used; front overlap 34.8 % < 65 %"
     assert not result.usable
     assert result.line_photos == 42
+
+
+def test_lines_over_unknown_ground_are_neither_usable_nor_lost_and_nothing_is_tried(tmp_path: Path) -> None:
+    setup = setup_with(tmp_path, survey_of(75.0))
+    usable, unknown, lost = (
+        LineMeasure(1000.0, part, 0.0, 0.0, 0.9 - part, 0.0, 0.0, 0.0, 0.0, 0.0, 14, 0, 25.0, 10.0, unknown=0.1)
+        for part in (0.96, 0.9, 0.8)
+    )
+    [survey] = judged_surveys(setup)
+    nothing: Any = None
+
+    def result_of(*lines: LineMeasure) -> planfly.SurveyResult:
+        return planfly.SurveyResult(setup, nothing, nothing, (survey,), (lines,), (None,))
+
+    open_, failed = result_of(usable, unknown, unknown), result_of(usable, unknown, lost)
+    assert (open_.lost, open_.usable, failed.lost) == (False, False, True)
+    assert open_.headline == "1 of 3 photo lines can be used; 2 lie outside the terrain data and cannot be judged"
+    assert failed.headline.endswith("1 lies outside the terrain data and cannot be judged; line 3 is the worst: 80 %")
+    [text] = open_.no_remedy_lines
+    assert text.startswith("nothing was tried: 2 photo lines outside the data of ")
+    assert text.endswith(" an elevation file of the whole survey is needed (--terrain)")
+    assert open_.survey_lines[-2].endswith("1000 m  not judged: 10 % over unknown ground")
