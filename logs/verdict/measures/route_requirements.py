@@ -452,13 +452,13 @@ class RouteRequirements:
         The waypoints of a loiter are corners outside the circle, which the leg leaves at a tangent point.
         """
         start = self.points[leg].copy()
-        if self.setup.route.arc_radii[leg] > 0.0:
-            start[:2] += float(min(self.length_after[leg], self.runs[leg])) * self.leg_unit(leg)
+        start[:2] += (float(self.runs[leg]) - self.straight_length(leg)) * self.leg_unit(leg)
         return start
 
     def straight_length(self, leg: int) -> float:
         """Return the horizontal length of a leg from `straight_start`, m."""
-        return float(np.hypot(*(self.points[leg + 1] - self.straight_start(leg))[:2]))
+        run = float(self.runs[leg])
+        return max(0.0, run - float(self.length_after[leg])) if self.setup.route.arc_radii[leg] > 0.0 else run
 
     def apexes(self) -> Floats:
         """Return the points at which the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
