@@ -21,6 +21,10 @@ class Notes:
     ...     notes.add("DO_SET_SERVO: not flown", seq)
     >>> notes.lines()
     ('items 3-5, 9: DO_SET_SERVO: not flown',)
+    >>> for seq in (12, 14, 16, 17):
+    ...     notes.add("DO_SET_SERVO: not flown", seq)
+    >>> notes.lines()
+    ('items 3-5, 9, 12 and 3 more: DO_SET_SERVO: not flown',)
     """
 
     _items: dict[str, list[int]] = field(default_factory=dict)
@@ -42,15 +46,20 @@ class Notes:
 
 
 def _range_text(numbers: list[int]) -> str:
-    """Return sorted numbers as text in which consecutive numbers are joined: "3-5, 9"."""
+    """Return sorted numbers as text in which consecutive numbers are joined: "3-5, 9", or "3-5, 9, 12 and 3 more"."""
     ranges: list[list[int]] = []
     for number in numbers:
         if not ranges or number > ranges[-1][1] + 1:
             ranges.append([number, number])
         ranges[-1][1] = number
-    return ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in ranges)
+    listed = ranges[:_MAX_LISTED_RANGES]
+    text = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in listed)
+    others = len(numbers) - sum(last - first + 1 for first, last in listed)
+    return f"{text} and {others} more" if others else text
 
 
+# Largest number of ranges of items that a note lists; the other items are counted.
+_MAX_LISTED_RANGES = 3
 # Largest number of items in a mission file, far beyond what any autopilot stores.
 MAX_ITEMS = 20_000
 # Largest mission file, bytes.

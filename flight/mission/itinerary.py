@@ -591,8 +591,8 @@ class _ItineraryBuilder:
         notes = self.notes.px4 if as_px4 else self.notes.arduplane
         if treatment == Treatment.OPEN:
             self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
-        elif item.command in MARKS:
-            # Others jump to it; by itself it is flown as written.
+        elif item.command in MARKS or item.command in CAMERA_SWITCHES:
+            # Others jump to a mark; by itself it is flown as written. The survey rule judges the photos.
             return
         elif support.reason == CAMERA_REASON:
             notes.add(f"{name}: {CAMERA_REASON}", item.seq)

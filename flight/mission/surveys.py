@@ -216,13 +216,14 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
     return spacings
 
 
-def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
+def survey_plan(mission: Mission, photo_spacing: float) -> SurveyPlan | None:
     """Return the settings that the ground station stored in the mission for a survey, or None.
 
     The settings with the survey's distance between photos are returned. If no settings, or several different ones, have
     this distance, the first settings without a distance are returned; None if there are none.
+
+    photo_spacing: distance between photos of the survey, m.
     """
-    photo_spacing = survey.lines[0].photo
     matching_plans = {
         plan
         for plan in mission.survey_plans

@@ -219,7 +219,7 @@ def suggest_gentler_landing(
     if finding.ok is not False or not finding.place.index or ground is None:
         return ()
     leg = finding.place.index - 1
-    altitude, length = float(requirements.points[leg, 2]), float(requirements.runs[leg])
+    altitude, length = float(requirements.points[leg, 2]), requirements.straight_length(leg)
     limit = ground_slope_limit(requirements, leg, (altitude, ground), is_climb=False, is_landing=True)
     max_slope = min(limit.limit, max(limit.certain, LEVEL_SLOPE_RAD)) - SUGGESTION_ANGLE_MARGIN_RAD
     if max_slope <= 0.0:

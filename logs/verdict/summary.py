@@ -101,14 +101,22 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     aircraft_text = _unknown_aircraft_text([finding for finding in open_findings if finding.check == UNKNOWN_AIRCRAFT])
     other_briefs = [finding.brief for finding in open_findings if finding.check in APART_FROM_FLIGHT]
     item_briefs = [finding.brief for finding in open_findings if finding.check == NOT_FLOWN]
-    rest_texts = (
-        [f"{count_text(len(item_briefs) - _MAX_NAMED_FINDINGS, 'more item')}"]
-        if len(item_briefs) > _MAX_NAMED_FINDINGS
-        else []
-    )
     return "; ".join(
-        filter(None, [aircraft_text, path_text, *item_briefs[:_MAX_NAMED_FINDINGS], *rest_texts, *other_briefs])
+        filter(
+            None,
+            [aircraft_text, path_text, *_first_briefs(item_briefs, "item"), *_first_briefs(other_briefs, "finding")],
+        )
     )
+
+
+def _first_briefs(briefs: Sequence[str], noun: str) -> list[str]:
+    """Return the first briefs, and the count of the others.
+
+    >>> _first_briefs(["a", "b", "c", "d", "e"], "item")
+    ['a', 'b', 'c', 'd', '1 more item']
+    """
+    others = len(briefs) - _MAX_NAMED_FINDINGS
+    return [*briefs[:_MAX_NAMED_FINDINGS], *([count_text(others, f"more {noun}")] if others > 0 else [])]
 
 
 # Subjects of a sentence on an insufficiently known aircraft, with the places that are counted, by rule.

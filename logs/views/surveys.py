@@ -61,22 +61,30 @@ def _survey_panel(
         """Convert positions to distances along and across the survey's lines, m."""
         return (positions[:, :2] - origin) @ axes
 
-    usable_parts, lost_parts = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    usable_parts, lost_parts, unknown_parts = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros((0, 2))]
     labels = []
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, line_measures, strict=True), 1):
         corners = to_panel(requirements.points[line.first : line.last + 1])
-        for parts, spans in ((lost_parts, _lost_spans(measure)), (usable_parts, _usable_spans(measure))):
+        unknown_spans = () if measure is None else measure.unknown_spans
+        for parts, spans in (
+            (lost_parts, _lost_spans(measure)),
+            (unknown_parts, unknown_spans),
+            (usable_parts, _usable_spans(measure)),
+        ):
             for span_start, span_end in spans:
                 parts.append(_line_part(corners, span_start, span_end))
         if (number - 1) % step == 0:
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     track_points = to_panel(position[:: max(1, len(position) // _POINTS)])
-    layers = (
+    layers: tuple[Layer, ...] = (
         Layer("line", "usable part of a photo line", "planned", *join_with_gaps(usable_parts), quiet=True),
         Layer("line", "photo line, lost", "fail", *join_with_gaps(lost_parts), quiet=True),
         Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True),
     )
+    if len(unknown_parts) > 1:
+        unknown_line = join_with_gaps(unknown_parts)
+        layers = (*layers, Layer("line", "photo line outside the terrain data, not judged", "area", *unknown_line))
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
@@ -92,7 +100,8 @@ def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
     """Return the start and end of each usable part of a photo line, m."""
     if measure is None:
         return []
-    edges = [0.0, *(metres for span in measure.lost_spans for metres in span), measure.length]
+    gaps = sorted((*measure.lost_spans, *measure.unknown_spans))
+    edges = [0.0, *(metres for span in gaps for metres in span), measure.length]
     return [(start, end) for start, end in zip(edges[::2], edges[1::2], strict=True) if end > start]
 
 

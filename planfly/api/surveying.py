@@ -1,7 +1,7 @@
 """Judge which part of each photo line of a survey is usable, and suggest remedies for lost lines."""
 
 from dataclasses import dataclass, replace
-from itertools import count, starmap
+from itertools import count
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -17,7 +17,13 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
+from logs.verdict.measures.photo_lines import (
+    LineMeasure,
+    OverlapMeasure,
+    count_flight_photos,
+    measure_line,
+    measure_overlap,
+)
 from logs.verdict.measures.route_requirements import RouteRequirements, judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
@@ -32,7 +38,8 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
-    count_taken_photos,
+    count_line_photos,
+    is_line_unknown,
     is_line_usable,
     line_text,
     lines_headline,
@@ -62,6 +69,7 @@ class SurveyResult:
     surveys: surveys of the mission, in the order flown.
     lines: measures of each line of each survey; None for a line that was not flown.
     overlaps: overlap of the photos of each survey; None if it cannot be measured, for instance without a camera.
+    photos: number of photos taken over the whole flight, also beside the lines; 0 if no item states their distance.
     remedies: remedies that help, each tested by a flight; empty if none were requested or no line is lost.
     nearest: the trial that came closest to success, if remedies were requested and none helps.
     kept: reason why the layout was kept and no other layout was tried, for messages.
@@ -75,6 +83,7 @@ class SurveyResult:
     surveys: tuple[Survey, ...]
     lines: tuple[tuple[LineMeasure | None, ...], ...]
     overlaps: tuple[OverlapMeasure | None, ...] = ()
+    photos: int = 0
     remedies: tuple[SurveyRemedy, ...] = ()
     nearest: NearMiss | None = None
     kept: str = ""
@@ -84,9 +93,18 @@ class SurveyResult:
     @property
     def usable(self) -> bool:
         """True if enough of every line is usable and the photos overlap as required."""
-        return all(is_line_usable(line) for lines in self.lines for line in lines) and all(
-            not overlap_faults(overlap) for overlap in self.overlaps
-        )
+        return not self.lost and not self.unknown_lines
+
+    @property
+    def unknown_lines(self) -> int:
+        """Number of photo lines that cannot be judged because too much of them lies outside the terrain data."""
+        return sum(is_line_unknown(line) for lines in self.lines for line in lines)
+
+    @property
+    def lost(self) -> bool:
+        """True if too much of a line is lost, or photos overlap less than required; False for unknown lines."""
+        lines = [line for lines in self.lines for line in lines if not is_line_unknown(line)]
+        return not all(map(is_line_usable, lines)) or any(overlap_faults(overlap) for overlap in self.overlaps)
 
     @property
     def headline(self) -> str:
@@ -95,18 +113,21 @@ class SurveyResult:
         return "; ".join([lines_headline([line for lines in self.lines for line in lines]), *dict.fromkeys(faults)])
 
     @property
-    def photos(self) -> int:
+    def line_photos(self) -> int:
         """Number of photos taken on all lines; 0 if no item states the distance between photos."""
-        return sum(starmap(count_taken_photos, zip(self.surveys, self.lines, self.overlaps, strict=True)))
+        return sum(map(count_line_photos, self.lines))
 
     @property
     def survey_lines(self) -> tuple[str, ...]:
         """Lines that describe each survey and its photo lines."""
         texts = []
+        if self.photos:
+            texts.append(f"{count_text(self.photos, 'photo')} while the camera is on, {self.line_photos} on the lines")
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
-            photos = count_taken_photos(survey, lines, overlap)
-            photos_text = f", {count_text(photos, 'photo')}" if photos else ""
-            texts += [f"{survey_text(survey)}{photos_text}", *overlap_lines(overlap)]
+            photos = count_line_photos(lines)
+            photos_text = f", {count_text(photos, 'photo')} on them" if photos and len(self.surveys) > 1 else ""
+            is_flown = any(line is not None for line in lines)
+            texts += [f"{survey_text(survey)}{photos_text}", *overlap_lines(overlap, is_flown=is_flown)]
             texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
         texts += [f"note: {note}" for note in camera_notes(self.setup.mission, self.setup.route)]
         return (*texts, self.circles) if self.circles else tuple(texts)
@@ -119,9 +140,17 @@ class SurveyResult:
     @property
     def no_remedy_lines(self) -> tuple[str, ...]:
         """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
+        if self.unknown_lines:
+            terrain = self.setup.scenario.terrain
+            source = "the terrain data" if terrain is None else terrain.source
+            return (
+                f"nothing was tried: {count_text(self.unknown_lines, 'photo line')} outside the data of {source} cannot"
+                " be judged; an elevation file of the whole survey is needed (--terrain)",
+            )
         texts = [
             "nothing was found that would help: no distance between photos, turn-around, gates, order, course,"
-            " parameter or airspeed alone, and no longer turn-arounds combined with a parameter or a lower airspeed"
+            " parameter or airspeed alone, and no longer turn-arounds combined with gates, a parameter or a lower"
+            " airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
@@ -226,7 +255,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
         flight = fly_and_judge(setup, None, advance, reference="never")
     result = _measure_survey(flight.requirements, flight.track, flight.verdict)
-    if not suggest or result.usable:
+    if not suggest or result.usable or result.unknown_lines:
         return result
     with stage("looking for what would help") as advance:
         step_counter = count(1)
@@ -326,6 +355,6 @@ def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verd
     circles = [] if aligned is None else waypoint_circles(requirements, aligned)
     survey_circles = [circle for circle in circles if any(survey.has_leg(circle.waypoint - 1) for survey in surveys)]
     overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, survey) for survey in surveys)
-    return SurveyResult(
-        setup, track, verdict, surveys, lines, overlaps, circles=circles_text(requirements, survey_circles)
-    )
+    photos = 0 if aligned is None else count_flight_photos(requirements, aligned)
+    circles_note = circles_text(requirements, survey_circles)
+    return SurveyResult(setup, track, verdict, surveys, lines, overlaps, photos, circles=circles_note)

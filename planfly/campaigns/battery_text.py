@@ -30,11 +30,12 @@ def answer_line(result: BatteryResult) -> str:
     if math.isnan(result.capacity):
         return f"not judged: {_unknown_reason(result)}"
     low, high = result.interval
-    interval_text = f"{low:.0f} to {high:.0f} Wh" if math.isfinite(high) else f"at least {low:.0f} Wh"
+    confidence_text = f"at {goal.confidence:.0%} confidence"
+    interval_text = f"{low:.0f} to {high:.0f} Wh {confidence_text}"
+    if not math.isfinite(high):
+        interval_text = f"at least {low:.0f} Wh {confidence_text}, no upper bound with {len(result.rows)} flights"
     volts_text = f", {1000.0 * result.capacity / result.volts:.0f} mAh at {result.volts:.1f} V" if result.volts else ""
-    return (
-        f"{result.capacity:.0f} Wh ({interval_text} at {goal.confidence:.0%} confidence{volts_text}) keep {keeps_text}"
-    )
+    return f"{result.capacity:.0f} Wh ({interval_text}{volts_text}) keep {keeps_text}"
 
 
 def _unknown_reason(result: BatteryResult) -> str:

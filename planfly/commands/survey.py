@@ -65,15 +65,15 @@ def add_survey_parser(command_line: LineParser) -> None:
 def survey(args: argparse.Namespace) -> int:
     """Judge every photo line; return the exit code.
 
-    The exit code is 4 if a photo line is not usable, otherwise that of the verdict on the flight.
+    The exit code is 4 if too much of a photo line is lost, otherwise that of the verdict on the flight.
     """
     from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.survey, args)
     code = verdict_code(result.verdict)
-    if not result.usable:
+    if result.lost:
         code = NOT_FLYABLE
-    print(f"survey    {colour_text(result.headline, 'good' if result.usable else 'bad')}")
+    print(f"survey    {colour_text(result.headline, 'bad' if result.lost else 'good' if result.usable else 'warning')}")
     print(f"flight    {result.verdict.headline}")
     for text in flown_lines(judging_conditions(result.setup)):
         print(f"  {text}")
@@ -138,6 +138,7 @@ def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
             for survey, lines in zip(result.surveys, result.lines, strict=True)
         ],
         photos=result.photos,
+        line_photos=result.line_photos,
         overlaps=[None if overlap is None else overlap_entry(overlap) for overlap in result.overlaps],
         remedies=[survey_remedy_entry(remedy) for remedy in result.remedies],
         nearest=None if result.nearest is None else near_miss_entry(result.nearest),

@@ -12,8 +12,9 @@ from flight.autopilots.parts import Candidate
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
-from flight.mission.surveys import with_photo_spacing
+from flight.mission.surveys import Survey, with_photo_spacing
 from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import GROUND_PATH, Finding
 from logs.verdict.measures.photo_lines import measure_overlap
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS
@@ -49,7 +50,8 @@ class SurveyRemedy:
     verdict: verdict on the flight.
     mission: the mission as it was flown.
     length: length of its route, m.
-    turn_around: turn-around distance of the layout, also with a changed parameter or airspeed, m; NaN if unchanged.
+    turn_around: turn-around distance of the layout, also with gates or a changed parameter or airspeed, m; NaN if
+        unchanged.
     lead_in: distance before the first line, if longer than the turn-around distance, m.
     """
 
@@ -106,8 +108,9 @@ def find_survey_remedies(
 
     Of each kind of change, the smallest change that passes is returned.
 
-    If no single change is enough, longer turn-around distances are combined with another parameter value or a lower
-    airspeed.  There are at most four flights for each of about five changes.
+    If neither longer turn-around distances nor gates are enough, both are combined; if nothing else is enough, longer
+    turn-around distances are combined with another parameter value or a lower airspeed.  There are at most four flights
+    for each of about six changes.
 
     verdict: verdict on the flight of the setup.
     on_trial: called before each flight with a description of the change.
@@ -117,11 +120,12 @@ def find_survey_remedies(
         return TriedRemedies()
     trials = _Trials(setup, airframe, verdict, on_trial)
     longer_turn_around = trials.find_turn_around()
+    gates = trials.try_gates()
     candidates = [
         trials.try_photo_spacing(),
         trials.try_other_side(),
         longer_turn_around,
-        trials.try_gates(),
+        gates or (None if longer_turn_around else trials.find_gates_and_turn_around()),
         trials.find_stride(math.inf if longer_turn_around is None else longer_turn_around.value),
         trials.find_course(),
         trials.find_parameter(),
@@ -145,17 +149,18 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
     """Return the number of usable photo lines and the number of all photo lines, according to a verdict."""
-    lines = [finding.ok for finding in verdict.findings if finding.rule == "survey" and not finding.check]
+    lines = [finding.ok for finding in _line_findings(verdict)]
     return sum(is_usable is True for is_usable in lines), len(lines)
 
 
 def _usable_parts(verdict: Verdict) -> list[float]:
-    """Return the usable part of each photo line that was measured, %; 0 for a line that was not flown."""
-    return [
-        0.0 if finding.flown is None else finding.flown
-        for finding in verdict.findings
-        if finding.rule == "survey" and not finding.check
-    ]
+    """Return the usable part of each photo line that was measured, %; 0 for a line that was not flown or judged."""
+    return [0.0 if finding.flown is None else finding.flown for finding in _line_findings(verdict)]
+
+
+def _line_findings(verdict: Verdict) -> list[Finding]:
+    """Return the findings on the photo lines of a flight, without those on the overlap of their photos."""
+    return [finding for finding in verdict.findings if finding.rule == "survey" and finding.check in ("", GROUND_PATH)]
 
 
 def _success_key(verdict: Verdict) -> tuple[int, float, int]:
@@ -191,6 +196,7 @@ class _Trials:
     ) -> None:
         self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
         self._original_worst_margins, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
+        self._has_gates = False
         lost_legs = {
             finding.place.index for finding in verdict.findings if finding.rule == "survey" and finding.ok is not True
         }
@@ -249,6 +255,8 @@ class _Trials:
                 setup = self._changed_setup(mission, self._airframe)
             except PlanflyError:
                 return None
+        if self._has_gates:
+            mission = _with_gates(setup, judged_surveys(setup))
         return self._fly_trial(mission, self._airframe, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
@@ -323,23 +331,10 @@ class _Trials:
         PX4 flies past a gate, and switches the camera in the gate's plane instead of at its acceptance radius.  Returns
         None for an autopilot without gates, or if the flight does not pass.
         """
-        mission, route = self._setup.mission, self._setup.route
-        ends = {
-            int(route.items[i])
-            for survey in self._surveys
-            for line in survey.lines
-            for i in (line.first, line.last)
-            if line.begins < i < line.ends
-        }
-        items = tuple(
-            replace(item, command=int(Command.CONDITION_GATE), params=(0.0,) * 4)
-            if item.seq in ends and item.command == Command.NAV_WAYPOINT
-            else item
-            for item in mission.items
-        )
-        if not self._setup.autopilot.route_rules.reads_as_px4 or items == mission.items:
+        mission = _with_gates(self._setup, self._surveys)
+        if mission == self._setup.mission:
             return None
-        flight = self._fly_trial(replace(mission, items=items), self._airframe, "gates at the ends of the lines")
+        flight = self._fly_trial(mission, self._airframe, "gates at the ends of the lines")
         return SurveyRemedy("gates", "", 0.0, 1.0, "", *flight) if self._is_remedy(flight) else None
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
@@ -444,21 +439,35 @@ class _Trials:
     # Two changes together.
 
     def _find_turn_around_with(
-        self, change: str, airframe: Airframe, turn_arounds: Sequence[float], mission: Mission | None = None
+        self,
+        change: str,
+        airframe: Airframe,
+        turn_arounds: Sequence[float],
+        mission: Mission | None = None,
+        *,
+        has_gates: bool = False,
     ) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes in combination with another change.
 
         change: description of the other change.
         airframe, mission: changed airframe, and changed mission or None.
         turn_arounds: distances to try, in increasing order, m.
+        has_gates: True for gates at the ends of the lines.
         """
         trials = copy(self)
-        trials._airframe, trials._change_prefix = airframe, f"{change}, "
+        trials._airframe, trials._change_prefix, trials._has_gates = airframe, f"{change}, ", has_gates
         if mission is not None:
             trials._setup = replace(self._setup, mission=mission)
         remedy = trials._find_shortest_turn_around(1, turn_arounds, 0.0)
         self.nearest = trials.nearest
         return remedy
+
+    def find_gates_and_turn_around(self) -> SurveyRemedy | None:
+        """Try longer turn-around distances with gates; return None without gates, or if none passes."""
+        if not self._setup.autopilot.route_rules.reads_as_px4:
+            return None
+        remedy = self._find_turn_around_with("gates", self._airframe, self._longer_turn_arounds(), has_gates=True)
+        return None if remedy is None else replace(remedy, kind="gates", current=0.0, value=1.0, unit="")
 
     def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
         """Try longer turn-around distances with another value of one autopilot parameter.
@@ -555,6 +564,30 @@ class _Trials:
                 break
             with suppress(PlanflyError):
                 yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
+
+
+def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:
+    """Return a setup's mission with gates (CONDITION_GATE) at the ends of lines that have leads.
+
+    The mission is unchanged for an autopilot without gates.
+    """
+    mission, route = setup.mission, setup.route
+    if not setup.autopilot.route_rules.reads_as_px4:
+        return mission
+    ends = {
+        int(route.items[i])
+        for survey in surveys
+        for line in survey.lines
+        for i in (line.first, line.last)
+        if line.begins < i < line.ends
+    }
+    items = tuple(
+        replace(item, command=int(Command.CONDITION_GATE), params=(0.0,) * 4)
+        if item.seq in ends and item.command == Command.NAV_WAYPOINT
+        else item
+        for item in mission.items
+    )
+    return replace(mission, items=items)
 
 
 def ordinal_text(number: int) -> str:

@@ -7,7 +7,7 @@ from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.rules.survey_rule import overlap_text, unusable_parts_text
-from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
+from logs.verdict.tolerances import PHOTO_OVERLAP_FRACTION
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 from world.wording import count_text
 
@@ -16,14 +16,23 @@ MIN_STATED_FRACTION = 0.005
 
 
 def is_line_usable(measure: LineMeasure | None) -> bool:
-    """Return True if at least `PHOTO_COVERAGE_FRACTION` of a photo line is usable.
+    """Return True if at least `logs.verdict.tolerances.PHOTO_COVERAGE_FRACTION` of a photo line is usable.
 
     A line that was not flown is not usable.
 
     >>> is_line_usable(None)
     False
     """
-    return measure is not None and measure.usable >= PHOTO_COVERAGE_FRACTION
+    return measure is not None and measure.ok is True
+
+
+def is_line_unknown(measure: LineMeasure | None) -> bool:
+    """Return True if a photo line cannot be judged because too much of it lies outside the terrain data.
+
+    >>> is_line_unknown(None)
+    False
+    """
+    return measure is not None and measure.ok is None
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
@@ -33,10 +42,16 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
     """
     usable_count = sum(is_line_usable(measure) for measure in measures)
+    unknown_count = sum(is_line_unknown(measure) for measure in measures)
     summary = f"{usable_count} of {len(measures)} photo lines can be used"
-    if usable_count == len(measures):
+    if unknown_count:
+        verb = "lies" if unknown_count == 1 else "lie"
+        summary += f"; {unknown_count} {verb} outside the terrain data and cannot be judged"
+    if usable_count + unknown_count == len(measures):
         return summary
-    fractions = [-1.0 if measure is None else measure.usable for measure in measures]
+    fractions = [
+        -1.0 if measure is None else math.inf if is_line_unknown(measure) else measure.usable for measure in measures
+    ]
     worst_index = min(range(len(fractions)), key=lambda k: fractions[k])
     measure = measures[worst_index]
     return (
@@ -49,7 +64,8 @@ def line_text(number: int, measure: LineMeasure | None) -> str:
     """Describe the length of a photo line, its usable fraction, and the causes of the loss."""
     if measure is None:
         return f"line {number:<3} not flown"
-    text = f"line {number:<3} {measure.length:6.0f} m  {100.0 * measure.usable:5.1f} % can be used"
+    text = f"line {number:<3} {measure.length:6.0f} m  "
+    text += "not judged" if is_line_unknown(measure) else f"{100.0 * measure.usable:5.1f} % can be used"
     loss_text = unusable_parts_text(measure)
     photos_text = (
         f"; {measure.missed_photos} of {count_text(measure.photos, 'photo')} missed" if measure.missed_photos else ""
@@ -63,12 +79,16 @@ def survey_text(survey: Survey) -> str:
     return f"{count_text(len(survey.lines), 'line')}, {survey.spacing:.0f} m apart, the first on course {course}°"
 
 
-def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
+def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> tuple[str, ...]:
     """Return texts on the photo overlap along and across the lines, or on why it is not judged.
+
+    is_flown: True if at least one line was flown.
 
     >>> overlap_lines(None)
     ('overlap not judged: the camera is unknown (--camera)',)
     """
+    if not is_flown:
+        return ("photos not judged: no line was flown",)
     if measure is None:
         return ("overlap not judged: the camera is unknown (--camera)",)
     texts = [overlap_text(measure, check) for check in (FRONT_OVERLAP, SIDE_OVERLAP)]
@@ -90,6 +110,9 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     if measure.unusable_fraction > MIN_STATED_FRACTION:
         unusable_text = f"{100.0 * measure.unusable_fraction:.0f} % of the lines' length, where no photo can be used"
         texts.append(f"overlap not judged on {unusable_text}")
+    if measure.unknown_fraction > MIN_STATED_FRACTION:
+        unknown_text = f"{100.0 * measure.unknown_fraction:.0f} % of the lines' length, outside the terrain data"
+        texts.append(f"overlap not judged on {unknown_text}")
     if measure.ground_sampling is not None:
         sampling_text = " to ".join(dict.fromkeys(f"{100.0 * distance:.1f}" for distance in measure.ground_sampling))
         heights_text = f"{measure.min_height:.0f} m to {measure.max_height:.0f} m above ground"
@@ -118,17 +141,13 @@ def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
     }
 
 
-def count_taken_photos(survey: Survey, lines: Sequence[LineMeasure | None], overlap: OverlapMeasure | None) -> int:
-    """Return the number of photos taken on the lines of a survey; 0 if the distance between photos is not stated.
+def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
+    """Return the number of photos taken on lines; 0 if the distance between photos is not stated.
 
-    A camera that cannot follow the trigger distance takes photos in its shortest interval.
+    >>> count_line_photos([None])
+    0
     """
-    count = 0.0
-    for line, measure in zip(survey.lines, lines, strict=True):
-        taken = 0 if measure is None else measure.photos - measure.missed_photos
-        is_limited = overlap is not None and overlap.is_camera_limited
-        count += taken * line.photo / overlap.photo_spacing if overlap is not None and is_limited else taken
-    return round(count)
+    return sum(0 if measure is None else measure.photos - measure.missed_photos for measure in lines)
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
@@ -192,6 +211,6 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             # A mission that is too slow is made faster by its items, not by an option.
             option_text = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
-    if remedy.kind in ("parameter", "airspeed") and not math.isnan(remedy.turn_around):
+    if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"

@@ -26,12 +26,13 @@ class PhotoLineEntry:
     usable: float | None
     away: float | None
     """Share not flown, or flown too far off the line; of the rest, banked too much; then with a wrong height above
-    ground; then with the camera off."""
+    ground; then with the camera off; then over ground outside the terrain data, which is not judged."""
     banked: float | None
     high: float | None
     dark: float | None
+    unknown: float | None
     lost_m: list[tuple[float, float]]
-    """Segments that cannot be used, m from the start of the line."""
+    """Segments that cannot be used, m from the start of the line, without those over unknown ground."""
     photos: int | None
     missed: int | None
 
@@ -95,7 +96,9 @@ class SurveyAnswer:
     conditions: Conditions
     surveys: list[list[PhotoLineEntry]]
     photos: int
-    """Number of photos taken on all lines; 0 if no item states the distance between photos."""
+    """Number of photos taken over the whole flight while the camera is on; 0 if no item states their distance."""
+    line_photos: int
+    """Number of those photos taken on the lines."""
     overlaps: list[OverlapEntry | None]
     """Overlaps of each survey; null if its camera is not known."""
     remedies: list[SurveyRemedyEntry]
@@ -124,6 +127,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
         banked=round_to_1e4(None if measure is None else measure.banked),
         high=round_to_1e4(None if measure is None else measure.off_height),
         dark=round_to_1e4(None if measure is None else measure.camera_off),
+        unknown=round_to_1e4(None if measure is None else measure.unknown),
         lost_m=[] if measure is None else [(round(start, 1), round(end, 1)) for start, end in measure.lost_spans],
         photos=None if measure is None else measure.photos,
         missed=None if measure is None else measure.missed_photos,

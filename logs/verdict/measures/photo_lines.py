@@ -1,5 +1,6 @@
 """Measure how much of a photo line was flown usably for photos, and how much its photos overlap."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Camera, Command
-from flight.mission.surveys import LineAxis, PhotoLine, Survey, survey_plan
+from flight.mission.items import Camera, Command, Mission
+from flight.mission.surveys import LineAxis, PhotoLine, Survey, camera_spacing, survey_plan
 from flight.simulation.track import ROLL
 from logs.verdict.measures.acceptance import acceptance_condition, position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -31,16 +32,18 @@ class LineMeasure:
     """One photo line as flown.
 
     length: m.
-    usable, off_line, banked, off_height, camera_off: fractions of the length, which add up to 1.  An unusable part
-        belongs to the first condition that it fails.  off_line: not flown along, or too far to the side.  banked: too
-        much bank.  off_height: too large a height error.
-    lost_at_start, lost_at_end: unusable length at either end of the line, m.
+    usable, off_line, banked, off_height, camera_off, unknown: fractions of the length, which add up to 1.  A part that
+        is not usable belongs to the first condition that it fails.  off_line: not flown along, or too far to the side.
+        banked: too much bank.  off_height: too large a height error.  unknown: no other fault, but the terrain data do
+        not cover the ground, so the height error is unknown.
+    lost_at_start, lost_at_end: lost length at either end of the line, m; an unknown part is not lost.
     max_lateral_offset: maximum distance to the side of the line, m.
-    max_height_error: maximum height error, m, positive above.
-    photos, missed_photos: number of planned photos, and of those not taken; 0 if no distance between photos is stated.
+    max_height_error: maximum height error, m, positive above; NaN if unknown everywhere.
+    photos, missed_photos: number of planned photos, and of those not taken, also because the camera is too slow; 0 if
+        no distance between photos is stated.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
-    lost_spans: start and end of each unusable part, m from the line's start.
+    lost_spans, unknown_spans: start and end of each lost part and of each unknown part, m from the line's start.
     """
 
     length: float
@@ -58,6 +61,26 @@ class LineMeasure:
     lateral_tolerance: float
     min_height_tolerance: float
     lost_spans: tuple[tuple[float, float], ...] = ()
+    unknown: float = 0.0
+    unknown_spans: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def ok(self) -> bool | None:
+        """True if enough of the line is usable, False if too much is lost, None if that depends on unknown ground."""
+        return is_covered(self.usable, self.unknown)
+
+
+def is_covered(usable: float, unknown: float) -> bool | None:
+    """Return True if enough of a photo line is usable, False if too much is lost, None if unknown parts decide.
+
+    usable, unknown: fractions of the length of the line.
+
+    >>> is_covered(0.96, 0.04), is_covered(0.9, 0.0), is_covered(0.4, 0.6), is_covered(0.4, 0.5)
+    (True, False, None, False)
+    """
+    if usable >= PHOTO_COVERAGE_FRACTION:
+        return True
+    return None if usable + unknown >= PHOTO_COVERAGE_FRACTION else False
 
 
 def lateral_tolerance(requirements: RouteRequirements, survey: Survey) -> float:
@@ -101,8 +124,10 @@ def _line_rows(
     conditions = {
         "off_line": np.abs(across) <= lateral_tolerance(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
-        "off_height": np.abs(height_error) <= height_tolerance,
+        # An unknown height error is not too large.
+        "off_height": ~(np.abs(height_error) > height_tolerance),
         "camera_off": _camera_on_rows(requirements, line, axis, position, is_ahead),
+        "unknown": np.isfinite(height_error),
     }
     return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
 
@@ -115,31 +140,40 @@ def measure_line(
     if rows is None:
         return None
     length, along, is_ahead = rows.axis.length, rows.along, rows.is_ahead
-    is_good, meets_conditions, lost_fractions = np.ones(0, dtype=np.bool_), is_ahead, {}
+    is_good, meets_conditions, lost_fractions = np.ones(1, dtype=np.bool_), is_ahead, {}
     for name, is_met in rows.conditions.items():
-        meets_conditions = meets_conditions & is_met
-        previous_fraction = float(is_good.mean()) if is_good.size else 1.0
+        meets_conditions, is_kept = meets_conditions & is_met, is_good
         is_good = _line_steps(along, meets_conditions, length)
-        lost_fractions[name] = previous_fraction - float(is_good.mean())
-    good_steps = np.flatnonzero(is_good)
+        lost_fractions[name] = float(is_kept.mean()) - float(is_good.mean())
+    # `is_kept`: steps that are usable, or unknown.
+    kept_steps = np.flatnonzero(is_kept)
     step = length / len(is_good)
     is_on_line = is_ahead & (along >= 0.0) & (along <= length)
-    photos, missed = _count_photos(
-        line, _line_steps(along, is_ahead & rows.conditions["off_line"] & rows.conditions["camera_off"], length), length
+    height_errors = rows.height_error[is_on_line & rows.conditions["unknown"]]
+    is_taken = _line_steps(along, is_ahead & rows.conditions["off_line"] & rows.conditions["camera_off"], length)
+    step_middles = (np.arange(len(is_taken)) + 0.5) * step
+    order = np.argsort(along[is_ahead])
+    speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)[is_ahead][order]
+    spacing = _photo_spacing(
+        requirements.setup.mission,
+        line.photo,
+        np.interp(step_middles, along[is_ahead][order], speeds) if speeds.size else np.zeros(len(step_middles)),
     )
+    photos, missed = _count_photos(line, is_taken, length, spacing)
     return LineMeasure(
         length=length,
         usable=float(is_good.mean()),
         **lost_fractions,
-        lost_at_start=float(good_steps[0] * step) if good_steps.size else length,
-        lost_at_end=float((len(is_good) - 1 - good_steps[-1]) * step) if good_steps.size else length,
+        lost_at_start=float(kept_steps[0] * step) if kept_steps.size else length,
+        lost_at_end=float((len(is_good) - 1 - kept_steps[-1]) * step) if kept_steps.size else length,
         max_lateral_offset=float(np.abs(rows.across[is_on_line]).max(initial=0.0)),
-        max_height_error=float(max(rows.height_error[is_on_line], key=abs, default=0.0)),
+        max_height_error=float(max(height_errors, key=abs, default=math.nan if is_on_line.any() else 0.0)),
         photos=photos,
         missed_photos=missed,
         lateral_tolerance=lateral_tolerance(requirements, survey),
-        min_height_tolerance=float(rows.height_tolerance.min(initial=math.inf)),
-        lost_spans=_runs_of_set_steps(~is_good, step),
+        min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
+        lost_spans=_runs_of_set_steps(~is_kept, step),
+        unknown_spans=_runs_of_set_steps(is_kept & ~is_good, step),
     )
 
 
@@ -185,23 +219,30 @@ def _camera_on_rows(
     The camera is on from the row that reaches the waypoint where it is switched on, to the row that reaches the
     waypoint where it is switched off.  Both waypoints may be beyond the line's ends, and each is optional.
     """
-    follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(position))
-    along = axis.project(position)[0]
+    rows, along = np.arange(len(position)), axis.project(position)[0]
 
     def first_row_at(waypoint: int, first_row: int = 0) -> int:
         """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
         point = requirements.points[waypoint]
         distances = np.hypot(*(position[:, :2] - point[:2]).T)
-        # An autopilot that follows a path is at a waypoint where the path passes it, and a gate is passed at its plane.
-        is_exact = follows_path or _is_gate(requirements, waypoint)
-        radius = 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
-        is_at_waypoint = (distances <= radius) | (along >= axis.project(point[None])[0][0])
+        is_at_waypoint = (distances <= _switch_radius(requirements, waypoint)) | (
+            along >= axis.project(point[None])[0][0]
+        )
         indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
 
     on_row = first_row_at(line.camera_on_at) if line.camera_on_at >= 0 else 0
     off_row = first_row_at(line.camera_off_at, on_row) if line.camera_off_at >= 0 else len(along)
     return (rows >= on_row) & (rows <= off_row)
+
+
+def _switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
+    """Return the distance before a waypoint at which the items after it switch the camera, m.
+
+    An autopilot that follows a path is at a waypoint where the path passes it, and a gate is passed at its plane.
+    """
+    is_exact = requirements.setup.autopilot.turns.follows_path or _is_gate(requirements, waypoint)
+    return 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
 
 
 def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
@@ -226,13 +267,57 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
     return np.cumsum(marks[:-1]) > 0
 
 
-def _count_photos(line: PhotoLine, is_taken: Flags, length: float) -> tuple[int, int]:
-    """Return the number of planned photos on a line, and the number of missed photos."""
+def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floats) -> tuple[int, int]:
+    """Return the number of planned photos on a line, and the number of those that are not taken.
+
+    spacing: distance between photos that the camera can take on each step of the line, m.
+    """
     if line.photo <= 0.0:
         return 0, 0
-    count = int(length / line.photo) + 1
-    steps = np.minimum((np.arange(count) * line.photo / length * len(is_taken)).astype(int), len(is_taken) - 1)
-    return count, int(np.count_nonzero(~is_taken[steps]))
+    count, step_count = int(length / line.photo) + 1, len(is_taken)
+    photos_before_edge = np.concatenate([[0.0], np.cumsum(length / step_count / spacing)])
+    # A millionth of a photo is rounding.
+    numbers = np.arange(int(photos_before_edge[-1] + 1e-6) + 1)
+    steps = np.minimum(np.interp(numbers, photos_before_edge, np.arange(step_count + 1)).astype(int), step_count - 1)
+    return count, count - int(np.count_nonzero(is_taken[steps]))
+
+
+def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Floats:
+    """Return the distances between photos that the camera can take at some ground speeds, m, (n,).
+
+    photo_spacing: distance between photos that the items state, m.
+    speeds: m/s, (n,).
+    """
+    plan = survey_plan(mission, photo_spacing)
+    interval = 0.0 if plan is None or plan.camera is None else plan.camera.interval
+    return np.maximum(photo_spacing, interval * speeds)
+
+
+def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> int:
+    """Return the row at which the items after a waypoint switch the camera; the last row before it if not passed."""
+    first, last = int(aligned.rows[max(0, waypoint - 1)]), int(aligned.rows[waypoint]) + 1
+    offsets = aligned.track.position[first:last, :2] - requirements.points[waypoint, :2]
+    indices = np.flatnonzero(np.hypot(*offsets.T) <= _switch_radius(requirements, waypoint))
+    return first + int(indices[0]) if indices.size else last - 1
+
+
+def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) -> int:
+    """Return the number of photos that the camera takes over a whole flight, on the lines and beside them.
+
+    The camera takes the first photo where it is switched on.  Items that state no distance between photos add none.
+    """
+    setup, track, photo_count = requirements.setup, aligned.track, 0
+    spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
+    for spacing, group in itertools.groupby(range(len(spacings)), spacings.__getitem__):
+        legs = list(group)
+        rows = slice(*(_switch_row(requirements, aligned, waypoint) for waypoint in (legs[0], legs[-1] + 1)))
+        # A distance of NaN is not positive.
+        if not spacing > 0.0 or not aligned.passed[legs[0]] or rows.stop - rows.start < 2:
+            continue
+        lengths = np.hypot(*np.diff(track.position[rows, :2], axis=0).T)
+        speeds = np.hypot(*track.velocity[rows, :2].T)[1:]
+        photo_count += int(float((lengths / _photo_spacing(setup.mission, spacing, speeds)).sum()) + 1e-6) + 1
+    return photo_count
 
 
 # ----------------------------------------------------------------------
@@ -254,7 +339,8 @@ class OverlapMeasure:
     line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
         and height above ground, m.
     min_height, max_height: heights above ground of the usable photos, m; NaN if none is usable.
-    unusable_fraction: fraction of the length of all lines without a usable photo, where no overlap is judged.
+    unusable_fraction, unknown_fraction: fractions of the length of all lines where no overlap is judged, because no
+        photo is usable, or because the terrain data do not cover the ground.
     """
 
     camera: Camera
@@ -270,6 +356,7 @@ class OverlapMeasure:
     min_height: float = math.nan
     max_height: float = math.nan
     unusable_fraction: float = 0.0
+    unknown_fraction: float = 0.0
 
     @property
     def needed_photo_spacing(self) -> float | None:
@@ -304,7 +391,7 @@ class _Strip(NamedTuple):
     """Points of a photo line, with a flag for usable points.
 
     positions: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
-    usable_fraction: fraction of the line's length with usable points.
+    usable_fraction, unknown_fraction: fractions of the line's length with usable points, and over unknown ground.
     """
 
     positions: Floats
@@ -312,6 +399,7 @@ class _Strip(NamedTuple):
     speeds: Floats
     is_usable: Flags
     usable_fraction: float = 1.0
+    unknown_fraction: float = 0.0
 
 
 def measure_overlap(
@@ -321,19 +409,23 @@ def measure_overlap(
 
     Return None if no camera is known.
     """
-    plan = survey_plan(requirements.setup.mission, survey)
+    plan = survey_plan(requirements.setup.mission, survey.lines[0].photo)
     if plan is None or plan.camera is None:
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
     kept_strips = [
-        None if strip is None or strip.usable_fraction < PHOTO_COVERAGE_FRACTION else strip for strip in strips
+        None if strip is None or is_covered(strip.usable_fraction, strip.unknown_fraction) is False else strip
+        for strip in strips
     ]
     lengths = [LineAxis(requirements.points[line.first : line.last + 1]).length for line in survey.lines]
-    unusable_fractions = [1.0 if strip is None else 1.0 - strip.usable_fraction for strip in strips]
+    unknown_fractions = [0.0 if strip is None else strip.unknown_fraction for strip in strips]
+    kept_fractions = [0.0 if strip is None else strip.usable_fraction + strip.unknown_fraction for strip in strips]
     used_heights = [strip.heights[strip.is_usable] for strip in strips if strip is not None]
     heights = np.concatenate(used_heights) if used_heights else np.empty(0)
     measure = OverlapMeasure(
-        plan.camera, unusable_fraction=float(np.average(unusable_fractions, weights=lengths)) if strips else 0.0
+        plan.camera,
+        unusable_fraction=1.0 - float(np.average(kept_fractions, weights=lengths)),
+        unknown_fraction=float(np.average(unknown_fractions, weights=lengths)),
     )
     if heights.size:
         measure = replace(measure, min_height=float(heights.min()), max_height=float(heights.max()))
@@ -353,20 +445,23 @@ def _line_strip(
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
         positions, speeds = axis.points_at(along), requirements.ground_speed[legs]
-        return _Strip(
-            positions, heights_over_ground(requirements, positions), speeds, np.ones(len(along), dtype=np.bool_)
-        )
+        heights = heights_over_ground(requirements, positions)
+        is_known = np.isfinite(heights)
+        known_fraction = float(is_known.mean())
+        return _Strip(positions, heights, speeds, is_known, known_fraction, 1.0 - known_fraction)
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    meets_conditions = rows.is_ahead
-    for is_met in rows.conditions.values():
-        meets_conditions = meets_conditions & is_met
-    usable_fraction = float(_line_steps(rows.along, meets_conditions, rows.axis.length).mean())
+    is_kept = rows.is_ahead & np.all([met for name, met in rows.conditions.items() if name != "unknown"], axis=0)
+    meets_conditions = is_kept & rows.conditions["unknown"]
+    kept_fraction, usable_fraction = (
+        float(_line_steps(rows.along, is_met, rows.axis.length).mean()) for is_met in (is_kept, meets_conditions)
+    )
     is_usable = meets_conditions & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
     speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
     heights = heights_over_ground(requirements, rows.position)
-    return _Strip(rows.position, heights, speeds, is_usable, usable_fraction)
+    unknown_fraction = kept_fraction - usable_fraction
+    return _Strip(rows.position, heights, speeds, is_usable, usable_fraction, unknown_fraction)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:

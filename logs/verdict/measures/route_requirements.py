@@ -446,6 +446,20 @@ class RouteRequirements:
         """Return the unit vector (east, north) of a leg's course, (2,)."""
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
+    def straight_start(self, leg: int) -> Floats:
+        """Return the point where a leg leaves the circle of a loiter, or its first waypoint without a loiter, (3,) m.
+
+        The waypoints of a loiter are corners outside the circle, which the leg leaves at a tangent point.
+        """
+        start = self.points[leg].copy()
+        start[:2] += (float(self.runs[leg]) - self.straight_length(leg)) * self.leg_unit(leg)
+        return start
+
+    def straight_length(self, leg: int) -> float:
+        """Return the horizontal length of a leg from `straight_start`, m."""
+        run = float(self.runs[leg])
+        return max(0.0, run - float(self.length_after[leg])) if self.setup.route.arc_radii[leg] > 0.0 else run
+
     def apexes(self) -> Floats:
         """Return the points at which the fly-by path passes each waypoint: the midpoints of the arcs, (w, 3) m."""
         apexes = self.points.copy()

@@ -433,8 +433,8 @@ def approach_findings(
         return []
     waypoint, leg = landing[0], landing[0] - 1
     place, item_text = requirements.waypoint(waypoint), _item_text(requirements.waypoint(waypoint))
-    glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
-    length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
+    glide_start, landing_point = requirements.straight_start(leg), requirements.points[waypoint]
+    length, course = requirements.straight_length(leg), float(requirements.courses[leg])
     start_altitude, point_altitude = float(glide_start[2]), setup.route.landing_ground
     ground_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
     if point_altitude is None or math.isnan(ground_altitude) or length < MIN_LEG_LENGTH_M:

@@ -8,13 +8,23 @@ import math
 
 import numpy as np
 
-from flight.mission.surveys import PhotoLine, Survey
-from logs.verdict.findings import UNKNOWN_PATH, Fact, Finding, Message, finding_reason, make_finding, message
+from flight.mission.surveys import LineAxis, PhotoLine, Survey
+from logs.verdict.findings import (
+    GROUND_PATH,
+    UNKNOWN_PATH,
+    Fact,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+)
 from logs.verdict.measures.circle_reach import find_hazards
 from logs.verdict.measures.photo_lines import (
     LineMeasure,
     OverlapMeasure,
     heights_over_ground,
+    is_covered,
     measure_line,
     measure_overlap,
 )
@@ -30,6 +40,7 @@ from logs.verdict.tolerances import (
     PHOTO_COVERAGE_FRACTION,
     PHOTO_HEIGHT_FRACTION,
     PHOTO_OVERLAP_FRACTION,
+    PHOTO_STEP_M,
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
@@ -224,10 +235,13 @@ def _planned_finding(
     cut_in = max(turn_in, off_altitude)
     cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
-    ok = straight_fraction >= PHOTO_COVERAGE_FRACTION
+    unknown_fraction = min(_unknown_ground_fraction(requirements, line), straight_fraction)
+    ok = is_covered(straight_fraction - unknown_fraction, unknown_fraction)
     name = _line_text(requirements, survey, line, number)
     faults, facts = [], [f"{name}: its turns leave {100.0 * straight_fraction:.0f} % of its {length:.0f} m straight"]
-    if not ok:
+    if ok is None:
+        faults.append(_unknown_ground_message(requirements, unknown_fraction, length, name))
+    if ok is False:
         what, how = ("the turns at its ends leave", "straight")
         if off_altitude > turn_in:
             what, how = ("the climb or descent before it leaves", "at its planned height above ground")
@@ -238,6 +252,20 @@ def _planned_finding(
             )
         )
     return _line_finding(requirements, line, ok, faults, facts, straight_fraction, geometric=True)
+
+
+def _unknown_ground_fraction(requirements: RouteRequirements, line: PhotoLine) -> float:
+    """Return the fraction of a photo line as planned over which the height above ground is unknown."""
+    axis = LineAxis(requirements.points[line.first : line.last + 1])
+    along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
+    return float(np.isnan(heights_over_ground(requirements, axis.points_at(along))).mean())
+
+
+def _unknown_ground_message(requirements: RouteRequirements, fraction: float, length: float, name: str) -> Message:
+    """Return a message on the fraction of a photo line that lies outside the terrain data."""
+    terrain = requirements.setup.scenario.terrain
+    source_text = "the terrain data" if terrain is None else f"the data of {terrain.source}"
+    return message(f"{name}: {100.0 * fraction:.0f} % of its {length:.0f} m lies outside {source_text}")
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
@@ -260,14 +288,21 @@ def _clip_to_length(distance: float, length: float) -> float:
 def _flown_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine, number: int
 ) -> Finding:
-    """Judge the usable fraction of a photo line as flown; a line that was not flown is not judged."""
+    """Judge the usable fraction of a photo line as flown.
+
+    A line that was not flown is not judged, nor one whose usable fraction depends on unknown ground.
+    """
     name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
     if measure is None:
         return _line_finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
-    ok = measure.usable >= PHOTO_COVERAGE_FRACTION
-    faults = [] if ok else [_coverage_fault(measure, name)]
-    facts = [] if not ok else [f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used"]
+    ok = measure.ok
+    faults, facts = [], [f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used"]
+    if ok is None:
+        faults.append(_unknown_ground_message(requirements, measure.unknown, measure.length, name))
+        facts = [unusable_parts_text(measure)] if unusable_parts_text(measure) else []
+    elif not ok:
+        faults, facts = [_coverage_fault(measure, name)], []
     if measure.missed_photos:
         facts.append(f"{measure.missed_photos} of {count_text(measure.photos, 'photo')} missed")
     return _line_finding(requirements, line, ok, faults, facts, measure.usable, geometric=False, measure=measure)
@@ -283,6 +318,7 @@ def unusable_parts_text(measure: LineMeasure) -> str:
         f"banked more than {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
         f"more than {measure.min_height_tolerance:.0f} m off the planned height above ground": measure.off_height,
         "with the camera off": measure.camera_off,
+        "over unknown ground": measure.unknown,
     }
     parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)
     return ", ".join(f"{100.0 * fraction:.0f} % {defect}" for fraction, defect in parts)
@@ -316,7 +352,7 @@ def _line_finding(
     usable_fraction: usable fraction of the line's length; NaN if it was not flown.
     measure: measurements of the flown line, which are reported as facts.
     """
-    measurements = []
+    is_unknown, measurements = ok is None and bool(faults), []
     if measure is not None:
         measurements = [
             Fact("distance from the line", measure.max_lateral_offset, "m"),
@@ -331,14 +367,15 @@ def _line_finding(
         ok=ok,
         reason=finding_reason(faults, facts),
         faults=faults,
-        planned=100.0 * usable_fraction if geometric else 100.0,
-        flown=None if geometric else 100.0 * usable_fraction,
+        planned=None if geometric and is_unknown else 100.0 * usable_fraction if geometric else 100.0,
+        flown=None if geometric or is_unknown else 100.0 * usable_fraction,
         limit=100.0 * PHOTO_COVERAGE_FRACTION,
         at_least=True,
         source="default",
-        margin=100.0 * (usable_fraction - PHOTO_COVERAGE_FRACTION),
+        margin=None if is_unknown else 100.0 * (usable_fraction - PHOTO_COVERAGE_FRACTION),
         unit="%",
         method="the turns' arcs" if geometric else "on the line, level, at its height, camera on",
+        check=GROUND_PATH if is_unknown else "",
         facts=measurements,
     )
 

@@ -148,10 +148,10 @@ def _slope_finding(
     """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
 
     rule: "takeoff" or "landing".
-    An altitude is None if the terrain there is unknown.
+    An altitude is None if the terrain there is unknown.  After a loiter the slope begins where its circle is left.
     """
     waypoint_place = requirements.waypoint(last)
-    distance = float(requirements.runs[first:last].sum())
+    distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())
     if first_altitude is None or last_altitude is None:
         return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, distance)

@@ -90,6 +90,12 @@ def test_too_few_flights_have_no_upper_end(flights: int, has_upper_end: bool) ->
     assert math.isfinite(quantile_of_capacities(rows, BatteryGoal())[1].high) == has_upper_end
 
 
+def test_an_interval_without_an_upper_end_says_so(base: CampaignBase) -> None:
+    """24 flights are fewer than the 72 of the least interval with an upper end."""
+    line = answer_line(battery_result(base, [energy_row(80.0)] * 24, own=200.0))
+    assert " at 95% confidence, no upper bound with 24 flights" in line
+
+
 @pytest.mark.parametrize(("crashes", "is_known"), [(5, True), (6, False)])
 def test_flights_that_do_not_complete_leave_it_unknown(base: CampaignBase, crashes: int, is_known: bool) -> None:
     rows = [energy_row(80.0) for _ in range(100 - crashes)] + [energy_row() for _ in range(crashes)]

@@ -54,7 +54,7 @@ def test_each_line_is_told_and_what_would_help_is_flown(
     [lines] = answer["surveys"]
     assert [(one["first_item"], one["last_item"]) for one in lines] == [(2, 4), (6, 8), (10, 12), (14, 16)]
     for one in lines:
-        parts = sum(one[name] for name in ("usable", "away", "banked", "high", "dark"))
+        parts = sum(one[name] for name in ("usable", "away", "banked", "high", "dark", "unknown"))
         assert parts == pytest.approx(1.0, abs=0.001)
         assert sum(high - low for low, high in one["lost_m"]) == pytest.approx(500.0 * (1.0 - one["usable"]), abs=2.0)
     assert (tmp_path / "better" / "survey.png").read_bytes().startswith(b"\x89PNG")
@@ -71,7 +71,7 @@ def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.Captur
     of_flight, of_log = planfly.survey(flown), planfly.survey(tmp_path / "f.mcap")
     assert of_flight.survey_lines == of_log.survey_lines
     assert repr(of_log) == f"<SurveyResult field.waypoints: {of_log.headline}>"
-    assert of_log.survey_lines[1] == "overlap not judged: the camera is unknown (--camera)"
+    assert of_log.survey_lines[2] == "overlap not judged: the camera is unknown (--camera)"
     # 120 m up: 176 m by 117 m, a photo each 20 m; lines 60 m apart, each within 20 m of where it is drawn.
     [seen] = planfly.survey(flown, camera=(23.5, 15.6, 16.0)).overlaps
     assert seen is not None

@@ -1,26 +1,30 @@
 """Photos of a survey by their numbers: too far apart, too fast for the camera, their pixels, and their count."""
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import planfly
 from flight.mission.items import Camera, Command, Mission, SurveyPlan
-from flight.mission.surveys import camera_notes
+from flight.mission.surveys import PhotoLine, camera_notes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.photo_lines import OverlapMeasure
-from logs.verdict.measures.route_requirements import judged_surveys
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, _count_photos, count_flight_photos
+from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
-from planfly.surveys.survey_text import count_taken_photos, overlap_lines, remedy_text
+from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text
 from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.open_flight import open_flight
-from tests.mission_lines import mission, wp
+from tests.mission_lines import mission, setup_of, wp
+from tests.synthetic import fly_path
 
 # 23.5 mm by 15.6 mm behind 16 mm, 75 % and 65 % required, one photo per second, 6000 pixels across.
 CAMERA = Camera(23.5 / 16.0, 15.6 / 16.0, 0.75, 0.65, 1.0, 6000.0)
@@ -100,19 +104,39 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     assert not any("sampling" in text for text in overlap_lines(OverlapMeasure(unknown, **photos)))  # type: ignore[arg-type]
 
 
-def test_a_camera_that_is_too_slow_takes_fewer_photos(tmp_path: Path) -> None:
-    """Of 101 triggers 10 m apart one photo each 20 m."""
-    [survey] = judged_surveys(setup_with(tmp_path, survey_of(10.0)))
+@pytest.mark.parametrize(("interval", "photos"), [(0.0, 21), (3.0, 14), (1.0, 21)])
+def test_the_camera_takes_photos_while_it_is_on_and_no_faster_than_it_can(interval: float, photos: int) -> None:
+    """One photo every 50 m of 1,010 m, the first at once; in 3 s at 25 m/s it flies 75 m, in 1 s only 25 m."""
+    setup = setup_of(wp(0, 0), wp(0, 500), "2 206 50 0 1 0 0 0 0", wp(0, 1510), "2 206 0 0 1 0 0 0 0", wp(0, 2500))
+    plan = SurveyPlan(50.0, 0.0, replace(CAMERA, interval=interval))
+    setup = replace(setup, mission=replace(setup.mission, survey_plans=(plan,)))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup))
+    assert aligned is not None
+    assert count_flight_photos(requirements, aligned) == photos
+
+
+@pytest.mark.parametrize(("spacing", "missed"), [(10.0, 0), (12.5, 20), (40.0, 75)])
+def test_a_line_misses_the_photos_for_which_its_camera_is_too_slow(spacing: float, missed: int) -> None:
+    """Of 101 planned photos, one every 10 m of 1,000 m, a camera takes 81 every 12.5 m and 26 every 40 m."""
+    line = PhotoLine(0, 1, 0, 1, 10.0)
+    steps = np.ones(1000, dtype=np.bool_)
+    assert _count_photos(line, steps, 1000.0, np.full(1000, spacing)) == (101, missed)
+
+
+def test_the_photos_on_the_lines_are_those_not_missed() -> None:
     line: Any = SimpleNamespace(photos=101, missed_photos=1)
-    assert count_taken_photos(survey, [line, None, line], None) == 200
-    limited = OverlapMeasure(CAMERA, 0.8, photo_spacing=20.0, is_camera_limited=True)
-    assert count_taken_photos(survey, [line, None, line], limited) == 100
+    assert count_line_photos([line, None, line]) == 200
+
+
+def test_a_flight_without_lines_does_not_deny_the_camera() -> None:
+    assert overlap_lines(None, is_flown=False) == ("photos not judged: no line was flown",)
 
 
 def test_the_first_line_names_an_overlap_that_is_too_small(tmp_path: Path) -> None:
     setup = setup_with(tmp_path, survey_of(75.0))
     [survey] = judged_surveys(setup)
-    usable: Any = SimpleNamespace(usable=1.0, photos=14, missed_photos=0)
+    usable: Any = SimpleNamespace(ok=True, usable=1.0, photos=14, missed_photos=0)
     lines = tuple(itertools.repeat(usable, len(survey.lines)))
     overlap = OverlapMeasure(CAMERA, 0.348, photo_spacing=75.0)
     verdict: Any = None
@@ -120,4 +144,26 @@ def test_the_first_line_names_an_overlap_that_is_too_small(tmp_path: Path) -> No
     result = planfly.SurveyResult(setup, track, verdict, (survey,), (lines,), (overlap,))
     assert result.headline == "3 of 3 photo lines can be used; front overlap 34.8 % < 65 %"
     assert not result.usable
-    assert result.photos == 42
+    assert result.line_photos == 42
+
+
+def test_lines_over_unknown_ground_are_neither_usable_nor_lost_and_nothing_is_tried(tmp_path: Path) -> None:
+    setup = setup_with(tmp_path, survey_of(75.0))
+    usable, unknown, lost = (
+        LineMeasure(1000.0, part, 0.0, 0.0, 0.9 - part, 0.0, 0.0, 0.0, 0.0, 0.0, 14, 0, 25.0, 10.0, unknown=0.1)
+        for part in (0.96, 0.9, 0.8)
+    )
+    [survey] = judged_surveys(setup)
+    nothing: Any = None
+
+    def result_of(*lines: LineMeasure) -> planfly.SurveyResult:
+        return planfly.SurveyResult(setup, nothing, nothing, (survey,), (lines,), (None,))
+
+    open_, failed = result_of(usable, unknown, unknown), result_of(usable, unknown, lost)
+    assert (open_.lost, open_.usable, failed.lost) == (False, False, True)
+    assert open_.headline == "1 of 3 photo lines can be used; 2 lie outside the terrain data and cannot be judged"
+    assert failed.headline.endswith("1 lies outside the terrain data and cannot be judged; line 3 is the worst: 80 %")
+    [text] = open_.no_remedy_lines
+    assert text.startswith("nothing was tried: 2 photo lines outside the data of ")
+    assert text.endswith(" an elevation file of the whole survey is needed (--terrain)")
+    assert open_.survey_lines[-2].endswith("1000 m  not judged: 10 % over unknown ground")

@@ -293,3 +293,26 @@ def test_gates_at_the_ends_of_lines_that_lose_their_photos_to_the_acceptance_rad
         *(2, 4, 8, 10, 14, 16)
     ]
     assert remedy_text(gated, 5000.0).startswith("gates (CONDITION_GATE, a setting of QGroundControl) instead of ")
+
+
+def test_gates_with_longer_turn_arounds_are_tried_together(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Three lines of 1 km with leads of 60 m: six gates pass, if the turn-arounds are at least 110 m."""
+    lines = []
+    for k in range(3):
+        north = [-60.0, 0.0, 1000.0, 1060.0][:: 1 if k % 2 == 0 else -1]
+        points = [wp(100.0 * k, value, 100.0) for value in north]
+        lines += [*points[:2], "2 206 50 0 1 0 0 0 0", points[2], "2 206 0 0 1 0 0 0 0", points[3]]
+    file = tmp_path / "gated.waypoints"
+    file.write_text(mission_text(mission(*lines), "waypoints"), encoding="ascii")
+
+    def fly(setup: FlightSetup, *_: Any) -> Any:
+        gates = [item for item in setup.mission.items if item.command == Command.CONDITION_GATE]
+        verdict = verdict_of(setup, lambda metres: (len(gates) == 6 and metres >= 110.0, {}))
+        return SimpleNamespace(setup=setup, flight_verdict=verdict)
+
+    monkeypatch.setattr(remedies, "Trial", fly)
+    setup = open_flight(file, {"aircraft": "x8", "autopilot": "px4"})
+    found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict_of(setup, lambda _: (False, {})))
+    [both] = found.remedies
+    assert (both.kind, both.turn_around) == ("gates", 125.0)
+    assert "instead of waypoints where the camera is switched, with turn-arounds of 125 m: " in remedy_text(both, 5e3)

@@ -25,6 +25,7 @@ from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import failing, judge
 from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.synthetic import bank_radius, fly_path, make_setup
+from world.terrain import make_flat_terrain
 
 LENGTH, APART, LEAD, UP = 1000.0, 200.0, 300.0, 100.0
 
@@ -429,3 +430,43 @@ def test_a_turn_around_that_fits_is_where_it_is_drawn() -> None:
     """Lines 400 m apart leave room for arcs of 110 m: their way is known, however near the missile stands."""
     setup = make_setup(lines(apart=400.0), limits={"surveys": "lines"}, **beside(-15.0))
     assert not judge_geometry(setup).undecided
+
+
+@pytest.mark.parametrize(
+    ("known_to", "aside_m", "ok"), [(980.0, 0.0, True), (900.0, 0.0, None), (900.0, 40.0, None), (900.0, 80.0, False)]
+)
+def test_a_line_beyond_the_terrain_data_is_judged_where_the_ground_is_known(
+    known_to: float, aside_m: float, ok: bool | None
+) -> None:
+    """Of 1,000 m a twentieth may be lost: 80 m aside are too many whatever the unknown 100 m are, 40 m may be."""
+    ground = make_flat_terrain(np.array([[-1000.0, 1500.0], [-1000.0, known_to]]), 0.0, 2.0)
+    setup = make_setup(lines(), limits={"surveys": "lines"}, ground=ground)
+    aside = fly_path(setup, across=lambda s: np.where((s > LEAD + 400.0) & (s < LEAD + 400.0 + aside_m), 80.0, 0.0))
+    first = photo_lines(judge(setup, aside))[0]
+    assert (first.ok, first.check) == (ok, "ground way" if ok is None else "")
+    assert "nan" not in first.reason
+    # Nothing is lost at its end, where the ground is unknown.
+    facts = {fact.what: fact.value for fact in first.facts}
+    assert facts["lost at its end"] == pytest.approx(0.0, abs=2.0)
+    if ok is None:
+        assert (
+            first.brief == "photo line 1 of 3 (items 1 to 2): 10 % of its 1000 m lies outside the data of flat at 0 m"
+        )
+    planned = photo_lines(judge_geometry(setup))[0]
+    assert planned.ok is (True if known_to > 950.0 else None)
+
+
+def test_no_photo_over_unknown_ground_overlaps() -> None:
+    """Footprints of 100 m along the track at 100 m, a photo every 50 m; half of each line is unknown."""
+    ground = make_flat_terrain(np.array([[-1000.0, 1500.0], [-1000.0, 500.0]]), 0.0, 2.0)
+    setup = make_setup(lines(), limits={"surveys": "lines"}, ground=ground)
+    camera = SurveyPlan(None, 0.0, Camera(4.0, 1.0, 0.4, 0.4))
+    setup = replace(setup, mission=replace(setup.mission, survey_plans=(camera,)))
+    requirements = route_requirements(setup)
+    for aligned in (None, align_track(requirements, fly_path(setup))):
+        measure = measure_overlap(requirements, aligned, requirements.surveys[0])
+        assert measure is not None
+        assert measure.unknown_fraction == pytest.approx(0.5, abs=0.02)
+        assert measure.unusable_fraction == pytest.approx(0.0, abs=0.01)
+        # 200 m of 400 m, as drawn; the track is up to 21 m beside its line after a turn.
+        assert measure.side == pytest.approx(0.5, abs=0.01 if aligned is None else 0.06)

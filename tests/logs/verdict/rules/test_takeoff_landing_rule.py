@@ -204,3 +204,11 @@ def test_a_take_off_close_to_the_limit_of_an_uncertain_aircraft_is_left_open() -
         limits = replace(made.limits, envelope=replace(made.envelope, climb_sd=math.radians(0.5)))
         item = of(judge_geometry(replace(made, limits=limits)), "takeoff")
         assert (item.ok, item.check) == (ok, "" if ok else "ground way")
+
+
+@pytest.mark.parametrize("distance", [459.0, 600.0])
+def test_a_landing_after_a_loiter_is_measured_from_the_tangent_point(distance: float) -> None:
+    """From the centre to the touchdown d, radius 75 m: the straight part is sqrt(d^2 - 75^2), which sinks 45 m."""
+    loiter = wp(0, 2000, 45, command=31, p="0 75 0 1")
+    item = judged("landing", wp(0, 0), loiter, wp(distance, 2000, 0, command=21))
+    assert item.planned == pytest.approx(math.degrees(math.atan(45.0 / math.sqrt(distance**2 - 75.0**2))), abs=0.01)
