@@ -396,7 +396,8 @@ def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
             # A wrong value in the aircraft's own file.
             raise
         raise ArgumentError.of_argument("aircraft", name, str(error)) from error
-    if airspeed is not None and not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
+    # Scenarios refuse what is not a number.
+    if isinstance(airspeed, float | int) and not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
         allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g} m/s"
         raise ArgumentError.of_argument("airspeed", airspeed, allowed, shown=f"{airspeed:g}")
 

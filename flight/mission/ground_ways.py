@@ -26,7 +26,7 @@ _RAIL_HEIGHT_M = 1.0
 _HAND_RELEASE_HEIGHT_M = 1.8
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class TakeOff:
     """A take-off that is simulated.
 
@@ -79,7 +79,7 @@ class TakeOff:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Approach:
     """A landing that is simulated.
 

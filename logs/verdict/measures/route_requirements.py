@@ -292,7 +292,7 @@ def sharpest_fly_over_turn(radii: float) -> float:
     return 2.0 * math.acos(min(1.0, (z - 1.0) / (2.0 * math.sqrt(z))))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PlannedPath:
     """Fly-by path as a chain of n points.
 
@@ -334,7 +334,7 @@ class FlownGround:
         return self.track.rows(self.landing_start_row, len(self.track))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RouteRequirements:
     """Turns, legs, limits and planned path of a route in numbers: computed once for each verdict.
 

@@ -61,7 +61,7 @@ BAD_WPL = {
     "jump-count": (wpl(*["1", "0", "2", "177", "1", "-2", "0", "0", "0", "0", "0", "1"]), ":3: p2 -2"),
     "jump-target": (wpl(*["1", "0", "2", "177", "1.5", "2", "0", "0", "0", "0", "0", "1"]), ":3: p1 1.5"),
     "loiter-turns": (wpl(*["1", "0", "3", "18", "-2", "0", "0", "0", "36.5", "-84.2", "300", "1"]), ":3: p1 -2"),
-    "too-many": ("QGC WPL 110\n" + "\n" * 5 + f"{HOME_LINE}\n" * 20_001, "20,001 items: at most 20,000"),
+    "too-many": ("QGC WPL 110\n" + "\n" * 5 + f"{HOME_LINE}\n" * 20_001, "too long: 20,001 items; the limit is 20,000"),
     "json-in-disguise": ('{"fileType": "Plan"', "not valid JSON"),
 }
 

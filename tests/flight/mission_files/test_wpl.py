@@ -57,7 +57,7 @@ def test_a_ring_without_a_return_point_is_taken_whole() -> None:
         ("36.5 -84.2\n36.5 west\n", "a.fence:2: '36.5 west'"),
         ("36.5 -84.2\n96.5 -84.2\n", "a.fence:2: latitude"),
         ("36.5 -84.2\nnan -84.2\n", "a.fence:2: 'nan -84.2': expected a latitude"),
-        (text_of([RETURN, *CORNERS * 64, CORNERS[0]]), "a.fence: 258 points: at most 255"),
+        (text_of([RETURN, *CORNERS * 64, CORNERS[0]]), "a.fence: too long: 258 points; the limit is 255"),
     ],
 )
 def test_what_is_no_such_fence(text: str, message: str) -> None:
