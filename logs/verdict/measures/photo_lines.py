@@ -409,7 +409,8 @@ def measure_overlap(
 
     Return None if no camera is known.
     """
-    plan = survey_plan(requirements.setup.mission, survey.lines[0].photo)
+    first_line = next(iter(survey.lines))
+    plan = survey_plan(requirements.setup.mission, first_line.photo)
     if plan is None or plan.camera is None:
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
