@@ -80,11 +80,11 @@ def _survey_panel(
     layers: tuple[Layer, ...] = (
         Layer("line", "usable part of a photo line", "planned", *join_with_gaps(usable_parts), quiet=True),
         Layer("line", "photo line, lost", "fail", *join_with_gaps(lost_parts), quiet=True),
-        Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True),
     )
     if len(unknown_parts) > 1:
         unknown_line = join_with_gaps(unknown_parts)
-        layers = (*layers, Layer("line", "photo line outside the terrain data, not judged", "area", *unknown_line))
+        layers = (*layers, Layer("line", "outside the terrain data, not judged", "return-unknown", *unknown_line))
+    layers = (*layers, Layer("line", "flown track", "flown", track_points[:, 0], track_points[:, 1], quiet=True))
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
