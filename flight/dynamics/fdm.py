@@ -102,10 +102,10 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
 
 
 class _ThreadOutput(io.StringIO):
-    """Text that the thread which made it prints; the text of other threads goes to a stream of theirs.
+    """Stream that keeps the text of the thread that created it, and passes on the text of other threads.
 
-    others: this stream.
-    stdout: standard output, to which they write when the stream is closed.
+    others: stream that receives the text of other threads.
+    stdout: standard output, which receives this text once `others` is closed.
     """
 
     def __init__(self, others: TextIO, stdout: TextIO) -> None:

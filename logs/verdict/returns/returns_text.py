@@ -171,8 +171,9 @@ def _judged_text(returns: Returns) -> str:
     total, failure_counts = len(returns.each), counts_text(returns)
     if failure_counts:
         safe_count = returns.count("safe")
-        if total == max(returns.count(kind) for kind in KINDS) and total > 1:
-            return f"all {failure_counts.replace(' ', ' returns ', 1)}"
+        common_kind = next((kind for kind in KINDS if returns.count(kind) == total), None)
+        if common_kind is not None and total > 1:
+            return f"all {total} returns {_PLURAL_TEXTS[common_kind].format(limit=returns.limit)}"
         safe_text = "none is" if safe_count == 0 else "1 is" if safe_count == 1 else f"{safe_count} are"
         return f"of {count_text(total, 'return')} {failure_counts}; {safe_text} safe"
     # Leave out returns that begin below the limit, as after a take-off: their lowest point is the start.
