@@ -194,12 +194,17 @@ def continued_goal(
 ) -> Goal:
     """Return the goal of a resumed campaign.
 
-    It is the requested goal, or the earlier goal if none is requested.  Without a requested number of flights, the
-    earlier number is kept.  Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
+    None keeps the earlier target, number of flights, or confidence level.
+    Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
     requested_goal = make_goal(flights, prove, at_least, confidence)
-    is_requested = (flights, prove, at_least) != (None, None, None)
-    return resumed_goal(requested_goal if is_requested else None, folder, confidence, keeps_flights=flights is None)
+    return resumed_goal(
+        requested_goal,
+        folder,
+        confidence,
+        keeps_target=prove is None and at_least is None,
+        keeps_flights=flights is None,
+    )
 
 
 def _report_flight_count(goal: Goal, folder: Path) -> None:
@@ -239,7 +244,7 @@ def campaign(
     .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights; None takes 300, or, with ``prove``, at most 5,000; for a resumed campaign its earlier
-    number.  Without flights, ``prove`` and ``at_least``, a resumed campaign keeps its earlier goal.
+    number.  Without ``prove`` and ``at_least``, a resumed campaign keeps its earlier target.
     prove: a probability; flights are flown until they show whether the mission reaches it.
     at_least: a probability to judge after all flights.  Only one of the two may be given.
     confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.

@@ -62,11 +62,17 @@ def _add_outcome(tally: Tally, outcome: str) -> Tally:
 
 
 def resumed_goal(
-    requested: Goal | None, folder: Path, confidence: float | None = None, *, keeps_flights: bool = False
+    requested: Goal,
+    folder: Path,
+    confidence: float | None = None,
+    *,
+    keeps_target: bool = False,
+    keeps_flights: bool = False,
 ) -> Goal:
-    """Return the goal of a resumed campaign: the requested goal, or the stored goal if none is requested.
+    """Return the goal of a resumed campaign: the requested goal, with the parts of the stored goal that are kept.
 
     confidence: confidence of the goal; None keeps the stored confidence.
+    keeps_target: True keeps the stored target, and whether the flights stop when it is decided.
     keeps_flights: True keeps the stored number of flights, if both goals have a fixed number or both stop by
         themselves.
     Raises StoreError for a folder without a campaign.
@@ -76,7 +82,7 @@ def resumed_goal(
     if not settings:
         raise StoreError(f"{path}: there is no campaign to continue", file=path)
     old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
-    goal = old_goal if requested is None else requested
+    goal = replace(requested, target=old_goal.target, stops=old_goal.stops) if keeps_target else requested
     if keeps_flights and goal.stops == old_goal.stops:
         goal = replace(goal, flights=old_goal.flights)
     is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)

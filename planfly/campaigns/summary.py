@@ -480,8 +480,11 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
     """Return a line on the margin of each deciding rule and on what it depends on; [] if no margin is known."""
+    choice_text = (
+        "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter; "
+    )
     return [
-        f"  decides {RULE_WORDS[entry.rule].title}: {_low_margin_text(summary, entry)}; {_drivers_text(entry)}"
+        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)}; {_drivers_text(entry)}"
         for entry in summary.deciding
     ]
 

@@ -654,6 +654,20 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     return columns
 
 
+def check_rows(path: Path) -> None:
+    """Raise StoreError if rows of a campaign's table are damaged, or if another program changed them."""
+    with _open_to_read(path) as connection:
+        (last_number,) = connection.execute("SELECT COALESCE(MAX(flight), -1) FROM flights").fetchone()
+        examination = examine_table(connection, tuple(CAMPAIGN_KIND.columns), last_number + 1, last_number + 1)
+    if damaged := examination.damaged:
+        numbers_text = ", ".join(map(str, damaged[:10])) + (", ..." if len(damaged) > 10 else "")
+        raise StoreError(
+            f"{path}: {count_text(len(damaged), 'row')} damaged or changed by another program (flights {numbers_text});"
+            " `planfly campaign --resume` flies these flights again",
+            file=path,
+        )
+
+
 def count_flights(path: Path) -> int:
     """Return the number of flights in the table of a campaign or of a wind search.
 

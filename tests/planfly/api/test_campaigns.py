@@ -118,6 +118,7 @@ def test_a_campaign_that_goes_on_keeps_its_confidence_unless_one_is_named(
     goals = [campaigns.continued_goal(tmp_path, flights, prove, at_least, one) for one in named]
     assert [one.confidence for one in goals] == list(named)
     assert campaigns.continued_goal(tmp_path, flights, prove, at_least, None) == Goal(0.9, False, 9, 0.8)
+    assert campaigns.continued_goal(tmp_path, 12, prove, at_least, None).target == 0.9
 
 
 def test_a_campaign_that_goes_on_without_a_number_says_its_number(
