@@ -170,7 +170,7 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
     counts = [len(table["flight"]) for table in tables]
     if pairs and pairs < max(counts):
         notes.append(
-            f"only the {count_text(pairs, 'flight')} that both campaigns have are compared: in the difference and by rule"
+            f"only {count_text(pairs, 'flight')} that both campaigns have are compared, in the difference and by rule"
         )
     if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
         notes.append(

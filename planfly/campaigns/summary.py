@@ -484,7 +484,8 @@ def deciding_lines(summary: CampaignSummary) -> list[str]:
         "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter; "
     )
     return [
-        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)}; {_drivers_text(entry)}"
+        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)};"
+        f" {_drivers_text(entry)}"
         for entry in summary.deciding
     ]
 

@@ -89,7 +89,7 @@ def test_the_flights_that_both_have_are_compared_and_a_stopped_campaign_is_noted
     second = fly(base, tmp_path / "b", 30, {}, Goal(0.9, True, 5000))
     found = planfly.compare_campaigns(first, second)
     assert (found.pairs, found.answer, found.inputs) == (20, "no difference shown", ())
-    assert found.notes[0] == "only the 20 flights that both campaigns have are compared: in the difference and by rule"
+    assert found.notes[0] == "only 20 flights that both campaigns have are compared, in the difference and by rule"
     assert "only approximate" in found.notes[1]
     assert "  differs nothing but planfly's code, if anything" in comparison_lines(found)
 
