@@ -448,7 +448,8 @@ class _AltitudeConverter:
         if math.isnan(ground):
             position_text = f"latitude {stop.lat_deg:.5f}, longitude {stop.lon_deg:.5f}"
             request = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame}) at {position_text}"
-            reason = "no terrain is given for it" if terrain is None else f"{terrain.source} has no data there"
+            no_terrain_text = "requires terrain; name an elevation file (--terrain)"
+            reason = no_terrain_text if terrain is None else f"{terrain.source} has no data there"
             raise MissionError(f"{request}: {reason}", file=self.source, field="frame", value=stop.frame)
         return ground
 

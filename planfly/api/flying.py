@@ -334,10 +334,14 @@ def judge(
         imported = read_imported(what, **options)
         return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    check_keywords_not_given(source, select_log_options(options), "only with an imported log, not with this file")
+    check_keywords_not_given(
+        source, select_log_options(options), "allowed only with the log of another program, such as .BIN"
+    )
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         check_judging_options(source, options)
-        check_keywords_not_given(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
+        check_keywords_not_given(
+            source, {"geometry": geometry or None}, "allowed only with a mission; a log is judged by its flight"
+        )
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
         return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
     flight_options = select_mission_options(options)

@@ -228,7 +228,11 @@ def returns(
     if path is not None and is_imported_log(path):
         check_keywords_not_given(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
         return _judge_imported_flight(_read_imported_flight(path, options), request)
-    check_keywords_not_given(str(path or "mission"), select_log_options(options), "only with an imported log")
+    check_keywords_not_given(
+        str(path or "mission"),
+        select_log_options(options),
+        "allowed only with the log of another program, such as .BIN",
+    )
     what = read_log(path) if path is not None and is_log(path) else what
     flight_options = select_mission_options(options)
     if isinstance(what, FlightLog | FlownMission):

@@ -132,14 +132,14 @@ def aircraft(args: argparse.Namespace) -> int:
         return _identify(args)
     for name in ("base", "check", "until"):
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "only with `logs` LOG", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "allowed only with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
     for name in _DATA_SHEET_KEYWORDS:
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "only with `folder` FOLDER", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "allowed only with `folder` FOLDER", shown="")
     if args.source is not None:
-        allowed = "only with `folder` FOLDER, the folder to make"
+        allowed = "allowed only with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
         embedded_aircraft = list(planfly.aircraft().values())
@@ -169,11 +169,11 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 def _make_folder(args: argparse.Namespace) -> int:
     """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
     if args.name is not None:
-        message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
+        message = f"{args.name}: cannot be combined with --new FOLDER; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
     for field, is_given, reason in (
         ("--out", args.out is not None, "--new names the folder to make"),
-        ("--motor-braking", args.motor_braking, "it is chosen for each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
     ):
         if is_given:
             raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
@@ -211,7 +211,7 @@ def _identify(args: argparse.Namespace) -> int:
     """Identify an aircraft from logs, and make its folder."""
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
-            reason = "the folder to make" if name == "out" else f"the {name} of the aircraft as flown"
+            reason = "the folder to make" if name == "out" else f"the {name} of the aircraft in these flights"
             raise PlanflyError(f"--identify needs --{name}, {reason}", field=f"--{name}")
     extra_names = [
         name
@@ -224,7 +224,7 @@ def _identify(args: argparse.Namespace) -> int:
     for field, is_given, reason_text in (
         ("--params", args.params is not None, "the parameters come from the logs"),
         ("--from", args.source is not None, "--base names the aircraft to start from"),
-        ("--motor-braking", args.motor_braking, "it is chosen for each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)

@@ -140,10 +140,10 @@ def _plan_front(args: argparse.Namespace) -> int:
 
     for name in ("old", "algorithm"):
         if (value := getattr(args, name)) is not None:
-            raise ScenarioError.of_argument(name, value, "not with `front` N, which uses a search of its own")
+            raise ScenarioError.of_argument(name, value, "cannot be combined with `front` N, which has its own search")
     evaluations, seconds = args.budget or (None, None)
     if evaluations is not None:
-        allowed = "with `front` N: expected a number of seconds, as in 10s"
+        allowed = "with `front` N the budget is a number of seconds, such as 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as should_stop:
@@ -214,7 +214,7 @@ def _check_replanning(args: argparse.Namespace) -> None:
     if args.old is None:
         for name in ("at_leg", "threats"):
             if (value := getattr(args, name)) is not None:
-                allowed = "only with `old` PLAN.json, the plan that is being flown"
+                allowed = "allowed only with `old` PLAN.json, the plan that is being flown"
                 raise ScenarioError.of_argument(name, value, allowed, shown="")
     elif args.at_leg is None:
         allowed = "`at_leg` K is missing: the leg that is about to be flown"

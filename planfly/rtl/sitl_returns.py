@@ -163,7 +163,7 @@ def check_is_arduplane(program: Path) -> None:
 def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
     """Raise ArgumentError if the simulated returns are not those of ArduPlane, which its program could not check."""
     if not isinstance(world.autopilot, ArduPlane):
-        allowed = f"ArduPlane's program does not fly the returns of {world.autopilot.title}"
+        allowed = f"the program of ArduPlane cannot check the returns of {world.autopilot.title}"
         raise ArgumentError.of_argument("sitl", str(program), allowed)
 
 

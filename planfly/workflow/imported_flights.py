@@ -138,7 +138,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     setup = replace(setup, source=source)
     track = make_track(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
-        raise MissionError(f"{path}: not a flight of {plan}; {mismatch.text}", file=path)
+        raise MissionError(f"{path}: not a flight of {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
     end_reason = "completed" if verdict.complete else _completion_text(verdict)
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, end_reason)

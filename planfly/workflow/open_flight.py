@@ -157,7 +157,7 @@ def check_fixed_wing(mission: Mission) -> Mission:
     for item in mission.items:
         if item.command in OTHER_VEHICLES:
             name = command_name(item.command)
-            allowed = f"for {OTHER_VEHICLES[Command(item.command)]}: planfly flies fixed-wing aircraft"
+            allowed = f"a command for {OTHER_VEHICLES[Command(item.command)]}; planfly flies only fixed-wing aircraft"
             raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
     return mission
 

@@ -145,7 +145,7 @@ def test_what_an_aircraft_does_not_have_reads_as_zero(access: PropertyAccess) ->
 
 
 def test_a_property_that_is_not_defined_is_refused_and_not_made(manager: FakeManager, access: PropertyAccess) -> None:
-    message = r"^own/own\.xml: property side is needed and not defined$"
+    message = r"^own/own\.xml: the model does not define the property side, which planfly needs$"
     for ask in (access.getter, access.setter, lambda name: access.set(name, 1.0)):
         with pytest.raises(FlightError, match=message):
             ask("side")

@@ -147,13 +147,13 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["zeppelin"], "no aircraft called 'zeppelin'"),
         (["./nowhere"], "./nowhere: no such folder; planfly aircraft --new ./nowhere makes it"),
         (["./full"], "full.toml: No such file"),
-        (["c172x", "--motor-braking"], "motor/braking is needed and not defined"),
+        (["c172x", "--motor-braking"], "the model does not define the property motor/braking, which"),
         (["aerosonde", "--out", "full"], "exists and is not empty"),
         (["aerosond"], "did you mean 'aerosonde'?"),
         (["full"], "did you mean './full'?"),
         (["--new", "./full"], "full: exists; --overwrite replaces it, or name another folder"),
         (["--new", "./mine", "--from", "zeppelin"], "no aircraft called 'zeppelin'"),
-        (["mine", "--new", "./mine"], "--new takes only the folder"),
+        (["mine", "--new", "./mine"], "mine: cannot be combined with --new FOLDER"),
         (["--from", "aerosonde"], "--from: only with --new"),
     ],
 )
@@ -285,7 +285,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
 @pytest.mark.parametrize(
     ("argv", "told"),
     [
-        (("--mass", "2.1"), "--span: required for a data sheet: 0.5..6 m"),
+        (("--mass", "2.1"), "--span: missing; a data sheet needs it (0.5..6 m)"),
         ((*SIX, "--mass", "60"), "--mass 60.0 kg: allowed 0.5..25 kg"),
         ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
         ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),
@@ -317,7 +317,7 @@ def test_a_bad_data_sheet_is_one_line(argv: tuple[str, ...], told: str, capsys: 
 
 def test_a_data_sheet_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", *SIX]) == 2
-    assert "--mass: only with --new FOLDER" in capsys.readouterr().err
+    assert "--mass: allowed only with --new FOLDER" in capsys.readouterr().err
 
 
 def test_an_aircraft_that_holds_no_level_flight_is_refused(
@@ -331,5 +331,5 @@ def test_an_aircraft_that_holds_no_level_flight_is_refused(
     )
     assert main(["aircraft", "aerosonde", "--out", str(tmp_path / "a")]) == 2
     line = capsys.readouterr().err.splitlines()[-1]
-    assert line == "planfly: aerosonde cannot hold level flight at any airspeed, from 0 to 9000 m above sea level"
+    assert line == "planfly: aerosonde cannot fly level: no airspeed is possible at any altitude from 0 to 9000 m AMSL"
     assert not (tmp_path / "a").exists()

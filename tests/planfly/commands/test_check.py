@@ -235,8 +235,11 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--for", "px4", "--guidance", "l1"], "cannot be combined with --for, which judges by several autopilots"),
-        (["--for", "px4", "--params", "a.params"], "cannot be combined with --for, which judges by several autopilots"),
+        (["--for", "px4", "--guidance", "l1"], "cannot be combined with --for, which flies with several autopilots"),
+        (
+            ["--for", "px4", "--params", "a.params"],
+            "cannot be combined with --for, which flies with several autopilots",
+        ),
     ],
 )
 def test_what_does_not_go_with_several_autopilots_is_one_line(

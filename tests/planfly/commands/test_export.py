@@ -227,7 +227,7 @@ def test_what_is_about_a_flight_is_not_written_of_a_plan(
     plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / f"a.{kind}")]) == 2
-    assert f".{kind} is written only from a flight log (.mcap)" in capsys.readouterr().err
+    assert f"only a flight log (.mcap) can be exported as .{kind}" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

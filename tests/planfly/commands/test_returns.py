@@ -190,14 +190,14 @@ def test_a_verdict_of_px4_agrees_with_itself_on_the_return(behind: Path, capsys:
 def test_arduplanes_program_does_not_fly_returns_of_px4(behind: Path, capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["returns", "behind.waypoints", "--scenario", "hill.toml", "--params", "rtl450.params"]
     assert main([*asked, "--sitl", str(write_fake(behind))]) == 2
-    assert "ArduPlane's program does not fly the returns of PX4" in capsys.readouterr().err
+    assert "the program of ArduPlane cannot check the returns of PX4" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["none.waypoints"], "none.waypoints"),
-        (["hill.waypoints", "--flight", "2"], "only with an imported log"),
+        (["hill.waypoints", "--flight", "2"], "allowed only with the log of another program, such as .BIN"),
         (["homeless.plan"], "home: missing"),
     ],
 )
