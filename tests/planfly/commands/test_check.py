@@ -58,14 +58,14 @@ def test_check_names_px4s_rules(tmp_path: Path) -> None:
 
 
 OTHERS = {
-    82: "NAV_SPLINE_WAYPOINT: for a multicopter",
-    92: "NAV_GUIDED_ENABLE: for a multicopter or a rover",
-    94: "NAV_PAYLOAD_PLACE: for a multicopter or a VTOL aircraft",
-    42703: "NAV_ATTITUDE_TIME: for a multicopter",
-    213: "NAV_SET_YAW_SPEED: for a rover",
-    84: "NAV_VTOL_TAKEOFF: for a VTOL aircraft",
-    85: "NAV_VTOL_LAND: for a VTOL aircraft",
-    3000: "DO_VTOL_TRANSITION: for a VTOL aircraft",
+    82: "NAV_SPLINE_WAYPOINT: a command for a multicopter",
+    92: "NAV_GUIDED_ENABLE: a command for a multicopter or a rover",
+    94: "NAV_PAYLOAD_PLACE: a command for a multicopter or a VTOL aircraft",
+    42703: "NAV_ATTITUDE_TIME: a command for a multicopter",
+    213: "NAV_SET_YAW_SPEED: a command for a rover",
+    84: "NAV_VTOL_TAKEOFF: a command for a VTOL aircraft",
+    85: "NAV_VTOL_LAND: a command for a VTOL aircraft",
+    3000: "DO_VTOL_TRANSITION: a command for a VTOL aircraft",
 }
 
 
@@ -274,8 +274,8 @@ def test_a_gap_in_seq_is_a_note_of_the_verdict(
     lines = [f"{seq} 0 {3 if alt else 0} 16 0 0 0 0 {lat} 8 {alt} 1" for seq, lat, alt in rows]
     Path("gap.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n")
     notes = [
-        "Note: gap.waypoints:4: a gap in the sequence numbers before 3 (1 in all): ",
-        "Note: gap.waypoints:5: sequence number 3 is not higher than the one before (1 in all): ",
+        "Note: gap.waypoints:4: the sequence numbers have a gap before 3 (1 gap in all): ",
+        "Note: gap.waypoints:5: sequence number 3 is not higher than the one before (1 such line in all): ",
     ]
     main(["check", "gap.waypoints", *more, "--json", "a.json", "--junit", "a.xml"])
     printed = capsys.readouterr().out

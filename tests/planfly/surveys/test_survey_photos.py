@@ -83,7 +83,7 @@ def test_a_camera_that_cannot_follow_and_settings_that_contradict_the_items_are_
     assert camera_notes(setup.mission, setup.route) == (
         "a survey triggers the camera every 10 m, but the settings of its camera in the file state 29.25 m"
         " (AdjustedFootprintFrontal)",
-        "the camera takes one photo per 1 s; the trigger distance of 10 m asks for one every 0.56 s at 18.0 m/s",
+        "the camera takes one photo per 1 s; the trigger distance of 10 m requires one every 0.56 s at 18.0 m/s",
     )
     # One percent is rounding, and 20 m take more than a second.
     setup = setup_with(tmp_path, survey_of(20.0, stated_photo=20.2))

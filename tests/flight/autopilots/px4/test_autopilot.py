@@ -58,7 +58,7 @@ NEAREST = "the nearest release that planfly simulates"
         ("1.17.0", None, "1.17", ""),
         ("1.15.4 stable", None, "1.16", f"is of PX4 1.15 (Version: 1.15): 1.16 flies it, {NEAREST}"),
         ("1.18.0 dev", None, "1.17", f"is of PX4 1.18 (Version: 1.18): 1.17 flies it, {NEAREST}"),
-        ("1.16.0", "1.17", "1.17", "is of PX4 1.16 (Version: 1.16): 1.17 flies it, as named"),
+        ("1.16.0", "1.17", "1.17", "is of PX4 1.16 (Version: 1.16), but 1.17 flies: it was named"),
         ("unknown", None, "1.17", ""),
     ],
 )

@@ -79,7 +79,7 @@ def test_a_quantity_that_is_missing_for_a_while_is_told_with_its_times(tmp_path:
 def test_an_aircraft_that_is_not_named_has_no_limits(tmp_path: Path) -> None:
     flight = judged(tmp_path)
     for rule in ("turn", "slope", "speed"):
-        assert reasons(flight, rule) == {"the aircraft is not named (--aircraft)"}
+        assert reasons(flight, rule) == {"no aircraft was named: --aircraft names it"}
     assert outcome(flight, "corridor") == [True, True]
 
 
@@ -89,7 +89,7 @@ def test_a_landing_of_an_aircraft_that_is_not_named_has_no_limit(tmp_path: Path)
     *items, last = found.mission.items
     landing = replace(found.mission, items=(*items, replace(last, command=21, alt=last.alt - 20.0)))
     landing_log = replace(raw, missions=(*raw.missions[:-1], replace(found, mission=landing)))
-    assert reasons(judged(tmp_path, landing_log), "landing") == {"the aircraft is not named (--aircraft)"}
+    assert reasons(judged(tmp_path, landing_log), "landing") == {"no aircraft was named: --aircraft names it"}
 
 
 @pytest.mark.parametrize(("datum", "judged_by"), [("unstated", False), ("ellipsoid", False), ("amsl", True)])
