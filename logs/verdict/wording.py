@@ -202,7 +202,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     remaining = [finding for change in suggestion for finding in change.remaining]
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
-        f"afterwards {state}: {', '.join(texts)}"
+        f"later in the flight {state}: {', '.join(texts)}"
         for state, fails in (("fails", True), ("undecided", False))
         if (texts := [_remaining_text(item) for item in remaining if item.fails is fails])
     ]
@@ -308,14 +308,14 @@ def disagreement_text(disagreement: Disagreement) -> str:
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
     >>> disagreement_text(Disagreement("landing", Place("waypoint", 2), "geometry", there=False, here=True))
-    'landing at waypoint 2 fails by geometry, and touchdown, by which a flight judges it, passes in flight'
+    'landing at waypoint 2 fails by geometry, and touchdown, its counterpart, passes in flight'
     """
     verbs = {True: "passes", False: "fails"}
     rule_and_place = (
         f"{RULE_NOUNS.get(disagreement.rule, disagreement.rule)} at {place_text_within(disagreement.place)}"
     )
     counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
-    conjunction = f", and {counterpart}, by which a flight judges it," if counterpart else " and"
+    conjunction = f", and {counterpart}, its counterpart," if counterpart else " and"
     return (
         f"{rule_and_place} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
         f"{conjunction} {verbs[disagreement.here]} in flight"

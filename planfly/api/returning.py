@@ -149,12 +149,16 @@ class ReturnsResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        notes = [f"returns are simulated with {self.returns.autopilot}'s control of a point mass, in the mean wind"]
+        notes = [
+            f"returns are simulated in the mean wind, by {self.returns.autopilot}'s control laws flying a point mass"
+        ]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             reflown_text = count_text(len(self.returns.jsbsim_differences), "return")
+            verb = "was" if len(self.returns.jsbsim_differences) == 1 else "were"
             notes.append(
-                f"{reflown_text} close to a limit also flown in JSBSim; the heights of the two simulations differ by"
+                f"{reflown_text} close to a limit {verb} also flown in JSBSim; the heights of the two"
+                " simulations differ by"
                 f" up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
@@ -179,7 +183,9 @@ class ReturnsResult:
         if self.setup.scenario.external:
             notes.append("the mission was given without a scenario: threats are unknown")
         if not self.returns.flown:
-            notes.append("returns start on the planned path: nothing was flown; the energy used before is predicted")
+            notes.append(
+                "nothing was flown: returns start on the planned path, and the energy used before them is predicted"
+            )
         return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:

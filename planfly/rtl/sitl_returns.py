@@ -115,7 +115,7 @@ class ProgramReturns:
             else f"{agreeing_count} of them agree with the simulation"
         )
         comparison += f"; {worse_count} ended worse than in the simulation" if worse_count else ""
-        return f"by {self.program} itself: {len(self.flown_pairs)} of the worst returns flown, {comparison}"
+        return f"{len(self.flown_pairs)} of the worst returns also flown by {self.program} itself: {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
         """Return a line for each return.

@@ -53,8 +53,8 @@ def test_check_names_px4s_rules(tmp_path: Path) -> None:
     assert main(["check", str(mission), "--geometry", "--autopilot", "px4", "--json", str(target)]) == 4
     findings = json.loads(target.read_text())["findings"]
     reasons = {item["reason"]: item["ok"] for item in findings if item["rule"] == "mission" and item["ok"] is not True}
-    assert [ok for reason, ok in reasons.items() if "(PX4 checkFixedWindLandApproach)" in reason] == [False]
-    assert [ok for reason, ok in reasons.items() if "(PX4 checkMissionItemValidity)" in reason] == [False]
+    assert [ok for reason, ok in reasons.items() if "(PX4 function checkFixedWindLandApproach)" in reason] == [False]
+    assert [ok for reason, ok in reasons.items() if "(PX4 function checkMissionItemValidity)" in reason] == [False]
 
 
 OTHERS = {

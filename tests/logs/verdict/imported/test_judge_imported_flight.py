@@ -162,7 +162,7 @@ def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path:
     verdict = judge_flight(on_the_ground, flight.track, "")
     completion = next(item for item in verdict.findings if item.rule == "completion")
     assert (completion.ok, completion.margin) == (False, -1)
-    assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last of them to its end"
+    assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last one to its end"
     assert verdict.answer == "not flown as planned"
 
 

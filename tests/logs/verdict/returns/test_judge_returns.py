@@ -66,7 +66,7 @@ def test_ranges_are_in_order_and_hold_every_return(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     words = {"ground": "unsafe", "low": "too low", "safe": "safe"}
     for one in found.ranges:
-        assert f" s, {words[one.worst.kind]}: return to home; " in range_text(one, found, setup.scenario)
+        assert f" s: {words[one.worst.kind]}; the " in range_text(one, found, setup.scenario)
         inside = [each for each in found.each if one.first <= each.time <= one.last]
         assert len(inside) == one.count
         assert {each.kind for each in inside} == {one.worst.kind}

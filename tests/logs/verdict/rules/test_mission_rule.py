@@ -246,7 +246,7 @@ def test_geofence() -> None:
         fenced = replace(setup, mission=replace(setup.mission, fences=fences))
         (finding,) = [item for item in judge_geometry(fenced).findings if item.check == "checkGeofence"]
         assert finding.ok == (words is None)
-        assert "(PX4 checkGeofence)" in finding.reason
+        assert "(PX4 function checkGeofence)" in finding.reason
         assert words is None or words in finding.reason
 
 
