@@ -30,7 +30,7 @@ def add_compare_parser(command_line: LineParser) -> None:
     add_log_argument(parser, "first", "A", "a flight log (.mcap), or the folder of a campaign")
     add_log_argument(parser, "second", "B", "another")
     parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
-    add_result_options(parser, "folder for pictures and compare.html (default: only the table)")
+    add_result_options(parser, "folder for pictures and compare.html (default: no files, only the table)")
 
 
 def compare(args: argparse.Namespace) -> int:

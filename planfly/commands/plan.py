@@ -50,7 +50,7 @@ def add_plan_parser(command_line: LineParser) -> None:
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the planner (default: the scenario's, or 1)"
     )
     planning_group.add_argument(
-        "--algorithm", metavar="A", help="the planner's algorithm, in place of the scenario's (see below)"
+        "--algorithm", metavar="A", help="algorithm of the planner instead of the scenario's (see below)"
     )
     planning_group.add_argument(
         "--budget",
@@ -64,9 +64,10 @@ def add_plan_parser(command_line: LineParser) -> None:
         metavar="N",
         type=number_parser("front"),
         help=(
-            "plan up to N alternatives (2 to 100); none is better than another in length, exposure "
-            "to radars, height above ground and energy at once (time for energy with [planner] "
-            'objective = "time"); --out is then a folder of plan-1.json ..., front.csv, front.json '
+            "plan up to N alternatives (2 to 100), none of which is better than another in all four"
+            " objectives: length, "
+            "exposure to radars, height above ground, and energy (or time with [planner] "
+            'objective = "time"). --out is then a folder with plan-1.json ..., front.csv, front.json '
             "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
         ),
     )
@@ -77,7 +78,10 @@ def add_plan_parser(command_line: LineParser) -> None:
         file_completer("json"),
     )
     replanning_group.add_argument(
-        "--at-leg", metavar="K", type=number_parser("at_leg"), help="keep the legs before leg K, which have been flown"
+        "--at-leg",
+        metavar="K",
+        type=number_parser("at_leg"),
+        help="number of the next leg: the legs before leg K have been flown, and are kept",
     )
     replanning_group.add_argument(
         "--add-threat",
