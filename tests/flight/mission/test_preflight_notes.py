@@ -101,15 +101,17 @@ def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, to
 def test_wind_from_behind_at_a_launch(from_deg: float, tail: float) -> None:
     found = notes(*WAY, launch=Launch("hand"), wind=Wind(4.0, math.radians(from_deg)))
     assert len(found) == (tail > 0.0)
-    assert all(one.startswith("launch: 4.0 m/s of tailwind on 0°") for one in found)
+    assert all(one.startswith("launch: 4.0 m/s of tailwind on course 0°") for one in found)
 
 
 def test_wind_from_behind_at_a_stated_course_and_at_a_landing() -> None:
     wind = Wind(4.0, math.radians(270.0))
     assert notes(*WAY, launch=Launch("hand", course=math.radians(60.0)), wind=wind) == [
-        f"launch: {4.0 * math.cos(math.radians(30.0)):.1f} m/s of tailwind on 60°"
+        f"launch: {4.0 * math.cos(math.radians(30.0)):.1f} m/s of tailwind on course 60°"
     ]
-    assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=wind) == ["landing: 4.0 m/s of tailwind on 90°"]
+    assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=wind) == [
+        ("landing: 4.0 m/s of tailwind on course 90°")
+    ]
     assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=Wind(4.0, math.radians(90.0))) == []
 
 
@@ -141,7 +143,9 @@ def test_a_rally_point_in_the_ground(alt: float, told: bool) -> None:
 def test_a_rally_point_in_the_ground_is_named_though_the_return_ends_above_it(alt: float, depth: int | None) -> None:
     """PX4 descends to RTL_DESCEND_ALT over a rally point: with 60 m, a point 50 m below the ground looks flyable."""
     found = notes(*WAY, rally(300, 300, alt), rules=ReturnRules(rally_height=60.0))
-    expected = [f"rally point 1 is {depth} m below the ground: {100 + alt:.0f} m AMSL, and the ground there 100 m"]
+    expected = [
+        f"rally point 1 is {depth} m below the ground: {100 + alt:.0f} m AMSL, but the ground there is at 100 m"
+    ]
     assert found == ([] if depth is None else expected)
 
 

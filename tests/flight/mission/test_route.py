@@ -297,9 +297,9 @@ def test_refusals_name_the_item() -> None:
     assert "no item has a position" in refusal("2 178 0 25 -1 0 0 0 0")
     assert "1 position to fly to" in refusal(wp(0, 0))
     assert "1 position to fly to" in refusal(wp(0, 0), wp(0, 0))
-    assert "item 1: height above terrain (frame 10) at latitude 36.50000, longitude -84.20000: no terrain" in refusal(
-        wp(0, 0, frame=10), wp(0, 900)
-    )
+    assert (
+        "item 1: height above terrain (frame 10) at latitude 36.50000, longitude -84.20000: requires terrain"
+    ) in refusal(wp(0, 0, frame=10), wp(0, 900))
     assert "has no data there" in refusal(wp(0, 0), wp(0, 9000, frame=10), terrain=ground())
     assert "item 2: 9400.0 m AMSL: allowed -500..9000" in refusal(wp(0, 0), wp(0, 900, 9100))
     # Swapped columns that are both within range end on another continent.

@@ -148,8 +148,8 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
             Home(36.5, -84.2, 310.0),
             ["home in frame 3: its height is taken as above mean sea level; the file probably has no home line"],
         ),
-        ("3 22 15 0 0 0 0 0 100", None, ["home at 0, 0, which is not a position"]),
-        ("2 178 0 22 0 0 0 0 0", None, ["home at 0, 0, which is not a position"]),
+        ("3 22 15 0 0 0 0 0 100", None, ["home is at 0, 0, which stands for no position"]),
+        ("2 178 0 22 0 0 0 0 0", None, ["home is at 0, 0, which stands for no position"]),
     ],
 )
 def test_whatever_stands_in_the_line_of_home_is_home_as_in_pymavlink(

@@ -154,7 +154,7 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["--new", "./full"], "full: exists; --overwrite replaces it, or name another folder"),
         (["--new", "./mine", "--from", "zeppelin"], "no aircraft called 'zeppelin'"),
         (["mine", "--new", "./mine"], "mine: cannot be combined with --new FOLDER"),
-        (["--from", "aerosonde"], "--from: only with --new"),
+        (["--from", "aerosonde"], "--from: allowed only with --new"),
     ],
 )
 def test_a_bad_name_or_folder_is_one_line(
@@ -295,10 +295,10 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
             "--battery 631 Wh: allowed up to 630 Wh for an aircraft of 2.1 kg (300 Wh per kg)",
         ),
         ((*SIX, "--prop", "12"), "--prop 12: expected diameter and pitch in inches, such as 12x6"),
-        ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with mass"),
+        ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with --mass"),
         # Given as nothing is given all the same.
-        (("--from", "c172x", "--mass", "0"), "--from c172x: cannot be combined with mass"),
-        (("--from", "c172x", "--prop", ""), "--from c172x: cannot be combined with prop"),
+        (("--from", "c172x", "--mass", "0"), "--from c172x: cannot be combined with --mass"),
+        (("--from", "c172x", "--prop", ""), "--from c172x: cannot be combined with --prop"),
         ((*SIX, "--fuel", "0"), "--fuel 0.0 kg: allowed 0.05..12 kg"),
         (("--battery", ""), "--battery : expected volts and capacity"),
         ((*SIX, "--params", ""), "is a folder; expected a parameter file"),

@@ -79,7 +79,7 @@ def test_a_mission_for_another_vehicle_is_a_line(
     mission.write_text(MISSION.format(up=200) + row, encoding="utf-8")
     for name in ("check", "fly"):
         assert main([name, str(mission)]) == 2
-        wanted = f"planfly: {mission}: item 5: {OTHERS[command]}: planfly flies fixed-wing aircraft\n"
+        wanted = f"planfly: {mission}: item 5: {OTHERS[command]}; planfly flies only fixed-wing aircraft\n"
         assert capsys.readouterr().err == wanted
 
 

@@ -142,7 +142,9 @@ def test_what_is_wrong_beside_a_gap_is_wrong(tmp_path: Path) -> None:
 
 def test_only_stretches_in_auto_are_judged_each_with_its_time(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "AUTO"), (80.0, "FBWA")), AEROSONDE)
-    assert "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part, from 30.0 s on" in flight.verdict.lines
+    assert (
+        "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part, which begin at 30.0 s" in flight.verdict.lines
+    )
     assert not flight.verdict.flyable
     completion = next(item for item in flight.verdict.findings if item.rule == "completion")
     assert completion.reason.startswith("AUTO was left for FBWA at 80.0 s, on the way to waypoint 2 (item 3): 1 of 2")
@@ -252,7 +254,7 @@ def test_each_datum_is_named() -> None:
         for datum in ("amsl", "ellipsoid", "pressure", "unstated")
     }
     assert len(set(said.values())) == 4
-    assert said["ellipsoid"] == "POS, above the WGS 84 ellipsoid"
+    assert said["ellipsoid"] == "from POS, above the WGS 84 ellipsoid"
 
 
 def test_what_is_lost_is_told() -> None:
