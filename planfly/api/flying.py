@@ -393,9 +393,13 @@ def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: s
 
 
 # Reason why a log cannot be judged in another world, in messages.
-_FIXED_OPTIONS_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+_FIXED_OPTIONS_TEXT = (
+    "not allowed with a log, which is judged with the aircraft, speeds, wind and autopilot of its flight"
+)
 # Reason why a log cannot be judged in another scenario, in messages.
-_FIXED_SCENARIO_TEXT = "a log is judged in the scenario stored in it; only `terrain` can replace its ground"
+_FIXED_SCENARIO_TEXT = (
+    "not allowed with a log, which is judged in its own scenario; only `terrain` can replace its ground"
+)
 
 
 def check_judging_options(source: str, options: MissionOptions) -> None:

@@ -193,7 +193,9 @@ class ReturnsResult:
 
 
 # Reason why the returns of a flight cannot be judged in another world, in messages.
-_RETURNS_AS_FLOWN_TEXT = "returns of a flight are flown in its own conditions; only `terrain` can replace its ground"
+_RETURNS_AS_FLOWN_TEXT = (
+    "not allowed with a log, whose returns start in the conditions of its flight; only `terrain` can replace its ground"
+)
 
 
 @with_warm_up(*FLYING, *GLIDING)

@@ -68,7 +68,9 @@ def _compare_campaigns(args: argparse.Namespace) -> int:
     """Print the comparison of two campaigns."""
     for option, value in (("--out", args.out), ("--svg", args.svg)):
         if value:
-            raise PlanflyError(f"{option}: only with two flight logs, not with campaigns", field=option, value=value)
+            raise PlanflyError(
+                f"{option}: allowed only with two flight logs, not with campaigns", field=option, value=value
+            )
     comparison = planfly.compare_campaigns(args.first, args.second)
     from planfly.campaigns.compare_campaigns import comparison_lines
 

@@ -221,7 +221,7 @@ def _check_replanning(args: argparse.Namespace) -> None:
                 allowed = "allowed only with `old` PLAN.json, the plan that is being flown"
                 raise ScenarioError.of_argument(name, value, allowed, shown="")
     elif args.at_leg is None:
-        allowed = "`at_leg` K is missing: the leg that is about to be flown"
+        allowed = "`at_leg` K is missing; it names the leg that is flown next"
         raise ScenarioError.of_argument("old", args.old, allowed, shown="")
 
 
@@ -243,10 +243,12 @@ def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> 
     conditions = conditions_of_plan(plan)
     print("\n".join([*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]))
     if plan.feasible and not is_dispersed:
-        print("Judged: in the stated wind over the terrain of the map; dispersions are not included (--flights 40)")
+        print("Judged: in the scenario's wind and over its terrain, without dispersions (--flights 40 flies with them)")
     if plan.ended != "completed":
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
-        print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")
+        print(
+            f"  note    the search ended {reason}, after {plan.evaluations:,} evaluations; this is the best plan so far"
+        )
     if plan.flown_legs:
         print(
             f"  note    legs 0..{plan.flown_legs - 1} are already flown and unchanged;"
