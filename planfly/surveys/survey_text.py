@@ -214,6 +214,6 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     return (
-        f"{change}: flown, and all lines can be used; the path has {remedy.length / 1000.0:.1f} km instead"
+        f"{change}: flown, and all lines can be used; the path is {remedy.length / 1000.0:.1f} km long instead"
         f" of {length / 1000.0:.1f} km"
     )

@@ -152,7 +152,7 @@ def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: 
     partly = replace(ESTIMATED, flights=ESTIMATED.flights[:-1])
     assert repr(partly) == "<WindsResult 4 directions, 4 of them not judged, 7.0 m/s the lowest; 599 flights>"
     assert wind_lines(partly)[1].endswith(
-        ("(the lowest; 6.5 to 7.5 m/s at 95 %), and up to 9.0 m/s from 180° (the highest)")
+        "(the lowest; 6.5 to 7.5 m/s at 95 %), and up to 9.0 m/s from 180° (the highest)"
     )
 
 
