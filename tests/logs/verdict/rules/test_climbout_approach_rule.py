@@ -296,7 +296,7 @@ def test_a_glide_into_a_wall_fails_and_one_that_only_just_clears_it_is_left_open
         found, verdict = judged("approach", wall(POINT - 600.0, top), *landing())
         assert (found.ok, verdict.undecided) == (ok, ok is None), top
     failed, verdict = judged("approach", wall(POINT - 600.0, up + 60.0), *landing())
-    assert "approach at waypoint 2 (item 3) (the glide to item 3 hits the ground)" in verdict.headline
+    assert "approach at waypoint 2, item 3 (the glide to item 3 hits the ground)" in verdict.headline
     assert failed.reason == (
         "the glide to item 3 hits the ground: 600 m before the landing point it is 60 m below the surface"
     )

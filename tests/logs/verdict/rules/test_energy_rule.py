@@ -70,7 +70,7 @@ def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, acti
     law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
     item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
     assert item.ok is ok
-    assert (", and the flight needs" in item.reason) is not ok
+    assert (", but the flight needs" in item.reason) is not ok
 
 
 def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judged() -> None:
@@ -210,7 +210,7 @@ def test_the_rounds_of_an_endless_jump_leave_the_rest_of_the_mission_and_the_res
 
     words = energy(-1).brief.split()
     count = int(words[-1])
-    assert words[words.index("rounds,") - 1] == str(count + 1)
+    assert words[words.index("rounds:") - 1] == str(count + 1)
     assert count > 2
     assert energy(count).ok
     assert energy(count + 1).ok is False

@@ -29,7 +29,7 @@ def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
     verdict = judge_geometry(setup_of(*lines, home=home))
     found = [item for item in verdict.findings if item.rule == "mission" and item.check == check]
     assert len(found) == 1, verdict.findings
-    assert found[0].reason.endswith(f"(PX4 {check})"), found[0].reason
+    assert found[0].reason.endswith(f"(PX4 function {check})"), found[0].reason
     assert not (verdict.flyable and found[0].ok is False)
     return found[0]
 
