@@ -218,8 +218,8 @@ def _missing_metadata_advice(folder: Path) -> str:
     if not models:
         return ""
     return (
-        f": next to its JSBSim model ({', '.join(models[:3])}) the folder needs {folder.name}.toml;"
-        f" planfly aircraft --new FOLDER makes a folder with all files"
+        f": the folder has a JSBSim model ({', '.join(models[:3])}), but also needs {folder.name}.toml;"
+        " planfly aircraft --new FOLDER makes a folder with all files"
     )
 
 

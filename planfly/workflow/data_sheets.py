@@ -263,7 +263,7 @@ def _parse_propeller(text: str) -> tuple[float, float]:
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
-            "expected diameter and pitch in inches, such as 12x6: a diameter of"
+            "expected diameter and pitch in inches, such as 12x6; allowed: a diameter of"
             f" {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g}, and a pitch of 0.25 to 1.5 times the diameter"
         )
         raise FlightError.of_argument("prop", text, allowed)
