@@ -419,7 +419,7 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     aircraft, params, autopilot = options.get("aircraft"), options.get("params"), options.get("autopilot")
     check_arguments(autopilot=autopilot)
     if program is not None and autopilot is not None:
-        allowed = "not with sitl: a real autopilot flies by its own control laws"
+        allowed = "cannot be combined with `sitl`: a real autopilot flies by its own control laws"
         raise ArgumentError.of_argument("autopilot", autopilot, allowed)
     autopilot_name, _, version = (autopilot or "").partition("-")
     return {

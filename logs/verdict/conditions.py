@@ -21,16 +21,16 @@ from world.wind import Turbulence
 from world.wording import count_text
 
 _NAVIGATION_TEXTS = {
-    "perfect": "exact",
-    "rtk": "with RTK's error (0.05 m on each axis)",
+    "perfect": "without position error",
+    "rtk": "with an RTK error of 0.05 m on each axis",
     "gnss": "with a GNSS error of 1.5 m on each axis",
 }
 AirspeedSource = Literal["scenario", "parameters", "aircraft", "flight"]
 _AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {
-    "scenario": "as stated",
-    "parameters": "by the autopilot's parameters",
+    "scenario": "from the scenario or an option",
+    "parameters": "from the autopilot's parameters",
     "aircraft": "its cruise speed",
-    "flight": "as it was flown",
+    "flight": "from the log",
 }
 
 
@@ -166,7 +166,7 @@ def _aircraft_line(conditions: Conditions) -> str:
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
     )
     if not conditions.aircraft:
-        return f"Aircraft: not named (--aircraft names yours), so none of its limits are judged; {speed}"
+        return f"Aircraft: not named, so none of its limits are judged (--aircraft names yours); {speed}"
     mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
     line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
     if conditions.aircraft_named:

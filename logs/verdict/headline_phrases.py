@@ -1,19 +1,24 @@
 """Phrase a failed finding for a headline: the rule, the place, and the numbers or the reason in brief."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from logs.verdict.findings import Finding
-from logs.verdict.wording import compared_texts, place_text, shorten_statement
+from logs.verdict.wording import compared_texts, noun_with_place, place_text, shorten_statement, threat_text
 
 # Function that phrases a failed finding; its first argument is the rule's name for people.
 HeadlinePhrase = Callable[[str, Finding], str]
 
 
 def _with_place(noun: str, finding: Finding, text: str) -> str:
-    """Join a rule's noun, the finding's place (unless it is the whole flight), and a text in brackets."""
-    if finding.place.kind == "flight":
-        return f"{noun} ({text})"
-    return f"{noun} {'at' if finding.place.kind == 'waypoint' else 'on'} {place_text(finding.place)} ({text})"
+    """Join a rule's noun, the finding's place (unless it is the whole flight or mission), and a text in brackets."""
+    place = finding.place
+    if place.kind in ("flight", "plan", "mission"):
+        return f"{noun_with_place(noun, place)} ({text})"
+    # The item is outside brackets, so that the text follows in the only brackets.
+    item_text = "" if place.item is None else f", item {place.item}"
+    place_name = place_text(replace(place, item=None)) + item_text
+    return f"{noun} {'at' if place.kind == 'waypoint' else 'on'} {place_name} ({text})"
 
 
 def reason_phrase(noun: str, finding: Finding) -> str:
@@ -71,10 +76,11 @@ def zone_phrase(noun: str, finding: Finding) -> str:
 
 
 def missile_phrase(_noun: str, finding: Finding) -> str:
-    """Return a phrase such as "threat Alfa (missile) (13.3 s inside its range)"."""
-    place = place_text(finding.place)
-    name = f"threat {place}" if finding.place.name else place
-    return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside its range)"
+    """Return a phrase such as "missile Alfa (13.3 s inside its range)"."""
+    return (
+        f"missile {threat_text(finding.place)} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s"
+        " inside its range)"
+    )
 
 
 def photo_line_phrase(noun: str, finding: Finding) -> str:

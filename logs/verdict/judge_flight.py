@@ -62,7 +62,7 @@ def judge_flight(
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
     >>> judge_flight(log.setup, log.track, "completed").headline
-    'not flyable: threat Alfa (missile) (13.3 s inside its range)'
+    'not flyable: missile Alfa (13.3 s inside its range)'
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)

@@ -87,7 +87,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> from logs.verdict.places import Place
     >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
-    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge with what is known of ...'
+    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge, because the aircraft's ...'
     """
     open_findings = undecided_findings(findings)
     paths = [
@@ -145,16 +145,19 @@ def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
         is_singular = len(subjects) == 1 and not slopes and max(counts.values()) <= 1
         verb = "is" if is_singular else "are"
         subject_text = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
-        return f"{subject_text} {verb} too close to the limit to judge with what is known of the aircraft"
+        return f"{subject_text} {verb} too close to the limit to judge, because the aircraft's limits are uncertain"
     if not slopes:
         return ""
     if len(slopes) > _MAX_NAMED_FINDINGS:
-        return f"slopes on {len(slopes)} legs are too close to the limit to judge with what is known of the aircraft"
+        return (
+            f"slopes on {len(slopes)} legs are too close to the limit to judge, because the aircraft's"
+            " limits are uncertain"
+        )
     place_names = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
     noun, verb = ("slopes", "are") if len(slopes) > 1 else ("slope", "is")
     return (
-        f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge with what is known of"
-        " the aircraft"
+        f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge,"
+        " because the aircraft's limits are uncertain"
     )
 
 
@@ -474,7 +477,7 @@ def _agreement_text(other_level: LevelAnswer) -> str:
     disagreements = other_level.disagreements
     if not disagreements:
         is_geometry = other_level.name == "geometry"
-        return "flight and geometry agree on every finding that both have" if is_geometry else "both flights agree"
+        return "flight and geometry agree on every finding that both judge" if is_geometry else "both flights agree"
     rest_text = (
         f", +{len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""
     )

@@ -62,6 +62,22 @@ def place_text_within(place: Place) -> str:
     return place_text(place) + ("," if place.to_item is not None else "")
 
 
+def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
+    """Name the rule of a finding and its place; a place that is the whole flight, plan or mission is left out.
+
+    within: True for use within a sentence, with the item of a leg between commas.
+
+    >>> noun_with_place("slope", Place("leg", 7, to_item=9)), noun_with_place("energy", Place("flight"))
+    ('slope at leg 7, to item 9', 'energy')
+    >>> noun_with_place("mission", Place("mission", item=3)), noun_with_place("mission", Place("mission"))
+    ('mission item 3', 'mission')
+    """
+    if place.kind in ("flight", "plan") or (place.kind == "mission" and place.item is None):
+        return noun
+    name = place_text_within(place) if within else place_text(place)
+    return f"{noun} {name}" if place.kind == "mission" else f"{noun} at {name}"
+
+
 def threat_text(place: Place) -> str:
     """Return the name of the threat of a missile or a radar.
 
@@ -202,7 +218,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     remaining = [finding for change in suggestion for finding in change.remaining]
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
-        f"afterwards {state}: {', '.join(texts)}"
+        f"later in the flight {state}: {', '.join(texts)}"
         for state, fails in (("fails", True), ("undecided", False))
         if (texts := [_remaining_text(item) for item in remaining if item.fails is fails])
     ]
@@ -213,7 +229,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
 
 def _remaining_text(finding: RemainingFinding) -> str:
     """Name the rule and the place of a finding that remains open."""
-    return f"{RULE_NOUNS.get(finding.rule, finding.rule)} at {place_text(finding.place)}"
+    return noun_with_place(RULE_NOUNS.get(finding.rule, finding.rule), finding.place)
 
 
 def without_trial(suggestion: Suggestion) -> Suggestion:
@@ -308,14 +324,13 @@ def disagreement_text(disagreement: Disagreement) -> str:
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
     >>> disagreement_text(Disagreement("landing", Place("waypoint", 2), "geometry", there=False, here=True))
-    'landing at waypoint 2 fails by geometry, and touchdown, by which a flight judges it, passes in flight'
+    'landing at waypoint 2 fails by geometry, and touchdown, its counterpart, passes in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    rule_and_place = (
-        f"{RULE_NOUNS.get(disagreement.rule, disagreement.rule)} at {place_text_within(disagreement.place)}"
-    )
+    rule_noun = RULE_NOUNS.get(disagreement.rule, disagreement.rule)
+    rule_and_place = noun_with_place(rule_noun, disagreement.place, within=True)
     counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
-    conjunction = f", and {counterpart}, by which a flight judges it," if counterpart else " and"
+    conjunction = f", and {counterpart}, its counterpart," if counterpart else " and"
     return (
         f"{rule_and_place} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
         f"{conjunction} {verbs[disagreement.here]} in flight"

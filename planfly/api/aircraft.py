@@ -140,7 +140,9 @@ def new_aircraft(
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
         raise PlanflyError.of_argument(
-            "source", source, f"cannot be combined with {next(iter(sheet_values))}: a copy has that aircraft's numbers"
+            "source",
+            source,
+            f"cannot be combined with `{next(iter(sheet_values))}`, because a copy keeps the numbers of its aircraft",
         )
     from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 

@@ -414,7 +414,10 @@ def winds(
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
         base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
         if base.scenario.wind.forecast is not None:
-            allowed = "not in this search, which replaces the wind: planfly window finds departures in a forecast"
+            allowed = (
+                "not allowed, because this search sets the wind itself; planfly window finds take-off"
+                " times in a forecast"
+            )
             raise ArgumentError.of_argument("forecast", options["forecast"], allowed, shown="")
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             winds_found = find_winds(base, goal, workers_used, store, advance)

@@ -253,14 +253,15 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
     """
     if path.is_file() and is_log(path):
         if (at := options["at"]) is not None:
-            allowed = "a log is exported with the zones of its own time"
+            allowed = "not allowed: a log is exported with the zones at the time of its flight"
             raise MissionError.of_argument("at", at, allowed, file=path)
         if options["fence"]:
-            allowed = "a log is exported with the fence that it was flown with"
+            allowed = "not allowed: a log is exported with the fence of its flight"
             raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
         for name in ("scenario", "autopilot", "params", "aircraft"):
             if (value := options.get(name)) is not None:
-                allowed = f"a log is exported with the {name} that it was flown with"
+                word = "parameters" if name == "params" else name
+                allowed = f"not allowed: a log is exported with the {word} of its flight"
                 raise MissionError.of_argument(name, value, allowed, file=path)
         return _read_log(path, needs_returns=_needs_kml(targets))
     has_aircraft = options.get("aircraft") is not None
@@ -270,7 +271,7 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOG_SUFFIXES:
-            message = f"{target}: {suffix} is written only from a flight log (.mcap), which {path} is not"
+            message = f"{target}: only a flight log (.mcap) can be exported as {suffix}, and {path} is not a flight log"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     needs_world = has_aircraft or any(
         target.suffix.lower() in (*MAP_WRITERS, *PARAMETER_SUFFIXES) for target in targets
@@ -377,7 +378,9 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
     if kind in _CONTENT_NAMES:
         count = len(mission.fences if kind == "fence" else mission.rally)
         if not count:
-            raise MissionError(f"{mission.source}: no {_CONTENT_NAMES[kind]} to write to {target}", file=mission.source)
+            raise MissionError(
+                f"{mission.source}: contains no {_CONTENT_NAMES[kind]} to write to {target}", file=mission.source
+            )
         return mission_text(mission, kind), f"{count} {_CONTENT_NAMES[kind]}"
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):

@@ -195,7 +195,7 @@ def _load_base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
     aircraft = find_aircraft(absolute_path(Path(text)) if names_folder(text) else text)
     if (aircraft.folder / "posterior.toml").is_file():
-        allowed = "this aircraft was itself identified from flight logs: name its base instead, see its posterior.toml"
+        allowed = "this aircraft was itself identified from flight logs; name the `base` that its posterior.toml states"
         raise FlightError.of_argument("base", str(base), allowed)
     if aircraft.battery_voltage == 0.0:
         allowed = "expected an electric aircraft; engines that burn fuel cannot be identified"
@@ -220,9 +220,10 @@ def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> 
     ):
         if not 1.0 / _MAX_SIZE_RATIO <= value / base_value <= _MAX_SIZE_RATIO:
             min_value, max_value = base_value / _MAX_SIZE_RATIO, base_value * _MAX_SIZE_RATIO
-            allowed = f"expected {min_value:.3g}..{max_value:.3g} for the base {prior.name}"
-            advice = "or make another `base` from a data sheet: planfly aircraft --new FOLDER"
-            raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
+            unit = _RANGES[name][2]
+            allowed = f"allowed {min_value:.3g}..{max_value:.3g} {unit} with the base {prior.name}"
+            advice = "for another size make a `base` from a data sheet (planfly aircraft --new FOLDER)"
+            raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g} {unit}")
 
 
 def _check_distinct(logs: Sequence[MotionLog]) -> None:

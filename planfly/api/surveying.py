@@ -164,7 +164,7 @@ class SurveyResult:
 
 
 # Reason why a flown survey cannot be judged in another world, in messages.
-_LINES_AS_FLOWN_TEXT = "a flight's photo lines are those that were flown"
+_LINES_AS_FLOWN_TEXT = "not allowed with a log, whose photo lines are judged as they were flown"
 
 
 @with_warm_up(*FLYING)

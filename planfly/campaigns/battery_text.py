@@ -18,7 +18,7 @@ def answer_line(result: BatteryResult) -> str:
     goal = result.goal
     where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
     where_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
-    keeps_text = f"{goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
+    keeps_text = f"a reserve of {goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
     lost = sum(math.isinf(row.return_energy) for row in result.rows)
     if math.isinf(result.capacity) and lost:
         return f"no battery keeps {keeps_text}: in {lost} of {len(result.rows)} flights a return does not arrive"
@@ -35,7 +35,7 @@ def answer_line(result: BatteryResult) -> str:
     if not math.isfinite(high):
         interval_text = f"at least {low:.0f} Wh {confidence_text}, no upper bound with {len(result.rows)} flights"
     volts_text = f", {1000.0 * result.capacity / result.volts:.0f} mAh at {result.volts:.1f} V" if result.volts else ""
-    return f"{result.capacity:.0f} Wh ({interval_text}{volts_text}) keep {keeps_text}"
+    return f"a battery of {result.capacity:.0f} Wh ({interval_text}{volts_text}) keeps {keeps_text}"
 
 
 def _unknown_reason(result: BatteryResult) -> str:
@@ -71,8 +71,8 @@ def battery_lines(result: BatteryResult) -> list[str]:
         lines.append("the mission has no home, so no returns were simulated")
     elif blocked:
         lines.append(
-            f"in {blocked} of {total} flights some returns hit something before they arrive, whatever the battery, and"
-            " are left out: see planfly returns"
+            f"in {blocked} of {total} flights some returns hit an obstacle before they arrive; these returns are left"
+            " out (planfly returns shows them)"
         )
     lines.append(
         f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s"
@@ -134,7 +134,9 @@ def _mass_lines(result: BatteryResult) -> list[str]:
         return ["the same mass is assumed for every capacity (--specific-energy states the battery's energy per mass)"]
     if not math.isfinite(result.capacity):
         return []
-    limit_text = f"; not less than {MIN_MASS_FACTOR:g} of it" if result.mass_factor == MIN_MASS_FACTOR else ""
+    limit_text = (
+        f"; at least {MIN_MASS_FACTOR:g} times this mass is assumed" if result.mass_factor == MIN_MASS_FACTOR else ""
+    )
     return [
         f"with {result.goal.specific_energy:g} Wh/kg the aircraft then weighs {result.mass * result.mass_factor:.2f} kg"
         f" (now {result.mass:.2f} kg{limit_text})"

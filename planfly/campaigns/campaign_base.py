@@ -232,7 +232,7 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
         raise SpreadError(
-            f"{base.dispersions.name}: with the median factors {factors}, {aircraft.name} cannot fly level at"
+            f"{base.dispersions.name}: with the medians of its factors ({factors}) {aircraft.name} cannot fly level at"
             f" {base.airframe.airspeed:g} m/s",
             file=base.dispersions.name,
             value=factors,

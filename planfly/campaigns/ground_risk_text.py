@@ -60,7 +60,7 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
         f" ground ({_share_text(result)} stay inside)",
         f"contingency volume: flights and turns of returns reach {flown.contingency_width:.0f} m beyond the flight"
         f" geography, and {flown.contingency_height:.0f} m above ground; Annex A requires {formula.width:.0f} m and"
-        f" {formula.height:.0f} m; returns on their way home reach {flown.return_distance:.0f} m",
+        f" {formula.height:.0f} m; returns on their way home reach {flown.return_distance:.0f} m beyond it",
         f"ground risk buffer: falls{' and glides' if result.goal.glide else ''} reach {flown.buffer_width:.0f} m"
         f" beyond flights and returns; the 1:1 rule requires {result.one_to_one_buffer:.0f} m{_glide_text(result)}",
         f"areas: operational volume {result.volume.area / 1e6:.2f} km², with its ground risk buffer"

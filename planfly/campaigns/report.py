@@ -509,7 +509,8 @@ def _lost_lines(winds: WindsResult) -> list[str]:
         for number in winds.lost[:10]
     )
     return [
-        f"lost      {len(winds.lost)} could not be flown because their workers died, and count as not flyable:"
+        f"lost      {len(winds.lost)} flights could not be flown, because their workers died; they"
+        " count as not flyable:"
         f" {flight_texts}"
     ]
 
@@ -532,7 +533,7 @@ def _deciding_lines(winds: WindsResult) -> list[str]:
     if not directions_by_rule:
         return []
     texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
-    return [f"fails most often, up to the boundary: {'; '.join(texts)}"]
+    return [f"rule that fails most flights, up to the boundary: {'; '.join(texts)}"]
 
 
 def _lines_without_failures(winds: WindsResult) -> list[str]:
@@ -575,8 +576,8 @@ def _failing_lines(winds: WindsResult) -> list[str]:
             continue
         speed, count, _ = direction.flights[0]
         lines.append(
-            f"{direction.from_deg:g}°: fails in {speed:.1f} m/s, the weakest wind flown ({count} of"
-            f" {count_text(count, 'flight')}); the boundary is below {speed:.1f} m/s, not judged"
+            f"wind from {direction.from_deg:g}°: {count} of {count_text(count, 'flight')} fail in {speed:.1f} m/s, the"
+            f" weakest wind flown; the boundary is below {speed:.1f} m/s, and is not judged"
         )
     return lines
 
@@ -595,17 +596,19 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
     target, max_speed, percent = winds.goal.target, winds.goal.most, f"{100 * winds.goal.confidence:g} %"
     lowest_text, highest_text = (_speed_text(direction.boundary, max_speed) for direction in (lowest, highest))
     if lowest.boundary >= CALM_MPS:
-        best_text = f", {highest_text} from {highest.from_deg:g}°" if highest_text != lowest_text else ""
+        best_text = ""
+        if highest_text != lowest_text:
+            best_text = f", and up to {highest_text} from {highest.from_deg:g}° (the highest)"
         return [
-            f"flies with P >= {target:g}, by the best estimate, in wind up to {lowest_text} from {lowest.from_deg:g}°"
+            f"by the best estimate, flyable with P >= {target:g} in wind up to {lowest_text} from {lowest.from_deg:g}°"
             f" (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
         ]
     if highest.boundary < CALM_MPS:
-        basis = "" if winds.fails_in_calm_air else ", by the best estimate,"
-        return [f"does not fly with P >= {target:g}{basis} even in calm air"]
+        basis = "" if winds.fails_in_calm_air else "by the best estimate, "
+        return [f"{basis}not flyable with P >= {target:g} even in calm air"]
     return [
-        f"does not fly with P >= {target:g}, by the best estimate, in any wind from {lowest.from_deg:g}°,"
-        f" even a light one; it flies in wind up to {highest_text} from {highest.from_deg:g}°"
+        f"by the best estimate, not flyable with P >= {target:g} in any wind from {lowest.from_deg:g}°,"
+        f" even a light one; flyable in wind up to {highest_text} from {highest.from_deg:g}°"
     ]
 
 
@@ -648,7 +651,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
         if reason:
             case = case._replace(result="skipped", message=f"not judged: {reason}")
         elif direction.boundary < CALM_MPS:
-            message = f"does not fly with P >= {winds.goal.target:g} even in calm air"
+            message = f"not flyable with P >= {winds.goal.target:g} even in calm air"
             case = case._replace(result="failure", message=message)
         else:
             case = case._replace(text=f"wind up to {_speed_text(direction.boundary, winds.goal.most)}")

@@ -449,8 +449,8 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     lines = [
         f"{_answer_text(summary)}: {_flyable_text(tally)}, {_share_text(tally)}"
         + ("; return not judged" if summary.unjudged_return else ""),
-        f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
-        f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
+        f"  P at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
+        f"  two-sided interval of P at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
         *_deciding_flights_lines(summary),
         *(f"  {line}" for line in flown_lines(summary.conditions)),
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
@@ -465,7 +465,9 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     ]
     if summary.lost:
         lost_text = ", ".join(map(str, summary.lost[:10]))
-        lines.append(f"  lost    {len(summary.lost)} could not be flown because their workers died: {lost_text}")
+        lines.append(
+            f"  lost    {len(summary.lost)} flights could not be flown, because their workers died: {lost_text}"
+        )
     return lines + deciding_lines(summary)
 
 
@@ -475,7 +477,7 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
     if not tally.undecided:
         return []
     flights_text = f"{tally.undecided} of {count_text(tally.flown, 'flight')}"
-    return [f"  Not judged: {flights_text}, the first of them because of {summary.undecided_text}"]
+    return [f"  Not judged: {flights_text}; reason of the first: {summary.undecided_text}"]
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
@@ -542,7 +544,7 @@ def _answer_text(summary: CampaignSummary) -> str:
 def _drivers_text(entry: DecidingRule) -> str:
     """Return a clause on the quantities that explain most of the variance of a deciding rule's margin."""
     if not entry.sensitivities:
-        return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to say what it depends on"
+        return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
     if not entry.drivers:
         return "no dispersed quantity significantly explains the margin"
     return "of the margin's variance " + ", ".join(

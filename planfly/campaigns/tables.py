@@ -237,12 +237,12 @@ class LockedTable:
         if stored_settings.get("made_of") != self.made_of:
             inputs = [json.loads(json.dumps(request.get("inputs", {}))) for request in (stored_request, settings)]
             differences = describe_differences(*inputs) or "planfly's code differs"
-            raise StoreError(f"{self.path}: belongs to another campaign: {differences}", file=self.path)
+            raise StoreError(f"{self.path}: contains a campaign with other settings: {differences}", file=self.path)
         for name in self._kind.fixed:
             if stored_request[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the stored flights were requested"
-                    f" with {stored_request[name]}",
+                    f"{self.path}: {name} {settings[name]}: expected {stored_request[name]},"
+                    " as in the campaign that is resumed",
                     file=self.path,
                 )
 

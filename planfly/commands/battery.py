@@ -28,14 +28,15 @@ def add_battery_parser(command_line: LineParser) -> None:
     group = parser.add_group("the battery")
     for name, unit, text in (
         ("probability", "P", "probability with which the reserve is kept (default: 0.95)"),
-        ("reserve", "F", "fraction of the battery that is to be left (default: 0.2)"),
+        ("reserve", "F", "fraction of the battery that must be left (default: 0.2)"),
         (
             "specific_energy",
             "WH/KG",
-            "energy per battery mass, with which the mass changes (default: the mass is kept)",
+            "energy per battery mass: the aircraft becomes heavier with a larger battery (default: its"
+            " mass stays the same)",
         ),
-        ("every", "S", "time between two returns, s (default: 10)"),
-        ("confidence", "C", "confidence of the capacity's interval (default: 0.95)"),
+        ("every", "S", "time between the starts of two returns, s (default: 10)"),
+        ("confidence", "C", "confidence level of the interval of the capacity (default: 0.95)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
@@ -44,7 +45,7 @@ def add_battery_parser(command_line: LineParser) -> None:
         type=number_parser("sample_flights"),
         help="number of flights, 20 to 100,000 (default: 100)",
     )
-    add_result_options(parser, "folder for the page, report.html, and the chart, battery.png (default: none)")
+    add_result_options(parser, "folder for the page (report.html) and the chart (battery.png) (default: no files)")
 
 
 def battery(args: argparse.Namespace) -> int:

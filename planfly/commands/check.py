@@ -113,7 +113,7 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     for name in _SINGLE_AUTOPILOT_OPTIONS:
         if (value := getattr(args, name)) not in (None, False):
             raise ArgumentError.of_argument(
-                name, value, "cannot be combined with --for, which judges by several autopilots"
+                name, value, "cannot be combined with --for, which flies with several autopilots"
             )
     flights = call_api(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}

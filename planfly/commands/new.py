@@ -29,7 +29,7 @@ def add_new_parser(command_line: LineParser) -> None:
             metavar="LAT,LON",
             type=parse_position,
             required=True,
-            help="latitude and longitude, degrees",
+            help=f"position of the {keyword}: latitude and longitude, degrees",
         )
     route_group.add_argument(
         "--height",

@@ -37,8 +37,8 @@ def add_predict_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--by",
         choices=("controls", "mission"),
-        help="follow the logged controls over windows of 2 s, or fly the mission with the simulated autopilot in the"
-        " logged wind (default: controls, if the log has them)",
+        help="controls follows the logged controls over windows of 2 s; mission flies the mission with the simulated"
+        " autopilot in the logged wind (default: controls, if the log has them)",
     )
     group.add_argument(
         "--from",

@@ -26,7 +26,7 @@ def add_terrain_parser(command_line: LineParser) -> None:
     area_group = parser.add_group("the area")
     with_completer(
         area_group.add_argument(
-            "--around", metavar="MISSION", help=".waypoints or .plan file, all of whose positions are covered"
+            "--around", metavar="MISSION", help="mission (.waypoints or .plan) whose positions lie in the area"
         ),
         file_completer(*MISSION_SUFFIXES),
     )

@@ -29,9 +29,9 @@ class WideQuantity:
         """Description of the quantity, its interval, and the flight that would narrow the interval.
 
         >>> WideQuantity("sink at idle", 0.23, "glides").text
-        'sink at idle: known to ±23 % only; fly glides'
+        'sink at idle: known only to ±23 %; to improve this, fly glides'
         """
-        return f"{self.title}: known to ±{100.0 * self.half:.0f} % only; fly {self.show}"
+        return f"{self.title}: known only to ±{100.0 * self.half:.0f} %; to improve this, fly {self.show}"
 
 
 Interval = tuple[float, float, float]

@@ -83,9 +83,9 @@ def _short_strip_text(plan: Plan) -> str:
     source = "the elevation file" if strip.height_sd is None else "its survey"
     return (
         f"only {100.0 * probability:.0f} % of the landings are expected to touch down on the strip of"
-        f" {strip.length:.0f} m: the altitude of the strip has a standard deviation of {height_sd:.1f} m ({source}),"
-        f" and the touchdown point one of {touchdown_sd:.0f} m (largest scatter of measured landings);"
-        f" to improve this, {', or '.join(remedies)}"
+        f" {strip.length:.0f} m. The altitude of the strip has a standard deviation of {height_sd:.1f} m ({source}),"
+        f" and the touchdown point one of {touchdown_sd:.0f} m (largest scatter of measured landings)."
+        f" To improve this, {', or '.join(remedies)}"
     )
 
 

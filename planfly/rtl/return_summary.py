@@ -83,7 +83,7 @@ def return_summary(
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
     is_replaced = world.stands_in and not world.has_other_law
-    replacement_text = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
+    replacement_text = f" (simulated with ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
     return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)
 
 
@@ -96,7 +96,7 @@ def return_law_lines(setup: FlightSetup) -> list[str]:
         return []
     world = make_return_world(setup)
     behaviour, unjudged = world.autopilot.returns, world.unjudged_parts
-    lines = [f"returns to launch are simulated with {world.autopilot.title}'s control of a point mass"]
+    lines = [f"returns to launch are simulated by {world.autopilot.title}'s control laws flying a point mass"]
     lines += [behaviour.path_text] if behaviour.path_text else []
     if unjudged:
         extent = "in full" if world.is_simulated else "at all"

@@ -115,7 +115,7 @@ class ProgramReturns:
             else f"{agreeing_count} of them agree with the simulation"
         )
         comparison += f"; {worse_count} ended worse than in the simulation" if worse_count else ""
-        return f"by {self.program} itself: {len(self.flown_pairs)} of the worst returns flown, {comparison}"
+        return f"{len(self.flown_pairs)} of the worst returns also flown by {self.program} itself: {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
         """Return a line for each return.
@@ -163,7 +163,7 @@ def check_is_arduplane(program: Path) -> None:
 def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
     """Raise ArgumentError if the simulated returns are not those of ArduPlane, which its program could not check."""
     if not isinstance(world.autopilot, ArduPlane):
-        allowed = f"ArduPlane's program does not fly the returns of {world.autopilot.title}"
+        allowed = f"the program of ArduPlane cannot check the returns of {world.autopilot.title}"
         raise ArgumentError.of_argument("sitl", str(program), allowed)
 
 

@@ -106,7 +106,7 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     )
     for number, (check, (text, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
         if check in faults and spacing:
-            texts[number] += f": that needs {text.format(spacing)} there"
+            texts[number] += f": this requires {text.format(spacing)} there"
     if measure.unusable_fraction > MIN_STATED_FRACTION:
         unusable_text = f"{100.0 * measure.unusable_fraction:.0f} % of the lines' length, where no photo can be used"
         texts.append(f"overlap not judged on {unusable_text}")
@@ -179,8 +179,8 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
 def near_miss_text(near_miss: NearMiss) -> str:
     """Describe the trial that came closest to passing, and the reason of its failure."""
     return (
-        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used, the worst to"
-        f" {near_miss.worst:.0f} %; {near_miss.verdict.headline}"
+        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used, the worst one to"
+        f" {near_miss.worst:.0f} % of its length; {near_miss.verdict.headline}"
     )
 
 
@@ -213,4 +213,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
-    return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"
+    return (
+        f"{change}: flown, and all lines can be used; the path is {remedy.length / 1000.0:.1f} km long instead"
+        f" of {length / 1000.0:.1f} km"
+    )

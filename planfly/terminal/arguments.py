@@ -146,7 +146,7 @@ def parse_problems(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected numbers of threats out of 7,15,30,60")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected one or more of 7,15,30,60 threats")
     return tuple(numbers)
 
 

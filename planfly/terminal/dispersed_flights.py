@@ -20,7 +20,7 @@ def check_flights_option(args: argparse.Namespace, excluded: str) -> None:
     if args.flights is None:
         return
     if getattr(args, excluded) is not None:
-        raise ScenarioError.of_argument("flights", args.flights, f"not with `{excluded}`")
+        raise ScenarioError.of_argument("flights", args.flights, f"cannot be combined with `{excluded}`")
     require_extra("campaigns", "--flights needs")
 
 
@@ -68,14 +68,14 @@ def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> li
     from planfly.campaigns.summary import deciding_lines, undecided_lines
 
     low, high = answer.interval
-    state = "" if answer.holds else ": less than 0.95"
+    state = "" if answer.holds else "; 0.95 is required"
     lines = [
-        f"flights   holds in {answer.flyable} of {answer.flights} flights with the default dispersions"
+        f"flights   the plan succeeds in {answer.flyable} of {answer.flights} flights with the default dispersions"
         f" (P between {low:.2f} and {high:.2f} at 95 %){state}",
         *undecided_lines(result.summary),
         *failure_lines(result.summary.by_rule, result.summary.mission_fault),
         *deciding_lines(result.summary),
     ]
     if answer.remedies:
-        lines.append(f"  raises  {'; '.join(answer.remedies)}")
+        lines.append(f"  raises P  {'; '.join(answer.remedies)}")
     return lines

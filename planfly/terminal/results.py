@@ -27,7 +27,7 @@ def print_verdict(verdict: "Verdict", notes: Iterable[str], setup: "FlightSetup 
 def print_returns_line(line: str) -> None:
     """Print the line on returns to launch, unless the line is empty."""
     if line:
-        print(f"returns   {line} (more: planfly returns)")
+        print(f"returns   {line}; more: planfly returns")
 
 
 def print_engine(engine: str) -> None:

@@ -6,7 +6,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import shorten_statement
+from logs.verdict.wording import noun_with_place, shorten_statement
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
@@ -39,7 +39,7 @@ def verdict_lines(
     no_change_text = _no_change_text(verdict, suggests_by_geometry)
     lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
     lines += [
-        f"  open    {rule_word(finding.rule)} at {finding.where}: {finding.reason}"
+        f"  open    {noun_with_place(rule_word(finding.rule), finding.place)}: {finding.reason}"
         for finding in presentation.undecided[: 2 * _MAX_LISTED]
     ]
     # One flight would decide all findings with the same suggestion.
@@ -80,11 +80,11 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     """
     worst_finding, *other_findings = rule.failed
     # A fence item names its rule.
-    place_text = f"{rule.words.word} at {worst_finding.where}"
+    place_text = noun_with_place(rule.words.word, worst_finding.place)
     if worst_finding.where.startswith(f"{rule.words.word} "):
         place_text = worst_finding.where
     if other_findings:
-        place_text = f"{rule.words.word}, {len(rule.failed)} of {rule.judged}; the worst at {worst_finding.where}"
+        place_text = f"{rule.words.word}: {len(rule.failed)} of {rule.judged} fail; the worst at {worst_finding.where}"
     lines = [colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}"]
     if worst_finding.suggestions:
         lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)

@@ -182,6 +182,6 @@ def with_tightened_limits(airframe: Airframe, scenario: Scenario) -> Airframe:
 def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:
     """Raise FlightError if the aircraft cannot fly level at any airspeed and altitude of its envelope."""
     if not np.isfinite(envelope.level_speed_max - envelope.level_speed_min).any():
-        amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m above sea level"
-        message = f"{aircraft.name} cannot hold level flight at any airspeed, from {amsl}"
+        amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m AMSL"
+        message = f"{aircraft.name} cannot fly level: no airspeed is possible at any altitude from {amsl}"
         raise FlightError(message, file=aircraft.name, field="airspeed")

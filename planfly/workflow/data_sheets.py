@@ -246,7 +246,8 @@ def _parse_battery(text: str) -> tuple[float, float]:
         _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
     ):
         allowed = (
-            f"expected volts and capacity, such as 14.8V,5Ah: {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
+            "expected volts and capacity, such as 14.8V,5Ah; allowed"
+            f" {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
             f" {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
         )
         raise FlightError.of_argument("battery", text, allowed)
@@ -262,7 +263,7 @@ def _parse_propeller(text: str) -> tuple[float, float]:
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
-            "expected diameter and pitch in inches, such as 12x6: a diameter of"
+            "expected diameter and pitch in inches, such as 12x6; allowed: a diameter of"
             f" {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g}, and a pitch of 0.25 to 1.5 times the diameter"
         )
         raise FlightError.of_argument("prop", text, allowed)
@@ -507,7 +508,7 @@ def _check_required_numbers(sheet: DataSheet) -> None:
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
             min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
-            allowed = f"required for a data sheet: {min_value:g}..{max_value:g} {unit}"
+            allowed = f"missing; a data sheet needs it ({min_value:g}..{max_value:g} {unit})"
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 

@@ -138,7 +138,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     setup = replace(setup, source=source)
     track = make_track(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
-        raise MissionError(f"{path}: not a flight of {plan}; {mismatch.text}", file=path)
+        raise MissionError(f"{path}: not a flight of {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
     end_reason = "completed" if verdict.complete else _completion_text(verdict)
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, end_reason)
@@ -180,7 +180,7 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
     return (
         logged.mission,
-        f"{logged.origin} of the log{time_text}, {count_text(len(logged.mission.items), 'item')}",
+        f"{count_text(len(logged.mission.items), 'item')} from {logged.origin} of the log{time_text}",
         None,
     )
 
@@ -217,7 +217,8 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
         source_text = "from the scenario, because the log contains no wind" if options.get("scenario") else ""
         return scenario, source_text
     windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
-    return windy_scenario, f"from {round(math.degrees(wind.from_course)) % 360:03d}°, by {wind.source} of the log"
+    course_text = f"{round(math.degrees(wind.from_course)) % 360:03d}°"
+    return windy_scenario, f"from {course_text}, according to {wind.source} of the log"
 
 
 def _flight_setup(

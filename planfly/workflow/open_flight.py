@@ -152,12 +152,12 @@ def check_fixed_wing(mission: Mission) -> Mission:
     >>> check_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
     Traceback (most recent call last):
         ...
-    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: for a multicopter: planfly flies fixed-wing ...
+    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: a command for a multicopter; planfly flies ...
     """
     for item in mission.items:
         if item.command in OTHER_VEHICLES:
             name = command_name(item.command)
-            allowed = f"for {OTHER_VEHICLES[Command(item.command)]}: planfly flies fixed-wing aircraft"
+            allowed = f"a command for {OTHER_VEHICLES[Command(item.command)]}; planfly flies only fixed-wing aircraft"
             raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
     return mission
 

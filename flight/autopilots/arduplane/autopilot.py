@@ -696,6 +696,4 @@ def _bank_limit_note(bank: float) -> str:
     """
     if bank <= 0.0:
         return ""
-    return (
-        f"NAVL1_LIM_BANK {bank:g} is not simulated: circles are as wide as without it, but ArduPlane's may be narrower"
-    )
+    return f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiter circles than planfly"

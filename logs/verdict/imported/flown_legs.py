@@ -164,8 +164,8 @@ class PlanMismatch:
         """Text of the reason."""
         if self.kind == "place":
             distance_text = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
-            return f"the mission lies elsewhere: the flight never comes within {distance_text} of its waypoints"
-        return f"the order differs: the flight passed the items as {', '.join(map(str, self.order))}, ..."
+            return f"the flight is elsewhere, at least {distance_text} from every waypoint"
+        return f"the flight passed its items in another order: {', '.join(map(str, self.order))}, ..."
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:

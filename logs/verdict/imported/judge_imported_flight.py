@@ -92,8 +92,9 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
     by_start = {legs.stretch.start: legs for legs in flown_stretches}
     lines = []
     for stretch in source.stretches:
-        name = stretch.mode or "the flight (the log contains no modes)"
+        name = stretch.mode or "the flight"
         time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+        time_text += "" if stretch.mode else " (the log contains no modes)"
         legs = by_start.get(stretch.start)
         if legs is None:
             lines.append(f"Judged: nothing of {time_text}: it did not pass two waypoints in order")
@@ -101,7 +102,7 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
         first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
         partial_text = f", leg {last} in part" if legs.partial else ""
         start_time = float(legs.aligned.track.time[0])
-        lines.append(f"Judged: {time_text}, legs {first} to {last}{partial_text}, from {start_time:.1f} s on")
+        lines.append(f"Judged: {time_text}, legs {first} to {last}{partial_text}, which begin at {start_time:.1f} s")
     return lines
 
 
@@ -126,11 +127,11 @@ def heights_text(source: ImportedLog) -> str:
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
-    'POS, above mean sea level, according to the log; at the start GPS.Alt -0.1 m relative to it'
+    'from POS, above mean sea level, according to the log; difference at the start: GPS.Alt -0.1 m'
     """
     offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in source.heights.offsets)
-    offset_text = f"; at the start {offsets} relative to it" if offsets else ""
-    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
+    offset_text = f"; difference at the start: {offsets}" if offsets else ""
+    return f"from {source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
 
 def row_faults_text(faults: RowFaults, gaps: int) -> str:
@@ -218,7 +219,7 @@ def _start_time_text(source: ImportedLog) -> str:
     """Describe the date and time at which the log's time is 0; return "" if the log states no plausible date."""
     if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
         return ""
-    return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    return f", time 0 s is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 # Name of each quantity in a message about a log without it.
@@ -236,9 +237,9 @@ _TRACK_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "atti
 _DATUM_REASONS = {
     "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
     "pressure": "the log's heights are pressure altitudes, above the 1013.25 hPa level",
-    "unstated": "the log does not state the datum of its heights (--datum names it)",
+    "unstated": "the log does not state the datum of its heights: --datum names it",
 }
-_UNNAMED_TEXT = "the aircraft is not named (--aircraft)"
+_UNNAMED_TEXT = "no aircraft was named: --aircraft names it"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:

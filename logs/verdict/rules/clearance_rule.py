@@ -312,7 +312,7 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
     shortfall_text = (
         f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
     )
-    return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{shortfall_text}"
+    return f"; {clearance - error:.1f} m after subtracting the terrain's stated error of {error:g} m{shortfall_text}"
 
 
 def _planned_finding(
@@ -325,7 +325,7 @@ def _planned_finding(
     off_text: where the leg leaves the terrain data; "" if it does not.
     """
     is_short = planned_height < limit - CLEARANCE_TOLERANCE_M
-    reason = f"{_height_text(planned_height)} at the lowest"
+    reason = f"{_height_text(planned_height)} at the lowest point"
     if is_short:
         reason += f"; {limit:.0f} m are required"
     reason += _terrain_error_text(planned_height, limit, terrain.vertical_error)

@@ -76,16 +76,18 @@ class _Obstacles(NamedTuple):
         """True if the path hits neither ground nor sphere nor zone; False if the ground is unknown."""
         return self.clearance >= 0.0 and not self.entered_hazard
 
-    def obstacle_message(self, subject: str, origin: str) -> Message:
+    def obstacle_message(self, subject: str, origin: str, condition: str = "") -> Message:
         """Describe the obstacle.
 
         subject: name of the path.
         origin: text on the place from which `distance` is measured, such as "from home".
+        condition: clause on the slope at which the path is flown; "" for none.
         """
         if self.entered_hazard:
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
-            f"{subject} hits the ground", f", {-self.clearance:.0f} m below the surface {self.distance:.0f} m {origin}"
+            f"{subject} hits the ground",
+            f": {self.distance:.0f} m {origin} it is {-self.clearance:.0f} m below the surface{condition}",
         )
 
 
@@ -293,7 +295,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
             True,
         )
     else:
-        fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
@@ -322,7 +324,7 @@ def _launch_finding(
         return _path_finding("climbout", place, obstacles, None, reason)
     is_certain, end_height = certain_slope == steepest.slope, start[2] - start[1]
     if not obstacles.is_clear:
-        fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
         climb_text = _climb_text(steepest, launch, item_text, end_height)
         text = f"{fault.text} ({climb_text}){_clear_courses_text(requirements, *start)}"
         fault = replace(fault, text=text)
@@ -355,7 +357,7 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
 
     end_height: height of the take-off's end above home, m.
     """
-    text = _degrees_text(climb.slope)
+    text = f"climb angle {_degrees_text(climb.slope)}"
     # The take-off holds its course until it has reached its height.
     if climb.length > launch.leg_length:
         text += (
@@ -368,7 +370,7 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
 def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
     """Return a clause on the part of the steepest climb that is certain; slopes in m per m."""
     certain_text = _degrees_text(max(0.0, certain_slope))
-    return f"; of the steepest climb, {_degrees_text(max_slope)}, {certain_text} is certain for this aircraft"
+    return f"; the steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
 
 def _degrees_text(slope: float) -> str:
@@ -411,8 +413,8 @@ def _clear_courses_text(
     ]
     widest_range = max(ranges, key=len)
     if len(widest_range) == 1:
-        return f"; a launch on {widest_range[0]:03d}° would be clear of obstacles"
-    return f"; a launch on {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
+        return f"; a launch course of {widest_range[0]:03d}° would be clear of obstacles"
+    return f"; a launch course of {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
 
 
 # ----------------------------------------------------------------------
@@ -505,7 +507,9 @@ def _item_text(place: Place) -> str:
 def _clearance_text(obstacles: _Obstacles) -> str:
     """Describe the minimum height above ground on a path without obstacles; "no obstacle" if no height was checked."""
     return (
-        "no obstacle" if math.isinf(obstacles.clearance) else f"{obstacles.clearance:.0f} m above ground at the lowest"
+        "no obstacle"
+        if math.isinf(obstacles.clearance)
+        else f"{obstacles.clearance:.0f} m above ground at the lowest point"
     )
 
 

@@ -118,11 +118,11 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
             faults.append(message(reason))
     elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
-            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, the last of them to "
-            f"its end: {_missing_items_text(missing_items)}"
+            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, the last one to"
+            f" its end; {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
-        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, the last of them to its end"
+        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, the last one to its end"
         unflown_legs, doubt_texts = _unflown_legs(setup, stretches, flown_legs)
         if unflown_legs:
             unflown_text = f"{_legs_text(setup, unflown_legs)} not flown along the mission"

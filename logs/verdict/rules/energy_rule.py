@@ -76,8 +76,8 @@ def energy_findings(
     else:
         reason = _used_text(requirements, energy, max_current, is_empty=is_empty)
         if geometric or math.isfinite(planned_energy):
-            flown_text = f"; {planned_energy:.1f} Wh{' for the whole mission' if is_cut_short else ''}"
-            reason += f"{'' if geometric else flown_text} by prediction"
+            mission_text = " for the whole mission" if is_cut_short else ""
+            reason += " (predicted)" if geometric else f"; predicted: {planned_energy:.1f} Wh{mission_text}"
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:
@@ -161,7 +161,8 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
     if repeats < 0:
         return [message(f"{fault}, but the energy does not last for one round")]
-    return [message(f"{fault}, but the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")]
+    rounds_text = count_text(repeats + 1, "round")
+    return [message(f"{fault}, but the energy lasts for only {rounds_text}: set its count to {repeats}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:
@@ -232,10 +233,10 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
                 share_text = f", of {charge_used:.0f} mAh from several monitored batteries"
                 messages.undecided.append(message(f"{name} {limit_text}{share_text}"))
             else:
-                messages.faults.append(message(f"{name} {limit_text}, and the flight needs {charge_used:.0f} mAh"))
+                messages.faults.append(message(f"{name} {limit_text}, but the flight needs {charge_used:.0f} mAh"))
     if return_time_fault := _return_time_fault(requirements, energy_used):
         messages.undecided.append(return_time_fault)
-    clause = f"; whether the battery falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
+    clause = f"; not judged: whether the battery reaches {' or '.join(unjudged)}, which leaves the mission"
     return messages._replace(unjudged_text=clause if unjudged else "")
 
 

@@ -144,18 +144,18 @@ def _zone_finding(
     ok: bool | None = visit.depth <= ROUNDING_M
     if ok and visit.unknown:
         ok = None
-    side_text, entry_text, exit_text = ("inside", "enters it", "leaves it")
+    side_text, deepest_text, entry_text, exit_text = ("inside", "deepest", "enters it", "leaves it")
     if zone.kind == "inclusion":
-        side_text, entry_text, exit_text = ("outside", "leaves it", "enters it again")
+        side_text, deepest_text, entry_text, exit_text = ("outside", "farthest out", "leaves it", "enters it again")
+    subject = "path" if flown_visit is None else "flight"
     faults, notes = [], []
     if visit.depth > ROUNDING_M:
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
-                f" at {_event_text(requirements, visit, 'at')}, for {visit.violation_time:.1f} s in all:"
-                f" {entry_text} at {_event_text(requirements, visit, 'entry')}"
-                f" and {exit_text} at {_event_text(requirements, visit, 'exit')}"
-                + (f"; {visit.entries} violations" if visit.entries > 1 else ""),
+                f"; the {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, is {deepest_text} at"
+                f" {visit.at_time:.1f} s and {exit_text} at {visit.exit_time:.1f} s; {visit.violation_time:.1f} s"
+                f" {side_text} in all" + (f" ({visit.entries} violations)" if visit.entries > 1 else ""),
             )
         )
     elif visit.depth > 0.0:

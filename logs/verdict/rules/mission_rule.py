@@ -130,7 +130,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
         "mission",
         Place("mission", item=item),
         ok=ok,
-        reason=f"{first_message.text}{more_text} (PX4 {check})",
+        reason=f"{first_message.text}{more_text} (PX4 function {check})",
         faults=[first_message],
         source="PX4",
         method="mission items",
@@ -156,7 +156,7 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
             "mission",
             Place("mission", item=refused_items[0].seq),
             ok=False,
-            reason=f"{fault.text} (ArduPlane mavlink_int_to_mission_cmd)",
+            reason=f"{fault.text} (ArduPlane function mavlink_int_to_mission_cmd)",
             faults=[fault],
             source="ArduPlane",
             method="mission items",
@@ -266,7 +266,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
-        steepest_text = f"{max(map(abs, slopes)):.1%}: a touchdown is judged on up to {STEEPEST_STRIP_SLOPE:.0%} only"
+        steepest_text = f"{max(map(abs, slopes)):.1%}; a touchdown is judged only on up to {STEEPEST_STRIP_SLOPE:.0%}"
         reason = f"NAV_LAND: the ground there slopes by {steepest_text}"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.

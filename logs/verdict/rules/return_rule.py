@@ -262,7 +262,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
-    reason = f"by the simulated {requirements.setup.autopilot.title}: {note_text}; {outcome}"
+    reason = f"the simulated {requirements.setup.autopilot.title} returns {note_text}; {outcome}"
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")
     faults = []
     if unknown_reason and requirements.setup.source is None:

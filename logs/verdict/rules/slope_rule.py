@@ -273,7 +273,8 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
         return ""
     deviation = math.degrees(_limit_deviation(requirements, leg, limit, certain_limit))
     return (
-        f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) {math.degrees(certain_limit):.1f}° is certain"
+        f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) only"
+        f" {math.degrees(certain_limit):.1f}° is certain"
     )
 
 
@@ -511,8 +512,7 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
     speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
-            f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
-            f" it can {verb}"
+            f"measured over {ability.duration:.0f} s at {throttle_text}: the aircraft can {verb} at most"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
         )
     ]

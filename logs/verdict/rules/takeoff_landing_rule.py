@@ -59,7 +59,9 @@ def takeoff_findings(
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     source = requirements.setup.source
     if source is not None and not source.aircraft_known:
-        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), "the aircraft is not named (--aircraft)")]
+        return [
+            _unjudged_finding("takeoff", requirements.waypoint(waypoint), "no aircraft was named: --aircraft names it")
+        ]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
 

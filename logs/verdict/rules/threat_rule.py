@@ -185,8 +185,8 @@ def _sphere_finding(
     )
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s), at"
-            f" least {flown_visit.closest:.0f} m from the center"
+            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s),"
+            f" closest {flown_visit.closest:.0f} m from the center"
         )
         facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
     flown_time = None if flown_visit is None else flown_visit.time_inside

@@ -88,7 +88,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
         assert verdict.levels[-1].headline == verdict.headline
     three = asked["geometry", "airframe", "autopilot"]
     assert three.lines[-2:] == (
-        "By geometry only: flyable; flight and geometry agree on every finding that both have",
+        "By geometry only: flyable; flight and geometry agree on every finding that both judge",
         "Airframe alone (planfly's guidance, exact navigation): flyable; both flights agree",
     )
 

@@ -102,7 +102,7 @@ def test_a_campaign_is_compared_with_a_campaign_only(
     for argv, words in (
         ([str(first), "flight.mcap"], "flight.mcap: no campaign; expected a folder with a campaign.sqlite"),
         ([str(first), str(empty)], "no flight of this campaign was flown"),
-        ([str(first), str(first), "--svg"], "--svg: only with two flight logs"),
+        ([str(first), str(first), "--svg"], "--svg: allowed only with two flight logs"),
     ):
         assert main(["compare", *argv]) == 2
         assert words in capsys.readouterr().err

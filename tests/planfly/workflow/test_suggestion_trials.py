@@ -96,10 +96,10 @@ def test_what_an_early_end_left_unjudged_is_named() -> None:
         RemainingFinding("clearance", Place("leg", 5), fails=False),
     )
     text = suggestion_text((replace(higher(1, 12.0)[0], remaining=remaining),))
-    fails_text = "afterwards fails: clearance at leg 4"
-    assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; afterwards undecided: clearance at leg 5)"
+    fails_text = "later in the flight fails: clearance at leg 4"
+    assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; later in the flight undecided: clearance at leg 5)"
     lost = replace(higher(1, 12.0)[0], remaining=(RemainingFinding("departure", FLIGHT, fails=True),))
-    assert suggestion_text((lost,)) == "raise both ends of leg 1 by 12 m (afterwards fails: loss of control at flight)"
+    assert suggestion_text((lost,)) == ("raise both ends of leg 1 by 12 m (later in the flight fails: loss of control)")
     # The energy of a flight that ended early passes only for the part that was flown.
     flown_part, whole = (make_finding("energy", FLIGHT, ok=ok, reason="") for ok in (True, False))
     assert is_passed(replace(before, findings=(*before.findings, flown_part)), verdict_of(whole), low(1))
