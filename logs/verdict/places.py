@@ -32,6 +32,7 @@ ChangeKind = Literal[
     "radius",
     "home altitude",
     "altitude frame",
+    "terrain height",
     "end loiter",
     "launch course",
     "launch speed",
