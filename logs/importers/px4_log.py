@@ -4,8 +4,6 @@ pyulog reads the container; damage is counted here, because pyulog only reports 
 and fields follow PX4's message documentation of the current release and of older releases.
 """
 
-import contextlib
-import io
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -33,6 +31,7 @@ from world.address_space import AddressSpaceError
 from world.arrays import Bytes, Ints
 from world.errors import LogError
 from world.kernels import compiled, read_only
+from world.silent_output import silence
 
 FORMAT = "PX4 log"
 # Bytes before the first record.
@@ -81,7 +80,7 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     """Read the named topics of a log.  Raises LogError for a file that pyulog cannot read."""
     try:
         # pyulog prints errors on the terminal.
-        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
+        with silence(), path.open("rb") as file:
             log = ULog(_FormatCheckingFile(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise

@@ -27,7 +27,7 @@ from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
-from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
+from logs.verdict.summary import failed_at_take_off, headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
 
@@ -136,12 +136,15 @@ def _level_answers(
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
-    """Return the airframe's answer, by the reference flight, with its disagreements with the flight."""
+    """Return the airframe's answer, by the reference flight, with its disagreements with the flight.
+
+    A flight that failed at take-off is not compared, because the reference flight begins in the air.
+    """
     failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
     airframe_findings = [
         replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed)
         for finding in flight_findings
-        if finding.rule not in GROUND_RULES
+        if finding.rule not in GROUND_RULES and not failed_at_take_off(flight_findings)
     ]
     disagreements = _disagreements("airframe", airframe_findings, flight_findings)
     # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.

@@ -96,6 +96,9 @@ SIDE_OVERLAP = "side overlap"
 # Rules of take-off and landing, which the airframe's reference flight does not fly.
 GROUND_RULES = ("takeoff", "climbout", "launch", "landing", "approach", "touchdown")
 
+# Those of them that judge a flight before its first waypoint.
+TAKE_OFF_RULES = ("takeoff", "climbout", "launch")
+
 # The words of every rule by its name, in the order in which a verdict judges and lists the rules.
 RULE_WORDS: dict[str, RuleWords] = {
     words.name: words

@@ -12,7 +12,7 @@ import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from flight.mission.altitude_frames import misread_altitudes
-from flight.mission.items import OVER_HOME, Frame
+from flight.mission.items import LANDINGS, OVER_HOME, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
@@ -36,6 +36,7 @@ from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Suggestion
 from logs.verdict.tolerances import (
     CALM_WIND_MPS,
+    HEIGHT_ERROR_LIMIT_M,
     HOME_ERROR_M,
     LEVEL_SLOPE_RAD,
     MIN_EVIDENCE_FLIGHT_S,
@@ -480,7 +481,7 @@ def suggest_flying_higher(
     """Suggest flying a leg higher above the ground.
 
     If home's altitude is that far below the ground, or if items are below the ground that are above it as heights above
-    home, suggest another altitude of home, or heights above home, first.
+    home, suggest another altitude of home, or heights above home, first.  Over varied ground also suggest following it.
     """
     if finding.limit is None or finding.margin is None:
         return ()
@@ -500,7 +501,44 @@ def suggest_flying_higher(
         suggestions.append((Change("altitude frame", MISSION, *frames, ""),))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
         suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
+    following = _follow_ground(requirements, finding)
+    if following:
+        # Of several legs it raises all at once, and is tried before each of them is raised.
+        suggestions.insert(0 if len(following) > 1 else len(suggestions), following)
     return tuple(suggestions)
+
+
+# Smallest difference of the ground's altitude along a leg for which it is suggested to follow the ground, m.
+_MIN_FOLLOWED_RELIEF_M = 20.0
+
+
+def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggestion:
+    """Return the changes with which the legs that are too low over varied ground follow it.
+
+    A leg's end keeps its height above ground, but gets at least the required one and the height by which a leg may be
+    off.  A leg that already follows the ground is not changed, nor is one that ends with a landing.  Return () if the
+    failed finding is not on one of the legs.
+    """
+    setup, leg, limit = requirements.setup, finding.place.index, finding.limit
+    terrain = setup.scenario.terrain
+    if terrain is None or limit is None or finding.place.kind != "leg" or not setup.autopilot.checks.follows_terrain:
+        return ()
+    landing_items = {item.seq for item in setup.mission.items if item.command in LANDINGS}
+    changes = []
+    for other in range(requirements.legs):
+        start, end = requirements.points[other], requirements.points[other + 1]
+        count = 2 + int(float(requirements.runs[other]) / terrain.spacing)
+        places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
+        ground = np.asarray(terrain.height(places[:, 0], places[:, 1]), dtype=np.float64)
+        follows = bool(np.isfinite(setup.route.points["above_ground"][other + 1]))
+        is_landing = int(setup.route.items[other + 1]) in landing_items
+        if follows or is_landing or not np.isfinite(ground).all() or np.ptp(ground) < _MIN_FOLLOWED_RELIEF_M:
+            continue
+        heights = places[:, 2] - ground
+        if other == leg or float(heights.min()) < limit:
+            height = _round_to_meter(max(float(heights[-1]), limit + HEIGHT_ERROR_LIMIT_M))
+            changes.append(Change("terrain height", requirements.leg(other), None, height, "m"))
+    return tuple(changes) if any(change.place.index == leg for change in changes) else ()
 
 
 def suggest_flying_lower(

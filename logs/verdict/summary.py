@@ -23,7 +23,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
-from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, RuleWords
+from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, TAKE_OFF_RULES, RuleWords
 from logs.verdict.suggestions import home_height
 from logs.verdict.tolerances import HOME_ERROR_M, NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
@@ -159,6 +159,22 @@ def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
         f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge,"
         " because the aircraft's limits are uncertain"
     )
+
+
+def failed_at_take_off(findings: Sequence[Finding]) -> bool:
+    """Return True if a flight failed at take-off and flew no leg.
+
+    The airframe's reference flight, which begins in the air, then shows nothing about the flight as a whole.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import FLIGHT
+    >>> launch = make_finding("launch", Place("waypoint", 0), ok=False, reason="")
+    >>> ends = [make_finding("completion", FLIGHT, ok=False, reason="", flown=legs) for legs in (0, 1)]
+    >>> [failed_at_take_off((launch, end)) for end in ends], failed_at_take_off(ends)
+    ([True, False], False)
+    """
+    fails_take_off = any(finding.ok is False and finding.rule in TAKE_OFF_RULES for finding in findings)
+    return fails_take_off and any(finding.rule == "completion" and finding.flown == 0.0 for finding in findings)
 
 
 def most_urgent_failure(findings: Sequence[Finding]) -> Finding | None:
@@ -307,6 +323,8 @@ def summary_lines(
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for answer in other_answers:
         agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
+        if answer.name == "airframe" and failed_at_take_off(findings):
+            agreement = "; it begins in the air, after the take-off that failed"
         lines.append(f"{_LEVEL_TITLES[answer.name]}: {answer.headline}{agreement}")
     return tuple(lines)
 

@@ -111,6 +111,8 @@ def change_text(change: Change) -> str:
     match change.what:
         case "length":
             return f"make {_length_text(change)}"
+        case "terrain height":
+            return _terrain_height_text((change,))
         case "rise":
             return _rise_text(change)
         case "airspeed" if change.most is not None:
@@ -203,6 +205,20 @@ def _length_text(change: Change) -> str:
     return f"{place_text_within(change.place)} {change.wanted:.0f} m long{comparison}"
 
 
+def _terrain_height_text(suggestion: Suggestion) -> str:
+    """Name the items at which legs that follow the ground end, with their heights above it.
+
+    >>> legs = [Change("terrain height", Place("leg", k, to_item=k + 1), None, 70.0 + k, "m") for k in (1, 2)]
+    >>> _terrain_height_text(tuple(legs))
+    'follow the ground to item 2 at 71 m and item 3 at 72 m above it (frame 10)'
+    """
+    texts = []
+    for change in suggestion:
+        end = place_text(change.place) if change.place.to_item is None else f"item {change.place.to_item}"
+        texts.append(f"{end} at {change.wanted:.0f} m")
+    return f"follow the ground to {_join_with_and(texts)} above it (frame 10)"
+
+
 def suggestion_text(suggestion: Suggestion) -> str:
     """Join the changes of one suggestion into one instruction.
 
@@ -210,7 +226,9 @@ def suggestion_text(suggestion: Suggestion) -> str:
     >>> suggestion_text(tuple(longer))
     'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
     """
-    if all(change.what == "length" for change in suggestion):
+    if all(change.what == "terrain height" for change in suggestion):
+        text = _terrain_height_text(suggestion)
+    elif all(change.what == "length" for change in suggestion):
         text = "make " + " and ".join(map(_length_text, suggestion))
     else:
         text = " and ".join(map(change_text, suggestion))

@@ -8,6 +8,7 @@ from typing import Literal
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parts import Candidate
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -68,22 +69,29 @@ def find_passing_parameter(
     vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
     if any(fact.what == PITCH_LIMIT_TIME for finding in findings for fact in finding.facts):
         vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
-    for name, step, farthest, unit, min_value in (
+    for candidate in (
         (*vertical_candidates, *lateral_candidates)
         if failed_finding.rule in _VERTICAL_RULES
         else (*lateral_candidates, *vertical_candidates)
     ):
-        current = values[name]
+        current = values[candidate.name]
 
-        def with_value(value: float, name: str = name) -> bool:
-            return passes(autopilot.with_parameters(**{name: value}))
+        def with_value(value: float, candidate: Candidate = candidate) -> bool:
+            return passes(autopilot.with_parameters(**dict.fromkeys((candidate.name, *candidate.others), value)))
 
         # Do not suggest values below the documented range.
-        passing_value = _nearest_passing_value(max(current, min_value - step), step, farthest, with_value)
+        start = max(current, candidate.least - candidate.step)
+        passing_value = _nearest_passing_value(start, candidate.step, candidate.far, with_value)
         if passing_value is not None:
             deviation = _deviation_at_failure(failed_finding, findings)
             return DecidingParameter(
-                name, current, passing_value, unit, failed_finding.rule, failed_finding.place, deviation
+                candidate.title,
+                current,
+                passing_value,
+                candidate.unit,
+                failed_finding.rule,
+                failed_finding.place,
+                deviation,
             )
     return None
 

@@ -87,7 +87,9 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
         elif _is_undecided(finding):
             is_new = old is None or not _is_undecided(old)
         else:
-            is_new = finding.ok is None and old is not None and old.ok is True
+            # That PX4 would reject a mission decides nothing for another autopilot.
+            is_judged_rule = finding.rule != "mission"
+            is_new = is_judged_rule and finding.ok is None and old is not None and old.ok is True
         if is_new:
             pairs.append((old, finding))
     return pairs

@@ -379,8 +379,10 @@ class Estimator:
 # "Global sensitivity measures from given data", EJOR 226, 2013).  The chance difference of small groups is subtracted,
 # as in Kelley's epsilon squared (PNAS 21, 1935), so that a quantity without effect has an index of 0.
 
-# Minimum number of flights for an index.
-MIN_FLIGHTS_FOR_INDEX = 30
+# Minimum number of flights for an index.  Without any effect, a campaign of eight quantities names one in 2 to 4 % of
+# seeded draws with 8 to 30 flights alike, so the power decides: a quantity that explains 70 % of the variance is named
+# in 97 % of the draws with 20 flights, in 80 % with 15, and in 44 % with 10.
+MIN_FLIGHTS_FOR_INDEX = 20
 # Maximum number of groups.
 _MAX_GROUPS = 64
 

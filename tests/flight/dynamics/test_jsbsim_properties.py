@@ -8,7 +8,6 @@ import jsbsim
 import pytest
 
 from aircraft.jsbsim_model import CommandProperty
-from flight.dynamics.fdm import silence
 from flight.dynamics.jsbsim_properties import (
     FLAT_DENSITY,
     FLAT_PLANET,
@@ -30,6 +29,7 @@ from flight.dynamics.jsbsim_properties import (
 from flight.dynamics.state import STATE
 from world.errors import FlightError
 from world.kernels import field_names
+from world.silent_output import silence
 
 
 def _in_feet(name: str) -> bool:

@@ -407,6 +407,10 @@ def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
     left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
     assert [item.ok for item in left] == [None] * len(said)
     assert all(words in item.reason for item, words in zip(left, said, strict=True))
+    # The next step is in the reason, and not in the headline.
+    assert [("--sitl" in item.reason, "--sitl" in item.brief) for item in left] == [
+        ("ARSPD" in words, False) for words in said
+    ]
     # Without a return the terrain is not followed: after any other last item ArduPlane returns by itself.
     alone = mission_findings(replace(setup_of(lines[0], wp(0, 900, command=17)), autopilot=law))
     assert not any("TERRAIN_FOLLOW" in item.reason for item in alone)
