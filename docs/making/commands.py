@@ -78,7 +78,7 @@ def _common_section(texts: list[str], common: set[tuple[str, str]]) -> str:
             groups.setdefault(option.group, []).append(option[1:])
     out = [
         "## Common options",
-        "Each of these options means the same for every command that has it, unless the command's own section explains it.",
+        "Each of these options means the same for every command that has it, unless the command's section explains it.",
     ]
     return "\n\n".join(out + [f"**{title}**\n\n{_definitions(entries)}" for title, entries in groups.items()])
 

@@ -2,7 +2,6 @@
 
 import ast
 import math
-import re
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
