@@ -37,7 +37,7 @@ class _Option(NamedTuple):
 
 
 def command_pages() -> str:
-    """Return the common options, one section per command, and the exit codes."""
+    """Return the common options, and one section per command."""
     commands = build_parser().commands
     texts = {name: _help_text(name, parser) for name, parser in commands.items()}
     uses = Counter(option[1:] for text in texts.values() for option in dict.fromkeys(_options_in(text)))
@@ -47,8 +47,7 @@ def command_pages() -> str:
         if count >= COMMON_OPTION_USES and form.startswith("-")
     }
     sections = [_section(name, parser, texts[name], common) for name, parser in commands.items()]
-    codes = f"## Exit codes\n\n```text\n{EXIT_CODES.strip()}\n```"
-    return "\n\n".join([_common_section(list(texts.values()), common), *sections, codes])
+    return "\n\n".join([_common_section(list(texts.values()), common), *sections])
 
 
 def _help_text(name: str, parser: CommandParser) -> str:

@@ -40,10 +40,9 @@ def add_survey_parser(command_line: LineParser) -> None:
         metavar="WxH,FOCAL",
         type=parse_camera,
         help=(
-            "width and height of the camera's sensor (across and along the track) and its focal "
-            "length, mm, optionally followed by the required overlaps along and across the lines, "
-            "percent: 23.5x15.6,16 or 23.5x15.6,16,75,60; the camera looks straight down (default: "
-            "the camera of a .plan)"
+            "sensor of the camera (width across the track x height along it) and focal length, mm, as in "
+            "23.5x15.6,16; or with the required overlaps along and across the lines, percent, as in "
+            "23.5x15.6,16,75,60 (default: the camera of a .plan)"
         ),
     )
     group.add_argument(
