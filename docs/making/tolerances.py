@@ -45,8 +45,7 @@ def tolerance_list() -> tuple[Tolerance, ...]:
         if line.startswith("#"):
             comment.append(line[1:].strip())
         elif number in starts:
-            # A constant without a comment shares that of the one above.
-            text = " ".join(comment) or f"{out[-1].unit}.  {out[-1].text}".removeprefix(".  ")
+            text = " ".join(comment)
             for name, expression in _assigned(starts[number]):
                 angle = "radians" in expression or "math.pi" in expression
                 meaning = text.removeprefix("rad.").strip() if angle else text

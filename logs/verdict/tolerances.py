@@ -33,11 +33,10 @@ LOITER_LAPS_TOLERANCE = 0.5
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
-# Radii of the arc at the bank limit.  Distance from the center within which an aircraft stays if the loiter is too
-# tight for its bank limit and the autopilot steers to the center: up to 2.09 in 20 flights of the simulated ArduPlane
-# (loiters of 10 to 100 m, wind up to 12 m/s). The simulated PX4 stays within this distance of a mission's last
-# waypoint, where it loiters: up to 2.06 in 54 flights (loiters of 80 and 200 m, wind up to 12 m/s), in radii of the
-# loiter or of that arc, whichever is wider.
+# Radii of the arc at the bank limit.  An aircraft stays within this distance of a loiter's center, even if the loiter
+# is too tight for its bank limit. In 20 flights of the simulated ArduPlane (loiters of 10 to 100 m, wind up to 12
+# m/s) it reached up to 2.09. It also stays within this distance of the last waypoint that the simulated PX4 circles:
+# up to 2.06 in 54 flights, in radii of that arc or of the loiter, whichever is larger.
 LOITER_SWING_RADII = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5
@@ -60,10 +59,11 @@ OVERSHOOT_TOLERANCE_M = 5.0
 SETTLED_CROSS_TRACK_M = 1.0
 # m, by turbulence.  Increase of `SETTLED_CROSS_TRACK_M` by gusts.
 GUST_OFFSET_M = {"none": 0.0, "light": 0.5, "moderate": 1.0}
-# Fraction of the passing distance, and m by turbulence.  A turn may pass its waypoint closer than the arc at the bank
-# limit, by the sum of this fraction and this length. The length is the cross-track error of an aircraft with good
-# guidance.
+# Fraction of the passing distance.  A turn may pass its waypoint closer than the arc at the bank limit, by the sum of
+# this and `CORNER_CUT_TOLERANCE_M`.
 CORNER_CUT_FRACTION = 0.01
+# m, by turbulence.  Cross-track error of an aircraft with good guidance: added to `CORNER_CUT_FRACTION` of the
+# passing distance.
 CORNER_CUT_TOLERANCE_M = {"none": 0.6, "light": 0.8, "moderate": 1.0}
 # Standard deviations.  Largest navigation error that the rules take into account.
 NAVIGATION_SIGMAS = 3.0
@@ -176,13 +176,13 @@ ROUGH_SLOPE_ERROR_RAD = math.radians(0.5)
 # m.  If neither mission nor autopilot states an acceptance radius, a waypoint is reached within the fly-by path's
 # distance from it plus this.  A corridor is wider by this than its turns need.
 WAYPOINT_PASS_MARGIN_M = 10.0
-# m.  Height error at a waypoint that the first line of a verdict names.  At 106 waypoints of the simulated ArduPlane
-# and PX4, on slopes of up to 5 degrees in up to moderate turbulence, the height error was 11.4 m or less.  ArduPlane
-# passed waypoints of a safe plan with a launch up to 49 m low.
+# m.  A larger height error at a waypoint is named in the first line of a verdict. At 106 waypoints of the simulated
+# ArduPlane and PX4, on slopes of up to 5 degrees and in up to moderate turbulence, the error was 11.4 m or less.
+# ArduPlane passed waypoints of a safe plan with a launch up to 49 m low.
 NOTABLE_HEIGHT_ERROR_M = 25.0
-# Ratio.  An autopilot that turns by its own control law, at the waypoint or before it, swings beyond the next leg by
-# up to this many times R (1 - cos turn). The largest ratio was 1.05 in 168 turns of the simulated ArduPlane and 1.24
-# in 80 turns of PX4 (95 to 180 degrees, wind up to 12 m/s, light turbulence).
+# Ratio.  Largest distance beyond the next leg after a fly-over turn, divided by R (1 - cos turn), if the autopilot
+# turns by its own control law. It was up to 1.05 in 168 turns of the simulated ArduPlane and 1.24 in 80 turns of PX4
+# (95 to 180 degrees, wind up to 12 m/s, light turbulence).
 FLY_OVER_SWING_RATIO = 1.25
 # m.  Approaches to a waypoint whose distances differ by less than this are equally close; of them the one nearest in
 # altitude counts. A path that crosses itself above or below has such approaches.
