@@ -275,7 +275,8 @@ def add_flights_option(group: OptionGroup) -> None:
     group.add_argument(
         "--flights",
         metavar="N",
-        type=number_parser("flights"),        help="then fly the plan N times with the default dispersions of 'planfly campaign', and report the share of "
+        type=number_parser("flights"),
+        help="then fly the plan N times with the default dispersions of 'planfly campaign', and report the share of "
         "flyable flights and what would help; the exit code is 4 if the share's whole confidence interval is below "
         "0.95; 40 flights take some 20 s",
     )
