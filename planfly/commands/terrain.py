@@ -42,8 +42,8 @@ def add_terrain_parser(command_line: LineParser) -> None:
     tile_group.add_argument(
         "--source",
         metavar="DIR|URL",
-        help="a folder of tiles or an elevation file; or a server of GLO-30 tiles of the Copernicus DEM (default: the "
-        "public one in Amazon's registry of open data, from which the needed parts are fetched and kept)",
+        help="a folder of tiles, an elevation file, or a server of the Copernicus DEM's GLO-30 tiles (default: the "
+        "public server in Amazon's registry of open data; fetched parts are kept)",
     )
     tile_group.add_argument(
         "--sea",

@@ -117,9 +117,8 @@ def add_fence_option(group: OptionGroup) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="file of a fence (.fence, .waypoints, .txt, .plan), of airspace zones (.geojson, .json including ED-269 "
-        "and ED-318, .kml, .openair, .gpkg) or of rally points (.rally, or a .waypoints with only rally points), which "
-        "applies in addition to those of the mission; repeatable",
+        help="also respect a fence (.fence, .waypoints, .txt, .plan) or airspace zones (.geojson, .json including "
+        "ED-269 and ED-318, .kml, .openair, .gpkg), or use rally points (.rally, .waypoints); repeatable",
     )
     with_completer(option, file_completer("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 
@@ -130,8 +129,8 @@ def add_time_option(group: OptionGroup) -> None:
         "--at",
         metavar="TIME",
         help=(
-            "time of the flight, START or START/END in ISO 8601 format, as in 2026-05-01T10:00+02:00: zones that are "
-            "inactive at that time are ignored, and a forecast is read from START on (default: all zones are active)"
+            "time of the flight in ISO 8601 format, START or START/END, as in 2026-05-01T10:00+02:00; inactive zones "
+            "are then ignored, and a forecast is read from START on (default: all zones are active)"
         ),
     )
 
@@ -277,9 +276,9 @@ def add_flights_option(group: OptionGroup) -> None:
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="then fly the plan N times with the default dispersions of 'planfly campaign', and print how many flights "
-        "succeed, what decides, and what would help; 40 flights take about 20 s. The exit code is 4 if the whole "
-        "interval of the probability is below 0.95",
+        help="then fly the plan N times with the default dispersions of 'planfly campaign', and report the share of "
+        "flyable flights and what would help; the exit code is 4 if the share's whole confidence interval is below "
+        "0.95; 40 flights take some 20 s",
     )
 
 
