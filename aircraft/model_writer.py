@@ -453,10 +453,8 @@ def _separation_table(stall_alpha: float, sharpness: float) -> str:
     points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})
     rows = []
     for alpha in points:
-        upper_blend, lower_blend = (
-            math.exp(-sharpness * (alpha - stall_alpha)),
-            math.exp(sharpness * (alpha + stall_alpha)),
-        )
+        upper_blend = math.exp(-sharpness * (alpha - stall_alpha))
+        lower_blend = math.exp(sharpness * (alpha + stall_alpha))
         fraction = (1.0 + upper_blend + lower_blend) / ((1.0 + upper_blend) * (1.0 + lower_blend))
         fraction = 0.0 if abs(alpha) <= stall_alpha - width + 1e-9 else min(1.0, fraction)
         rows.append(f"          {alpha:.6f}  {fraction:.8f}")

@@ -154,11 +154,9 @@ class Limits:
 
     def _make_table(self, airspeed: float | None) -> PerformanceTable:
         """Make the performance table for a true airspeed, or for the airspeed of the limits if it is None."""
-        cruise_airspeed, altitudes, wind = (
-            self.airspeed if airspeed is None else airspeed,
-            self.envelope.amsl,
-            self.wind,
-        )
+        cruise_airspeed = self.airspeed if airspeed is None else airspeed
+        altitudes = self.envelope.amsl
+        wind = self.wind
         is_equivalent = airspeed is None and self.tracking is not None
         speed_factors = [air_density_factor(float(amsl)) if is_equivalent else 1.0 for amsl in altitudes]
         angles = np.array(
@@ -213,10 +211,8 @@ def derate(
         max_angles = np.arcsin(np.maximum(0.0, np.sin(angles) - unused_rate / airspeeds))
         return _read_only(np.where(reduced > 0.0, np.minimum(reduced, max_angles), reduced))
 
-    climb, descent = (
-        reduce_angles(table.climb, climb_fraction, unused_climb),
-        reduce_angles(table.descent, sink_fraction, unused_sink),
-    )
+    climb = reduce_angles(table.climb, climb_fraction, unused_climb)
+    descent = reduce_angles(table.descent, sink_fraction, unused_sink)
     return table._replace(climb=climb, descent=descent)
 
 
@@ -230,10 +226,8 @@ def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) ->
     """
     airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
     climb_limit, descent_limit = [np.arcsin(np.minimum(1.0, rate / airspeeds)) for rate in (climb_rate, sink_rate)]
-    climb, descent = (
-        _read_only(np.minimum(table.climb, climb_limit)),
-        _read_only(np.minimum(table.descent, descent_limit)),
-    )
+    climb = _read_only(np.minimum(table.climb, climb_limit))
+    descent = _read_only(np.minimum(table.descent, descent_limit))
     return table._replace(climb=climb, descent=descent)
 
 
@@ -356,7 +350,10 @@ def turn_radius_between(table: PerformanceTable, course_in: float, course_out: f
     varies by that much.
     """
     turn = wrap(course_out - course_in)
-    ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
+    ux = math.sin(course_in)
+    uy = math.cos(course_in)
+    vx = math.sin(course_out)
+    vy = math.cos(course_out)
     wx, wy = downwind_vector(table)
     # A U-turn may be flown in either direction.
     turn_sign = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)

@@ -40,7 +40,10 @@ class PlanflyError(Exception):
         self, message: str, *, file: str | Path = "", field: str = "", value: Any = None, allowed: str = ""
     ) -> None:
         super().__init__(message)
-        self.file, self.field, self.value, self.allowed = str(file), field, value, allowed
+        self.file = str(file)
+        self.field = field
+        self.value = value
+        self.allowed = allowed
         self.argument = ""
 
     @classmethod

@@ -131,7 +131,10 @@ def wrap(angle: float) -> float:
 @inlined
 def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
     """Return the course change at b on the path a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
-    ux, uy, vx, vy = bx - ax, by - ay, cx - bx, cy - by
+    ux = bx - ax
+    uy = by - ay
+    vx = cx - bx
+    vy = cy - by
     # + 0.0 for a leg without length: see `signed_turns`.
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 

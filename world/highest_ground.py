@@ -88,7 +88,10 @@ def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell_side, south)
     north_col, north_row = polymap(to_pixel, west, south + cell_side)
-    east_col, east_row, north_col, north_row = east_col - col, east_row - row, north_col - col, north_row - row
+    east_col = east_col - col
+    east_row = east_row - row
+    north_col = north_col - col
+    north_row = north_row - row
     area = east_col * north_row - north_col * east_row
     first_row = math.ceil(row + min(0.0, east_row) + min(0.0, north_row))
     last_row = math.floor(row + max(0.0, east_row) + max(0.0, north_row))

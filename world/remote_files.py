@@ -118,7 +118,10 @@ class RemoteFile:
                 raise _IncompleteAnswer(f"bytes {begin}-{end - 1} were requested, and the server sent {sent_range}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
-                position, digest, start_time, is_slow = begin, sha256(), time.monotonic(), False
+                position = begin
+                digest = sha256()
+                start_time = time.monotonic()
+                is_slow = False
                 # read1 returns the bytes received so far, because read would wait for hours for a slow server.
                 while position < end and not is_slow and (chunk := answer.read1(min(_CHUNK_BYTES, end - position))):
                     file.write(chunk)

@@ -362,8 +362,6 @@ def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float]
     endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
     straight_line = endpoints[1] - endpoints[0]
     offset = np.array([-straight_line[1], straight_line[0]]) / (math.hypot(*straight_line) or 1.0) * radius * 0.5
-    first_position, second_position = (
-        endpoints[0] + straight_line / 3.0 + offset,
-        endpoints[1] - straight_line / 3.0 - offset,
-    )
+    first_position = endpoints[0] + straight_line / 3.0 + offset
+    second_position = endpoints[1] - straight_line / 3.0 - offset
     return (float(first_position[0]), float(first_position[1])), (float(second_position[0]), float(second_position[1]))

@@ -97,7 +97,10 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
     v = row - i
     u = col - j
     # Unsigned, so that numba does not check each index for being negative.
-    upper_row, lower_row, left_col, right_col = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
+    upper_row = np.uintp(i)
+    lower_row = np.uintp(i + 1)
+    left_col = np.uintp(j)
+    right_col = np.uintp(j + 1)
     upper_height = heights[upper_row, left_col] * (1.0 - u) + heights[upper_row, right_col] * u
     lower_height = heights[lower_row, left_col] * (1.0 - u) + heights[lower_row, right_col] * u
     return upper_height * (1.0 - v) + lower_height * v
@@ -266,10 +269,8 @@ def _piece_clearance(
                     + curvature * vertex_fraction * vertex_fraction
                 )
                 if vertex_clearance < min_clearance:
-                    min_clearance, min_fraction = (
-                        vertex_clearance,
-                        start_fraction + vertex_fraction * (end_fraction - start_fraction),
-                    )
+                    min_clearance = vertex_clearance
+                    min_fraction = start_fraction + vertex_fraction * (end_fraction - start_fraction)
         start_clearance = end_clearance
         start_fraction = end_fraction
     return min_clearance, min_fraction

@@ -342,10 +342,8 @@ def _fill_from_tile(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTil
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
     # A tile of another pitch reaches half of its own pixel beyond the centres of its outermost pixels.
-    columns, rows_covered = (
-        np.flatnonzero((col > -0.5) & (col < cols - 0.5)),
-        np.flatnonzero((row > -0.5) & (row < rows - 0.5)),
-    )
+    columns = np.flatnonzero((col > -0.5) & (col < cols - 0.5))
+    rows_covered = np.flatnonzero((row > -0.5) & (row < rows - 0.5))
     if not columns.size or not rows_covered.size:
         return
     # Snap to the tile's own grid: heights there stay unchanged, and need no neighbouring pixel.

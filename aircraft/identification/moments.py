@@ -102,11 +102,9 @@ def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Fl
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]
     elevator, aileron, rudder = signals.surfaces.T
     span_factor, chord_factor = base.span / (2.0 * signals.airspeed), base.chord / (2.0 * signals.airspeed)
-    roll, pitch, yaw = (
-        signals.rates[:, 0] * span_factor,
-        signals.rates[:, 1] * chord_factor,
-        signals.rates[:, 2] * span_factor,
-    )
+    roll = signals.rates[:, 0] * span_factor
+    pitch = signals.rates[:, 1] * chord_factor
+    yaw = signals.rates[:, 2] * span_factor
     ones = np.ones(len(alpha))
     return {
         "pitch": [

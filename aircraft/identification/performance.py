@@ -94,10 +94,8 @@ def max_level_speeds(base: BaseModel, values: Floats, density: float) -> Floats:
     for _ in range(40):
         middle_speed = 0.5 * (low_speed + high_speed)
         is_short = excess_thrust(middle_speed) < 0.0
-        low_speed, high_speed = (
-            np.where(is_short, low_speed, middle_speed),
-            np.where(is_short, middle_speed, high_speed),
-        )
+        low_speed = np.where(is_short, low_speed, middle_speed)
+        high_speed = np.where(is_short, middle_speed, high_speed)
     return np.asarray(0.5 * (low_speed + high_speed))
 
 

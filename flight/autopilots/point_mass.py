@@ -306,10 +306,8 @@ def _electric_power(
     idle_power = _interpolate(power[0], airspeed, amsl, aircraft)
     level_power = _interpolate(power[1], airspeed, amsl, aircraft)
     full_power = _interpolate(power[2], airspeed, amsl, aircraft)
-    full_excess, idle_excess = (
-        _interpolate(excess_table[excess_table.shape[0] - 1], airspeed, amsl, aircraft),
-        _interpolate(excess_table[0], airspeed, amsl, aircraft),
-    )
+    full_excess = _interpolate(excess_table[excess_table.shape[0] - 1], airspeed, amsl, aircraft)
+    idle_excess = _interpolate(excess_table[0], airspeed, amsl, aircraft)
     if thrust_power >= full_excess or not idle_excess < 0.0 < full_excess:
         return full_power
     if thrust_power <= idle_excess:
@@ -326,10 +324,8 @@ def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: f
     """Return specific excess power in straight flight at a throttle, an airspeed and an altitude, m/s."""
     grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
     row = min(excess_table.shape[0] - 2, int(grid_position))
-    lower_power, upper_power = (
-        _interpolate(excess_table[row], airspeed, amsl, aircraft),
-        _interpolate(excess_table[row + 1], airspeed, amsl, aircraft),
-    )
+    lower_power = _interpolate(excess_table[row], airspeed, amsl, aircraft)
+    upper_power = _interpolate(excess_table[row + 1], airspeed, amsl, aircraft)
     return lower_power + (grid_position - row) * (upper_power - lower_power)
 
 

@@ -61,13 +61,11 @@ def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, resu
     result.clearance = result.clearance_before_arrival = math.inf if has_terrain else math.nan
     result.threat = -1
     result.sphere_distance, result.distance_before_arrival = math.inf, math.inf
-    result.arrival_time, result.arrival_altitude, result.energy, result.outcome, result.position_count = (
-        math.nan,
-        math.nan,
-        0.0,
-        RETURN_TIMEOUT,
-        0,
-    )
+    result.arrival_time = math.nan
+    result.arrival_altitude = math.nan
+    result.energy = 0.0
+    result.outcome = RETURN_TIMEOUT
+    result.position_count = 0
 
 
 @inner
@@ -150,11 +148,9 @@ def update_clearances(
         radius = radii[m]
         if radius <= 0.0:
             continue
-        offset_e, offset_n, offset_up = (
-            estimated.east - spheres[m, 0],
-            estimated.north - spheres[m, 1],
-            estimated.up - spheres[m, 2],
-        )
+        offset_e = estimated.east - spheres[m, 0]
+        offset_n = estimated.north - spheres[m, 1]
+        offset_up = estimated.up - spheres[m, 2]
         sphere_distance = math.sqrt(offset_e * offset_e + offset_n * offset_n + offset_up * offset_up) - radius
         if sphere_distance < result.sphere_distance:
             result.sphere_distance, result.threat, result.threat_time = sphere_distance, m, time
@@ -171,11 +167,9 @@ def update_clearances(
             if math.isnan(result.arrival_time):
                 result.clearance_before_arrival = clearance
             result.clearance_time = time
-            result.clearance_east, result.clearance_north, result.clearance_up = (
-                estimated.east,
-                estimated.north,
-                estimated.up,
-            )
+            result.clearance_east = estimated.east
+            result.clearance_north = estimated.north
+            result.clearance_up = estimated.up
         result.clearance = clearance
     if clearance <= -MAX_IMPACT_DEPTH_M:
         result.outcome, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time

@@ -172,10 +172,8 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     )
     level = steady_flight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
-    longitudinal_quantities, lateral_quantities = (
-        ("pitch", "alpha", "airspeed", "amsl"),
-        ("roll", "roll_rate", "beta", "yaw"),
-    )
+    longitudinal_quantities = ("pitch", "alpha", "airspeed", "amsl")
+    lateral_quantities = ("roll", "roll_rate", "beta", "yaw")
     responses = (
         _step_response(aircraft, "elevator", -elevator, math.inf, 20.0, longitudinal_quantities),
         _step_response(aircraft, "throttle", throttle, math.inf, 20.0, longitudinal_quantities),

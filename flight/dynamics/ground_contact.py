@@ -250,7 +250,10 @@ def _set_friction(
     max_force: float,
 ) -> None:
     """Fill a friction record, and limit the contact's last friction force to the record's range."""
-    friction.contact, friction.kind, friction.min_force, friction.max_force = contact_index, kind, min_force, max_force
+    friction.contact = contact_index
+    friction.kind = kind
+    friction.min_force = min_force
+    friction.max_force = max_force
     set_vector(friction.direction, direction)
     set_vector(friction.arm, arm)
     contact.friction[kind] = _limit(min_force, contact.friction[kind], max_force)

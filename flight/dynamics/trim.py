@@ -375,8 +375,14 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
     alpha: angle of attack, rad.
     """
     # Without NumPy, whose sines on processors with AVX-512 differ in the last digit from other machines.
-    ch, sh, cc, sc = math.cos(heading), math.sin(heading), math.cos(climb), math.sin(climb)
-    cb, sb, ca, sa = math.cos(bank), math.sin(bank), math.cos(alpha), math.sin(alpha)
+    ch = math.cos(heading)
+    sh = math.sin(heading)
+    cc = math.cos(climb)
+    sc = math.sin(climb)
+    cb = math.cos(bank)
+    sb = math.sin(bank)
+    ca = math.cos(alpha)
+    sa = math.sin(alpha)
     forward = (ch * cc, sh * cc, -sc)
     level_right = (-sh, ch, 0.0)
     level_down = (ch * sc, sh * sc, cc)

@@ -177,7 +177,10 @@ def quaternion_rate(q: Quaternion, rates: Vector) -> Quaternion:
 def matrix_of_quaternion(q: Quaternion) -> Matrix:
     """Return the matrix that transforms vectors into the axes of a body, from the body's attitude quaternion."""
     w, (x, y, z) = q
-    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    ww = w * w
+    xx = x * x
+    yy = y * y
+    zz = z * z
     wx, wy, wz = w * x, w * y, w * z
     xy, xz, yz = x * y, x * z, y * z
     return (

@@ -128,10 +128,8 @@ def follow_roll(
     airspeed = max(8.0, state.airspeed)
     inverse_speed_ratio = gains.reference_airspeed / airspeed
     memory.bank, memory.bank_rate = bank, roll_rate
-    aileron_per_rate, aileron_per_acceleration = (
-        gains.aileron_per_roll_rate * inverse_speed_ratio,
-        gains.aileron_per_roll_acceleration * inverse_speed_ratio * inverse_speed_ratio,
-    )
+    aileron_per_rate = gains.aileron_per_roll_rate * inverse_speed_ratio
+    aileron_per_acceleration = gains.aileron_per_roll_acceleration * inverse_speed_ratio * inverse_speed_ratio
     disturbance = (
         aileron_per_acceleration * (state.roll_rate - memory.last_roll_rate) / dt
         + aileron_per_rate * state.roll_rate

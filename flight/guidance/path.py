@@ -326,10 +326,8 @@ def _ground_following_corners(
         start_height = end_height
     corners = []
     for distance_along in np.arange(0.5 * GROUND_STEP_M, length - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
-        east, north = (
-            segment_start[0] + distance_along * math.sin(course),
-            segment_start[1] + distance_along * math.cos(course),
-        )
+        east = segment_start[0] + distance_along * math.sin(course)
+        north = segment_start[1] + distance_along * math.cos(course)
         fraction = math.hypot(east - leg_start[0], north - leg_start[1]) / math.dist(
             leg_start[:2], route.positions[leg + 1, :2]
         )

@@ -193,10 +193,8 @@ def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: f
         new_change = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
         mission, item_index = _with_replaced_item(mission, index - 1, new_change), index
     else:
-        mission, item_index = (
-            _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)),
-            index + 1,
-        )
+        mission = _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed))
+        item_index = index + 1
     later_items = mission.items[item_index + 1 :]
     if not any(is_movable(item) for item in later_items) or later_items[0].command == Command.DO_CHANGE_SPEED:
         return mission

@@ -101,7 +101,10 @@ class _ItemBuilder:
 
         position: (3,) m; None for a command without a position.
         """
-        frame, lat, lon, up = Frame.MISSION, 0.0, 0.0, 0.0
+        frame = Frame.MISSION
+        lat = 0.0
+        lon = 0.0
+        up = 0.0
         if position is not None:
             frame, up = Frame.GLOBAL, _round_to_thousandths(float(position[2]))
             lat, lon = (round_to_grid(float(value)) for value in to_geo(self._origin, position[0], position[1]))

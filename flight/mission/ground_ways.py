@@ -216,10 +216,8 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])
-    wind, home = (
-        scenario.wind.components_on_course(course, ground)[0],
-        home_point(mission, scenario.origin, scenario.terrain),
-    )
+    wind = scenario.wind.components_on_course(course, ground)[0]
+    home = home_point(mission, scenario.origin, scenario.terrain)
     base = ground if home is None else home.up
     return Approach(
         strip, int(route.items[last_leg]), last_leg - 1, point, course, length, float(leg_start[2]), wind, base

@@ -627,7 +627,11 @@ class _ItineraryBuilder:
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
         """Return the stop of an item, with the current speeds, and with the gates since the last stop."""
-        lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, stated_loiter(item), item.alt, item.frame
+        lat = item.lat_deg
+        lon = item.lon_deg
+        loiter = stated_loiter(item)
+        alt = item.alt
+        frame = item.frame
         gates, self.gates = tuple(self.gates), []
         if self.home is not self.first_home and frame in OVER_HOME:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)

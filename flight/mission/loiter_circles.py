@@ -228,10 +228,8 @@ def _make_nodes(
                 unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=False))
                 continue
             # Two loiters with the same stated radius and center may differ by the radius scale at their altitudes.
-            previous_stated_radius, stated_radius = (
-                abs(previous.signed_radius) / rules.radius_scale(previous.up),
-                abs(node.signed_radius) / rules.radius_scale(node.up),
-            )
+            previous_stated_radius = abs(previous.signed_radius) / rules.radius_scale(previous.up)
+            stated_radius = abs(node.signed_radius) / rules.radius_scale(node.up)
             is_same_direction = math.copysign(1.0, previous.signed_radius) == math.copysign(1.0, node.signed_radius)
             if (
                 previous.distance_to(node) >= _SAME_PLACE_M

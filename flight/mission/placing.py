@@ -131,10 +131,8 @@ def place_stops(
     return_mission, return_heights, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
         # An RTL and its landing sequence use the home of the last DO_SET_HOME.
-        return_mission, return_heights = (
-            replace(mission, home=home),
-            _AltitudeConverter(mission.source, home, origin, terrain, notes),
-        )
+        return_mission = replace(mission, home=home)
+        return_heights = _AltitudeConverter(mission.source, home, origin, terrain, notes)
     return_points = (
         _place_return_points(return_mission, home, origin, return_heights) if itinerary.ends_with_rtl else ()
     )

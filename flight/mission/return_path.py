@@ -435,12 +435,10 @@ class _ReturnBuilder:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
         self._end_altitude = end_altitude
-        self._min_slope_height, self._ability, self._dive_slope, self._next_position = (
-            min_slope_height,
-            ability,
-            dive_slope,
-            next_position,
-        )
+        self._min_slope_height = min_slope_height
+        self._ability = ability
+        self._dive_slope = dive_slope
+        self._next_position = next_position
         self._position = self._slope_start = start
         # Altitude of the climb before the turn, m; it may lie above the target.
         self._first_climb_altitude = -math.inf

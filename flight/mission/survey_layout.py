@@ -169,10 +169,8 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
     Each line includes the commands that switch something at its ends.
     """
-    index_by_seq, item_count = (
-        {item.seq: item_index for item_index, item in enumerate(mission.items)},
-        len(mission.items),
-    )
+    index_by_seq = {item.seq: item_index for item_index, item in enumerate(mission.items)}
+    item_count = len(mission.items)
     seqs, flown = [int(seq) for seq in route.items], _flown_items(route)
 
     def index(waypoint: int) -> int:

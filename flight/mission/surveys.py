@@ -170,10 +170,8 @@ class LineAxis:
             distance = np.hypot(along - np.clip(along, min_along, max_along), right)
             is_nearer = distance < min_distance
             min_distance[is_nearer] = distance[is_nearer]
-            coordinates[0, is_nearer], coordinates[1, is_nearer] = (
-                self.along[index] + along[is_nearer],
-                right[is_nearer],
-            )
+            coordinates[0, is_nearer] = self.along[index] + along[is_nearer]
+            coordinates[1, is_nearer] = right[is_nearer]
             coordinates[2, is_nearer] = math.atan2(direction[0], direction[1])
         return coordinates[0], coordinates[1], coordinates[2]
 

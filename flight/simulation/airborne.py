@@ -229,11 +229,9 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     # Process waypoints of one loiter that agree in these fields only once.
     first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
     for waypoint in circles[first_indices]:
-        stated_radius, speed, altitude = (
-            abs(float(waypoint["loiter_radius"])),
-            float(waypoint["airspeed"]),
-            float(waypoint["up"]),
-        )
+        stated_radius = abs(float(waypoint["loiter_radius"]))
+        speed = float(waypoint["airspeed"])
+        altitude = float(waypoint["up"])
         flown_radius = max(
             setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
         )

@@ -274,13 +274,11 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
 
     Sets ``state``, ``true`` and ``place`` of a record of `flight.simulation.tick.WORKSPACE`.
     """
-    state, true, air, settings, place = (
-        workspace.state,
-        workspace.true,
-        workspace.air,
-        workspace.settings,
-        workspace.place,
-    )
+    state = workspace.state
+    true = workspace.true
+    air = workspace.air
+    settings = workspace.settings
+    place = workspace.place
     if not _to_si(state, workspace.state_factors):
         return False
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
@@ -334,7 +332,11 @@ def fill_tick(workspace: Record, block: Floats) -> None:
 
     block: of the `Workspace`, with the wind field.
     """
-    state, true, air, timing, place = workspace.state, workspace.true, workspace.air, workspace.timing, workspace.place
+    state = workspace.state
+    true = workspace.true
+    air = workspace.air
+    timing = workspace.timing
+    place = workspace.place
     cos, sin = place.north_cos, place.north_sin
     row = workspace.rows[timing.row]
     turbulence = workspace.noise[timing.row].turbulence
@@ -512,7 +514,10 @@ def _fill_row(
     """Fill a `flight.simulation.track.TRACK_ROW` record, except for the wind."""
     row.time = time
     # Element by element: assigning a whole array would check shapes.
-    position, velocity, attitude, rates = row.position, row.velocity, row.attitude, row.rates
+    position = row.position
+    velocity = row.velocity
+    attitude = row.attitude
+    rates = row.rates
     position[0], position[1], position[2] = true.east, true.north, true.up
     velocity[0], velocity[1], velocity[2] = true.velocity_east, true.velocity_north, true.velocity_up
     attitude[0], attitude[1], attitude[2] = state.roll, state.pitch, state.yaw
@@ -522,11 +527,9 @@ def _fill_row(
     flow[0], flow[1] = state.alpha, state.beta
     controls[ELEVATOR], controls[AILERON], controls[RUDDER] = state.elevator, state.aileron, state.rudder
     controls[THROTTLE] = state.throttle
-    commands_row[ELEVATOR], commands_row[AILERON], commands_row[RUDDER] = (
-        commands.elevator,
-        commands.aileron,
-        commands.rudder,
-    )
+    commands_row[ELEVATOR] = commands.elevator
+    commands_row[AILERON] = commands.aileron
+    commands_row[RUDDER] = commands.rudder
     commands_row[THROTTLE] = commands.throttle
     row.load_factor = state.load_factor
     row.current = state.current

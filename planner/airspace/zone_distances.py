@@ -119,10 +119,8 @@ def penetration_depth(
     else:
         depth = required_distance - view.distance
     per_metre = 1.0 / max(line.length, 1e-9)
-    first_fraction, last_fraction = (
-        (view.first - required_distance) * per_metre,
-        (view.last + required_distance) * per_metre,
-    )
+    first_fraction = (view.first - required_distance) * per_metre
+    last_fraction = (view.last + required_distance) * per_metre
     return max(depth, 1e-9), min(1.0, max(0.0, first_fraction)), min(1.0, max(0.0, last_fraction))
 
 
@@ -153,10 +151,8 @@ def altitude_band(start_altitude: float, end_altitude: float, error_below: float
 
     error_below, error_above: vertical tracking error, m.
     """
-    min_altitude, max_altitude = (
-        min(start_altitude, end_altitude) - error_below,
-        max(start_altitude, end_altitude) + error_above,
-    )
+    min_altitude = min(start_altitude, end_altitude) - error_below
+    max_altitude = max(start_altitude, end_altitude) + error_above
     return AltitudeBand(min_altitude, max_altitude, -UNKNOWN_HEIGHT_BOUND, UNKNOWN_HEIGHT_BOUND)
 
 
@@ -263,10 +259,8 @@ def measure_zone_margin(
         band = altitude_band(a[2], b[2], error_below, error_above)
         if uses_ground:
             band = _exact_altitude_band(heights, depths, to_pixel, a, b, lateral_error, error_below, error_above)
-        horizontal, vertical = (
-            _horizontal_distance(records, z, a, b, search_distance + max_lateral_error) - max_lateral_error,
-            vertical_distance(zone, band),
-        )
+        horizontal = _horizontal_distance(records, z, a, b, search_distance + max_lateral_error) - max_lateral_error
+        vertical = vertical_distance(zone, band)
         if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
         piece_count = max(1, math.ceil(horizontal_length / MAX_PIECE_LENGTH))
@@ -282,11 +276,11 @@ def measure_zone_margin(
                     heights, depths, to_pixel, piece_start, piece_end, piece_error, error_below, error_above
                 )
             max_piece_error = max(piece_error[0], piece_error[1])
-            horizontal, vertical = (
+            horizontal = (
                 _horizontal_distance(records, z, piece_start, piece_end, search_distance + max_piece_error)
-                - max_piece_error,
-                vertical_distance(zone, band),
+                - max_piece_error
             )
+            vertical = vertical_distance(zone, band)
             _update_margin(zone, required, z, horizontal, vertical, margin)
 
 
@@ -363,8 +357,6 @@ def _exact_altitude_band(
         depth_clearance, _ = segment_clearance(depths, to_pixel, offset_start, offset_end)
         if math.isnan(clearance) or math.isnan(depth_clearance):
             return band
-        min_height, max_height = (
-            min(min_height, clearance - error_below),
-            max(max_height, error_above - depth_clearance),
-        )
+        min_height = min(min_height, clearance - error_below)
+        max_height = max(max_height, error_above - depth_clearance)
     return AltitudeBand(band.min_altitude, band.max_altitude, min_height, max_height)

@@ -236,7 +236,10 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         across = north_offset * line.course_east - east_offset * line.course_north
         return _view_circle(along, across, zone.radius, line.length)
     is_inside, distance2 = False, math.inf
-    right, left, first, last = math.inf, -math.inf, math.inf, -math.inf
+    right = math.inf
+    left = -math.inf
+    first = math.inf
+    last = -math.inf
     edges = records.edges
     for k in range(zone.first_edge, zone.last_edge):
         edge = edges[k]
@@ -246,7 +249,10 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         east_offset, north_offset = edge.to_east - line.east, edge.to_north - line.north
         to_along = east_offset * line.course_east + north_offset * line.course_north
         to_across = north_offset * line.course_east - east_offset * line.course_north
-        right, left, first, last = min(right, across), max(left, across), min(first, along), max(last, along)
+        right = min(right, across)
+        left = max(left, across)
+        first = min(first, along)
+        last = max(last, along)
         if (across > 0.0) != (to_across > 0.0):
             crossing = along + (to_along - along) * across / (across - to_across)
             is_inside = is_inside != (crossing > 0.0)

@@ -270,7 +270,10 @@ def _swath_excess_height(
     for side in (0.0, -1.0, 1.0):
         if side != 0.0 and lateral < _MIN_OFFSET_M:
             break
-        x, y, x2, y2 = start[0] + side * east, start[1] + side * north, end[0] + side * east, end[1] + side * north
+        x = start[0] + side * east
+        y = start[1] + side * north
+        x2 = end[0] + side * east
+        y2 = end[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
         excess = terrain_excess(depths, bounds, required, above, ends, x, y, -start[2], x2, y2, -end[2], max_excess)

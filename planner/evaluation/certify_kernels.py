@@ -73,10 +73,8 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
             piece = pieces[piece_count]
             _cut_piece(waypoints[i], waypoints[i + 1], begin_fraction, end_fraction, piece)
             piece.number = i
-            piece.lateral_begin, piece.lateral_end = (
-                _lateral_deviation(data, piece.begin, across),
-                _lateral_deviation(data, piece.end, across),
-            )
+            piece.lateral_begin = _lateral_deviation(data, piece.begin, across)
+            piece.lateral_end = _lateral_deviation(data, piece.end, across)
             _set_deviations(lags[i], begin_fraction, end_fraction, piece)
             piece.lateral = max(piece.lateral_begin, piece.lateral_end)
             begin_fraction = end_fraction
@@ -337,7 +335,10 @@ def required_buffer(
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:
-            dx, dy, x, y = b[0] - a[0], b[1] - a[1], a[0] - end[0], a[1] - end[1]
+            dx = b[0] - a[0]
+            dy = b[1] - a[1]
+            x = a[0] - end[0]
+            y = a[1] - end[1]
             run2 = dx * dx + dy * dy
             fraction = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
             distance = math.sqrt((x + fraction * dx) ** 2 + (y + fraction * dy) ** 2)

@@ -62,7 +62,10 @@ def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records
     aircraft, tracking = data.aircraft, data.tracking
     leg_count: int = legs.shape[0]
     for i in range(1, leg_count):
-        ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
+        ux = legs[i - 1].east
+        uy = legs[i - 1].north
+        vx = legs[i].east
+        vy = legs[i].north
         is_turning = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
         measure_corner(aircraft, tracking, wind, is_turning, ux, uy, vx, vy, path[i, 2], corners[i])
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
@@ -110,7 +113,10 @@ def courses_at_waypoint(data: ProblemArrays, legs: Records, i: int) -> tuple[flo
     """
     leg_count = legs.shape[0]
     leg_after, leg_before = min(i, leg_count - 1), max(i - 1, 0)
-    ux, uy, vx, vy = legs[leg_before].east, legs[leg_before].north, legs[leg_after].east, legs[leg_after].north
+    ux = legs[leg_before].east
+    uy = legs[leg_before].north
+    vx = legs[leg_after].east
+    vy = legs[leg_after].north
     if i == 0 and not math.isnan(data.start_course):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
     if i == leg_count and not math.isnan(data.destination_course):
@@ -207,10 +213,8 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
         tangent = 0.0
     ux, uy = (waypoint[0] - previous[0]) / length_before, (waypoint[1] - previous[1]) / length_before
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_after, (next_waypoint[1] - waypoint[1]) / length_after
-    slope_in, slope_out = (
-        (waypoint[2] - previous[2]) / length_before,
-        (next_waypoint[2] - waypoint[2]) / length_after,
-    )
+    slope_in = (waypoint[2] - previous[2]) / length_before
+    slope_out = (next_waypoint[2] - waypoint[2]) / length_after
     chord_count = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
     arc_length = radius * turn if chord_count > 0 else 0.0
     start_height, end_height = waypoint[2] - tangent * slope_in, waypoint[2] + tangent * slope_out

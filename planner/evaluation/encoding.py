@@ -352,10 +352,8 @@ def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *,
     """
     frame = rotated_frame(space.start, space.destination)
     mean_leg = frame.length / (waypoints - 1)
-    lower, upper = (
-        np.array([_MIN_POLAR_STEP * mean_leg, -max_angle, space.up[0]]),
-        np.array([2.0 * mean_leg, max_angle, space.up[1]]),
-    )
+    lower = np.array([_MIN_POLAR_STEP * mean_leg, -max_angle, space.up[0]])
+    upper = np.array([2.0 * mean_leg, max_angle, space.up[1]])
 
     def decode(vectors: Floats) -> Floats:
         """Convert vectors (n, d) to paths (n, w, 3)."""

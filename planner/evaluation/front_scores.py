@@ -115,10 +115,8 @@ def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: fl
             min_height = -math.inf if math.isnan(height) else height
         if k == count or min_height == -math.inf:
             return min_height
-        i, j = (
-            min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1),
-            min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1),
-        )
+        i = min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1)
+        j = min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1)
         skip_fraction = (height - min_height) / (tiles[i, j] * horizontal_length + abs(dz) + 1e-9)
         skip_fraction = min(skip_fraction, data.slope_bounds.tile_side / (horizontal_length + 1e-9))
         k = min(count, k + max(1, int(skip_fraction * count)))

@@ -125,13 +125,11 @@ def score_legs(
 
     The other parts read the measurements that this part stores in `scratch`.
     """
-    legs, corners, flown_corners, extents, lags = (
-        scratch.legs,
-        scratch.corners,
-        scratch.flown,
-        scratch.extents,
-        scratch.lags,
-    )
+    legs = scratch.legs
+    corners = scratch.corners
+    flown_corners = scratch.flown
+    extents = scratch.extents
+    lags = scratch.lags
     aircraft = data.aircraft
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)

@@ -107,13 +107,19 @@ def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: i
 
     first_path, size: first path of the block, and number of its paths.
     """
-    end, x, y, inner = block.end, block.x, block.y, block.inner
+    end = block.end
+    x = block.x
+    y = block.y
+    inner = block.inner
     east, north, up = end.east, end.north, end.up
     for b in range(size):
         east[b] = paths[first_path + b, i, 0]
         north[b] = paths[first_path + b, i, 1]
         up[b] = paths[first_path + b, i, 2]
-    centre_x, centre_y, half_x, half_y = to_pixel.centre_x, to_pixel.centre_y, to_pixel.half_x, to_pixel.half_y
+    centre_x = to_pixel.centre_x
+    centre_y = to_pixel.centre_y
+    half_x = to_pixel.half_x
+    half_y = to_pixel.half_y
     for b in range(size):
         x[b] = (east[b] - centre_x) / half_x
         y[b] = (north[b] - centre_y) / half_y
@@ -356,7 +362,10 @@ def _add_turn_violations(
     """
     max_turn, leg_count = data.max_turn, legs.shape[0]
     for i in range(1, leg_count):
-        ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
+        ux = legs[i - 1].east
+        uy = legs[i - 1].north
+        vx = legs[i].east
+        vy = legs[i].north
         violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
         if not math.isnan(end_course):
@@ -369,7 +378,10 @@ def _add_bounds_violations(
     data: ProblemArrays, path: Floats, corners: Records, by_amount: bool, violations: Record
 ) -> None:
     """Add waypoints off the map (tracking error included), below the floor or above the ceiling (eq. 7)."""
-    west, east, south, north = data.west, data.east, data.south, data.north
+    west = data.west
+    east = data.east
+    south = data.south
+    north = data.north
     floor, ceiling = data.floor, data.ceiling
     for i in range(path.shape[0]):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]

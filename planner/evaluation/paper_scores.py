@@ -138,8 +138,14 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0
     point_column, point_row = block.point.column, block.point.row
-    index, us, vs, ground = block.index, block.u, block.v, block.ground
-    top_left, top_right, low_left, low_right = block.top_left, block.top_right, block.low_left, block.low_right
+    index = block.index
+    us = block.u
+    vs = block.v
+    ground = block.ground
+    top_left = block.top_left
+    top_right = block.top_right
+    low_left = block.low_left
+    low_right = block.low_right
     for b in range(size):
         # Points off the raster and NaN read an arbitrary pixel; the last loop sets them to NaN.
         column, row = point_column[b], point_row[b]
@@ -173,7 +179,10 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
 def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, block: Record) -> None:
     """Add the points' terrain violations and heights above ground (eq. 5, 11)."""
     east, north, up = block.point.east, block.point.north, block.point.up
-    ground, required_height, below, height = block.ground, block.need, block.sums.below, block.sums.height
+    ground = block.ground
+    required_height = block.need
+    below = block.sums.below
+    height = block.sums.height
     for b in range(size):
         required_height[b] = required.clearance + required.buffer
     if not required.same_everywhere:
@@ -204,7 +213,10 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
         index[b] = cell_index if is_inside else outside_index
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
-        first_entry, entry_count, min_altitude, max_altitude = cell.first, cell.count, cell.lowest, cell.highest
+        first_entry = cell.first
+        entry_count = cell.count
+        min_altitude = cell.lowest
+        max_altitude = cell.highest
         first_entries[b] = first_entry
         entry_counts[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
 
@@ -251,7 +263,10 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
     """Add a leg's length, and count its slope and the turn into it if beyond their limits (eq. 1-4, 8)."""
     climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
-    east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
+    east = block.step.east
+    north = block.step.north
+    up = block.step.up
+    runs = block.run
     east_before, north_before, run_before = block.east_before, block.north_before, block.run_before
     turns, slopes, lengths = block.sums.turns, block.sums.slopes, block.sums.length
     for b in range(size):
@@ -279,9 +294,15 @@ def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record
 @inlined
 def _add_bounds_violations(data: ProblemArrays, size: int, waypoints: Record, sums: Record) -> None:
     """Count a waypoint that is off the map, below the floor or above the ceiling (eq. 7)."""
-    west, east, south, north = data.west, data.east, data.south, data.north
+    west = data.west
+    east = data.east
+    south = data.south
+    north = data.north
     floor, ceiling = data.floor, data.ceiling
-    xs, ys, zs, outside_counts = waypoints.east, waypoints.north, waypoints.up, sums.outside
+    xs = waypoints.east
+    ys = waypoints.north
+    zs = waypoints.up
+    outside_counts = sums.outside
     for b in range(size):
         x, y, z = xs[b], ys[b], zs[b]
         is_outside = (x < west) | (x > east) | (y < south) | (y > north) | (z < floor) | (z > ceiling)

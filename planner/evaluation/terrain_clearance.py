@@ -154,16 +154,12 @@ def _take_sample(
     """
     ground = pixel_height(heights, column, row)
     excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH_M
-    i, j = (
-        min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1),
-        min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1),
-    )
+    i = min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1)
+    j = min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
     max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * horizontal_length + abs(altitude_change) + 1e-9
-    next_step, tile_step = (
-        (excess_height - max_further_height - NEAR_GROUND_HEIGHT_M) / max_fall,
-        tile_side / (horizontal_length + 1e-9),
-    )
+    next_step = (excess_height - max_further_height - NEAR_GROUND_HEIGHT_M) / max_fall
+    tile_step = tile_side / (horizontal_length + 1e-9)
     next_step = next_step if next_step < tile_step else tile_step
     return excess_height, next_step if next_step > min_step else min_step
 
@@ -305,10 +301,8 @@ def sample_terrain(
                 min_step,
             )
             leg.depth -= excess_height if excess_height < 0.0 else 0.0
-            gap_at_beginning, gap_at_end = (
-                excess_height if fraction <= leg.beginning else math.inf,
-                excess_height if fraction >= leg.ending else math.inf,
-            )
+            gap_at_beginning = excess_height if fraction <= leg.beginning else math.inf
+            gap_at_end = excess_height if fraction >= leg.ending else math.inf
             leg.height_at_beginning = (
                 gap_at_beginning if gap_at_beginning < leg.height_at_beginning else leg.height_at_beginning
             )

@@ -263,10 +263,8 @@ def kill_density(
             )
             x, end_x = ax + begin_fraction * dx - missile_class.west, ax + end_fraction * dx - missile_class.west
             x, end_x = (x, end_x) if x < end_x else (end_x, x)
-            first_column, last_column = (
-                _cell_index((x - radius) * per_metre, columns),
-                _cell_index((end_x + radius) * per_metre, columns),
-            )
+            first_column = _cell_index((x - radius) * per_metre, columns)
+            last_column = _cell_index((end_x + radius) * per_metre, columns)
             if last_column < 0 or first_column >= columns:
                 continue
             row_start = missile_class.first_cell + row * columns
@@ -287,10 +285,8 @@ def kill_density(
                     end_a, begin_b = length_a / max(length, length_a), 1.0 - length_b / max(length, length_b)
                     distance2_a = _closest2(-along * inverse, 0.0, end_a, along, start2, length2)
                     distance2_b = _closest2(-along * inverse, begin_b, 1.0, along, start2, length2)
-                    distance_a, distance_b = (
-                        min(distance_a, math.sqrt(distance2_a) - grown_radius),
-                        min(distance_b, math.sqrt(distance2_b) - grown_radius),
-                    )
+                    distance_a = min(distance_a, math.sqrt(distance2_a) - grown_radius)
+                    distance_b = min(distance_b, math.sqrt(distance2_b) - grown_radius)
                     if closest2 < grown_radius * grown_radius:
                         density += _sphere_density(along, start2, length2, grown_radius, missile.scale)
     return density, distance_a, distance_b

@@ -372,7 +372,10 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
         conditions = _conditions_at(travel, table, x, y, amsl)
         time = leg_time(dx, dy, dz, conditions.wind_east, conditions.wind_north, conditions.airspeed)
         # The cost is time x rate, plus a cost per metre of climb.
-        rate, climb_cost, power_curvature, timed_cost = travel.time, 0.0, 0.0, travel.time * time.seconds
+        rate = travel.time
+        climb_cost = 0.0
+        power_curvature = 0.0
+        timed_cost = travel.time * time.seconds
         if travel.energy != 0.0:
             sine = dz / (conditions.airspeed * time.seconds)
             is_interior = conditions.min_sine < sine < conditions.max_sine

@@ -178,10 +178,8 @@ class FrontSampling:
             values = np.concatenate([self.objectives, objectives[feasible_rows]])
             archive_rows = self._archive_rows(values)
             is_in_archive[feasible_rows[archive_rows[archive_rows >= len(self.vectors)] - len(self.vectors)]] = True
-            self.vectors, self.objectives = (
-                np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows],
-                values[archive_rows],
-            )
+            self.vectors = np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows]
+            self.objectives = values[archive_rows]
         kinds, self._kinds = self._kinds, np.empty(0, dtype=np.int64)
         for kind in np.unique(kinds):
             should_grow = is_in_archive[kinds == kind].mean() > TARGET_SUCCESS

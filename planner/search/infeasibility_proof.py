@@ -52,10 +52,8 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     >>> [is_closed(make_problem(one, load_airframe(one).limits).certified) for one in (scenario, guarded)]
     [False, True]
     """
-    is_considered, max_altitude = (
-        np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles,
-        highest_level_flight(data),
-    )
+    is_considered = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles
+    max_altitude = highest_level_flight(data)
     if max(data.start[2], data.destination[2]) > max_altitude:
         return True
     return bool(
@@ -128,24 +126,18 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 
     column_size: side of the square columns, m.
     """
-    columns, rows = (
-        max(1, math.ceil((data.east - data.west) / column_size)),
-        max(1, math.ceil((data.north - data.south) / column_size)),
-    )
+    columns = max(1, math.ceil((data.east - data.west) / column_size))
+    rows = max(1, math.ceil((data.north - data.south) / column_size))
     # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
-    range_bottoms, range_tops = (
-        np.empty((columns, rows, MAX_ALTITUDE_RANGES)),
-        np.empty((columns, rows, MAX_ALTITUDE_RANGES)),
-    )
+    range_bottoms = np.empty((columns, rows, MAX_ALTITUDE_RANGES))
+    range_tops = np.empty((columns, rows, MAX_ALTITUDE_RANGES))
     range_counts = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
         for j in range(rows):
             closed_below = _lowest_ground(data, i, j, column_size) + data.clearance
-            range_bottoms[i, j, 0], range_tops[i, j, 0], range_counts[i, j] = (
-                -math.inf,
-                max(closed_below, data.floor),
-                1,
-            )
+            range_bottoms[i, j, 0] = -math.inf
+            range_tops[i, j, 0] = max(closed_below, data.floor)
+            range_counts[i, j] = 1
     for k in range(missiles.size):
         if missiles[k] and data.threats[k].kill_radius > 0.0:
             missile = data.threats[k]
@@ -166,7 +158,10 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
     """Return the height of the lowest pixel under a column and next to it, m; -inf if one has no data."""
-    first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
+    first_column = math.inf
+    first_row = math.inf
+    last_column = -math.inf
+    last_row = -math.inf
     for corner in range(4):
         east, north = data.west + (i + corner % 2) * column_size, data.south + (j + corner // 2) * column_size
         column, row = polymap(data.to_pixel, east, north)
@@ -201,14 +196,10 @@ def _close_sphere(
     east, north: distances of the sphere's centre from the map's south-western corner, m.
     """
     columns, rows = range_counts.shape
-    first_column, last_column = (
-        max(0, math.floor((east - radius) / column_size)),
-        min(columns - 1, math.floor((east + radius) / column_size)),
-    )
-    first_row, last_row = (
-        max(0, math.floor((north - radius) / column_size)),
-        min(rows - 1, math.floor((north + radius) / column_size)),
-    )
+    first_column = max(0, math.floor((east - radius) / column_size))
+    last_column = min(columns - 1, math.floor((east + radius) / column_size))
+    first_row = max(0, math.floor((north - radius) / column_size))
+    last_row = min(rows - 1, math.floor((north + radius) / column_size))
     for i in range(first_column, last_column + 1):
         dx = abs((i + 0.5) * column_size - east) + 0.5 * column_size
         for j in range(first_row, last_row + 1):

@@ -520,10 +520,8 @@ def _list_departures(
         tailwind = site.scenario.wind.components_on_course(course, float(site.home[2]))[0]
         for corners in candidate_chains(launch.end, course, end, next_course, site.turn_radius, laps):
             points = [home, launch.end, *corners, end]
-            measures, takeoff_distance = (
-                measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths),
-                math.dist(home, takeoff_end),
-            )
+            measures = measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths)
+            takeoff_distance = math.dist(home, takeoff_end)
             is_long_enough = measures.fits and takeoff_distance + measures.length >= min_length
             if is_long_enough and launch.fits([*points, next_point], site.turn_lengths):
                 yield (
@@ -693,10 +691,8 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course
     course = float(leg_courses(waypoints[-2:])[0]) if destination_course is None else destination_course
-    start, end = (
-        (float(last_waypoint[0]), float(last_waypoint[1])),
-        (float(final.final_waypoints[0, 0]), float(final.final_waypoints[0, 1])),
-    )
+    start = (float(last_waypoint[0]), float(last_waypoint[1]))
+    end = (float(final.final_waypoints[0, 0]), float(final.final_waypoints[0, 1]))
     previous_waypoints = waypoints[-3:-1]
     previous_points = [(float(waypoint[0]), float(waypoint[1])) for waypoint in previous_waypoints]
     glide_start = (float(final.final_waypoints[1, 0]), float(final.final_waypoints[1, 1]))

@@ -172,11 +172,12 @@ def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathM
                 return PathMeasures(length, math.inf, turn, math.inf)
             max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
             length_before, length_after = turn_lengths.lengths(turn)
-            max_fraction, occupied_length = (
-                max(max_fraction, (occupied_length + length_before) / leg_length),
-                length_after,
-            )
-        length, east, north, leg_length = length + next_length, next_east, next_north, next_length
+            max_fraction = max(max_fraction, (occupied_length + length_before) / leg_length)
+            occupied_length = length_after
+        length = length + next_length
+        east = next_east
+        north = next_north
+        leg_length = next_length
     max_fraction = max(max_fraction, occupied_length / leg_length) if leg_length else math.inf
     return PathMeasures(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
 

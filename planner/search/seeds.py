@@ -326,10 +326,8 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
     """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
-    lattices, remaining_states = (
-        [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS],
-        MAX_EXPANDED,
-    )
+    lattices = [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS]
+    remaining_states = MAX_EXPANDED
     for index, step_fraction in enumerate(LATTICE_STEP_FRACTIONS):
         # If memory limits the step, a smaller step gives the same lattice again.
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:

@@ -133,10 +133,8 @@ def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: fl
     for side in range(-MAX_SIDE, MAX_SIDE + 1):
         b[0], b[1] = to_world_position(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        slopes[side + MAX_SIDE, 0], slopes[side + MAX_SIDE, 1] = (
-            fraction * math.tan(climb),
-            fraction * math.tan(dive),
-        )
+        slopes[side + MAX_SIDE, 0] = fraction * math.tan(climb)
+        slopes[side + MAX_SIDE, 1] = fraction * math.tan(dive)
     return slopes
 
 
@@ -376,7 +374,10 @@ def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:
     """Return points (stages + 1, 3) of the route found, and its cost; (0, 3) points and inf if none."""
-    stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.centre_index
+    stages = grid.stages
+    step = frame.length / grid.stages
+    columns = search.columns
+    y = search.centre_index
     z = _nearest_layer(grid, columns[stages, y], data.destination[2])
     total = search.cost[y, z]
     if total == math.inf:
@@ -384,11 +385,9 @@ def end_airspace_route(
     points = np.empty((stages + 1, 3))
     for stage in range(stages, -1, -1):
         first_height = columns[stage, y].lowest if grid.follows else grid.floor
-        points[stage, 0], points[stage, 1], points[stage, 2] = (
-            stage * step,
-            grid.across[y],
-            first_height + z * grid.layer_spacing,
-        )
+        points[stage, 0] = stage * step
+        points[stage, 1] = grid.across[y]
+        points[stage, 2] = first_height + z * grid.layer_spacing
         if stage > 0:
             parent = search.cells[stage, y, z]
             y, z = parent // grid.layers, parent % grid.layers

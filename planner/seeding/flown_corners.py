@@ -129,11 +129,9 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
         climb, dive = math.inf, math.inf
         level_start[2] = path[i, 2]
         for leg in (i - 1, i):
-            level_end[0], level_end[1], level_end[2] = (
-                path[leg + 1, 0] - path[leg, 0],
-                path[leg + 1, 1] - path[leg, 1],
-                path[i, 2],
-            )
+            level_end[0] = path[leg + 1, 0] - path[leg, 0]
+            level_end[1] = path[leg + 1, 1] - path[leg, 1]
+            level_end[2] = path[i, 2]
             climb_limit, dive_limit = slope_limits(data, level_start, level_end)
             climb, dive = min(climb, math.tan(climb_limit)), min(dive, math.tan(dive_limit))
         flown.slopes[i, 0], flown.slopes[i, 1] = climb, dive
@@ -159,12 +157,10 @@ def spare_arc_length(
     Slopes are those of `aircraft.path_limits.arc_slope`. The length is negative if the arc is too short.
     """
     length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
-    ux, uy, vx, vy = (
-        waypoint[0] - previous[0],
-        waypoint[1] - previous[1],
-        next_waypoint[0] - waypoint[0],
-        next_waypoint[1] - waypoint[1],
-    )
+    ux = waypoint[0] - previous[0]
+    uy = waypoint[1] - previous[1]
+    vx = next_waypoint[0] - waypoint[0]
+    vy = next_waypoint[1] - waypoint[1]
     turn = min(MAX_TURN_RAD, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
     altitude_change = (
         radius
@@ -214,10 +210,8 @@ def corner_point(
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_out, (next_waypoint[1] - waypoint[1]) / length_out
-    slope_in, slope_out = (
-        (waypoint[2] - previous_waypoint[2]) / length_in,
-        (next_waypoint[2] - waypoint[2]) / length_out,
-    )
+    slope_in = (waypoint[2] - previous_waypoint[2]) / length_in
+    slope_out = (next_waypoint[2] - waypoint[2]) / length_out
     cross = ux * vy - uy * vx
     turn = min(MAX_TURN_RAD, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:
@@ -239,10 +233,8 @@ def corner_point(
     tangent, side = radius * math.tan(0.5 * turn), 1.0 if cross >= 0.0 else -1.0
     # The middles of the chords are this far from the centre; the arc is further.
     chord_radius = radius * math.cos(0.5 * ARC_STEP)
-    along, offset = (
-        chord_radius * math.sin(fraction * turn) - tangent,
-        side * (radius - chord_radius * math.cos(fraction * turn)),
-    )
+    along = chord_radius * math.sin(fraction * turn) - tangent
+    offset = side * (radius - chord_radius * math.cos(fraction * turn))
     out[0], out[1] = waypoint[0] + ux * along - uy * offset, waypoint[1] + uy * along + ux * offset
     out[2] = waypoint[2] - tangent * slope_in + fraction * tangent * (slope_in + slope_out)
 

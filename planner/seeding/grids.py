@@ -313,12 +313,10 @@ def relax_stage(
     ratio: spacing across as a fraction of a step.
     """
     layer_count, width = cost.shape
-    flat_cost, flat_next_cost, flat_parents, flat_cell_costs = (
-        cost.ravel(),
-        next_cost.ravel(),
-        parents.ravel(),
-        cell_costs.ravel(),
-    )
+    flat_cost = cost.ravel()
+    flat_next_cost = next_cost.ravel()
+    flat_parents = parents.ravel()
+    flat_cell_costs = cell_costs.ravel()
     for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
         if first > last:

@@ -149,10 +149,8 @@ def _expand_state(
         next_along, next_across = along + _STEPS[next_course, 0], across + _STEPS[next_course, 1]
         if not (0 <= next_along < lattice.along and 0 <= next_across < lattice.across):
             continue
-        lowest_layer, highest_layer = (
-            max(0, layer - layer_limits[next_course, 1]),
-            min(lattice.layers - 1, layer + layer_limits[next_course, 0]),
-        )
+        lowest_layer = max(0, layer - layer_limits[next_course, 1])
+        highest_layer = min(lattice.layers - 1, layer + layer_limits[next_course, 0])
         for next_layer in range(lowest_layer, highest_layer + 1):
             next_state = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + next_course
             _set_position(frame, lattice, next_along, next_across, next_layer, end)

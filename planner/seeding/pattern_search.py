@@ -290,11 +290,9 @@ def _continue_search(
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state
     )
-    limits, candidate, trial = (
-        precompute_limits(data),
-        _make_candidate(data, best_vector.size // 3 + 2),
-        best_vector.copy(),
-    )
+    limits = precompute_limits(data)
+    candidate = _make_candidate(data, best_vector.size // 3 + 2)
+    trial = best_vector.copy()
     while evaluations < max_evaluations:
         if move == 0:
             has_moved = False

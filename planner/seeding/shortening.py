@@ -163,20 +163,16 @@ def _descend(
 
     values: filled with the final values of the constraints.
     """
-    min_corner, max_corner, model, step, trial = (
-        descent.min_corner,
-        descent.max_corner,
-        descent.model,
-        descent.step,
-        descent.trial,
-    )
+    min_corner = descent.min_corner
+    max_corner = descent.max_corner
+    model = descent.model
+    step = descent.step
+    trial = descent.trial
     merit, models = lagrangian(data, limits, active, path, multipliers, values, penalty, model), 1
     for _ in range(STEPS_PER_ROUND):
-        max_move, step_fraction, is_better = (
-            _newton_step(path, min_corner, max_corner, model, descent.factor, step),
-            1.0,
-            False,
-        )
+        max_move = _newton_step(path, min_corner, max_corner, model, descent.factor, step)
+        step_fraction = 1.0
+        is_better = False
         for _ in range(HALVINGS_PER_STEP):
             for row in range(step.size):
                 axis = row % 3

@@ -109,7 +109,10 @@ def active_constraints(
     measure_corners(data, limits.wind, path, legs, corners)
     if data.tracking.has_error:
         compute_height_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
-    extra_heights, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
+    extra_heights = np.zeros(count)
+    climb = np.zeros(count)
+    dive = np.zeros(count)
+    roll = np.zeros(count)
     for i in range(count):
         max_climb, max_dive = slope_limits(data, path[i], path[i + 1])
         climb[i], dive[i] = math.tan(max_climb), math.tan(max_dive)
@@ -152,10 +155,8 @@ def _fill_turn_lengths(
             vx, vy = ux * math.cos(turn) - uy * sine, uy * math.cos(turn) + ux * sine
         measure_corner(data.aircraft, data.tracking, limits.wind, True, ux, uy, vx, vy, path[i, 2], corners[0])
         half_turn_tangent = math.tan(0.5 * min(turn, MAX_TURN_RAD))
-        before[i], after[i] = (
-            min(MAX_TURN_LENGTH_M, corners[0].before) / half_turn_tangent,
-            min(MAX_TURN_LENGTH_M, corners[0].after) / half_turn_tangent,
-        )
+        before[i] = min(MAX_TURN_LENGTH_M, corners[0].before) / half_turn_tangent
+        after[i] = min(MAX_TURN_LENGTH_M, corners[0].after) / half_turn_tangent
         if data.fly_over:
             before[i], after[i] = 0.0, min(MAX_TURN_LENGTH_M, turn_length(True, corners, 0)) / half_turn_tangent
 
@@ -208,11 +209,9 @@ def carry_multipliers(
 
     A new pair of leg and missile gets the multiplier 0.
     """
-    new_multipliers, pair_count, previous_pair_count = (
-        np.zeros(constraint_count(next_active)),
-        next_active.pairs.shape[0],
-        previous_active.pairs.shape[0],
-    )
+    new_multipliers = np.zeros(constraint_count(next_active))
+    pair_count = next_active.pairs.shape[0]
+    previous_pair_count = previous_active.pairs.shape[0]
     copy_into(new_multipliers[pair_count:], multipliers[previous_pair_count:])
     k = 0
     for p in range(pair_count):
@@ -379,7 +378,10 @@ def _add_ground(
 
     The value of a constraint is the height above the required clearance, m.
     """
-    merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
+    merit = 0.0
+    slopes = model.slopes
+    heights = data.heights
+    to_pixel = data.to_pixel
     for i in range(path.shape[0] - 1):
         for k in range(active.samples):
             fraction = (k + 1.0) / (active.samples + 1.0)
@@ -417,7 +419,10 @@ def _add_corners(
 
     The heights are above the required height (m), the lengths beyond the length that the arc needs (m).
     """
-    merit, point, ground_gradient, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
+    merit = 0.0
+    point = np.empty(3)
+    ground_gradient = np.empty(3)
+    corner = np.empty((3, 3))
     for i in range(1, path.shape[0] - 1):
         radius = flown.radii[i]
         for k in range(3):
@@ -472,11 +477,9 @@ def _add_slopes(
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
             second_slopes = slopes[1]
-            second_slopes[0], second_slopes[1], second_slopes[2] = (
-                tangent * dx / horizontal_length,
-                tangent * dy / horizontal_length,
-                sign,
-            )
+            second_slopes[0] = tangent * dx / horizontal_length
+            second_slopes[1] = tangent * dy / horizontal_length
+            second_slopes[2] = sign
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
             number = first_number + 3 * i + kind

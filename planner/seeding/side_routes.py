@@ -79,12 +79,10 @@ def _relax_stage_back(
     spans: `SPAN` records (layers,) of this stage's cells that are within the bound.
     """
     layer_count, width = goal_costs.shape
-    flat_goal_costs, flat_previous, flat_successors, flat_cell_costs = (
-        goal_costs.ravel(),
-        previous_goal_costs.ravel(),
-        successors.ravel(),
-        cell_costs.ravel(),
-    )
+    flat_goal_costs = goal_costs.ravel()
+    flat_previous = previous_goal_costs.ravel()
+    flat_successors = successors.ravel()
+    flat_cell_costs = cell_costs.ravel()
     for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
         if first > last:
@@ -195,11 +193,9 @@ def continue_grid_costs(
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, done = search
     start_costs, parents, goal_costs, successors = costs
-    height_differences, goal_distances, extra = (
-        grid.layers - grid.layers[goal],
-        np.empty(width),
-        np.zeros((stages + 1, width)),
-    )
+    height_differences = grid.layers - grid.layers[goal]
+    goal_distances = np.empty(width)
+    extra = np.zeros((stages + 1, width))
     end_number = min(2 * stages, done + max_stages)
     for step_number in range(done, end_number):
         stage = step_number + 1
@@ -278,7 +274,10 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
                     continue
                 passing = passings[k, passing_side(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
                 if cost < passing.cost:
-                    passing.cost, passing.stage, passing.layer, passing.across = cost, stage, z, y
+                    passing.cost = cost
+                    passing.stage = stage
+                    passing.layer = z
+                    passing.across = y
     return passings
 
 
@@ -315,10 +314,8 @@ def sides_passed(points: Floats, obstacles: Records) -> Ints:
     stages = np.rint(obstacles["along"] / step).astype(np.int64)
     is_beyond_end = (stages <= 0) | (stages >= len(points) - 1)
     nearest_points = points[np.clip(stages, 0, len(points) - 1)]
-    lateral_offsets, vertical_offsets = (
-        nearest_points[:, 1] - obstacles["across"],
-        nearest_points[:, 2] - obstacles["up"],
-    )
+    lateral_offsets = nearest_points[:, 1] - obstacles["across"]
+    vertical_offsets = nearest_points[:, 2] - obstacles["up"]
     horizontal_sides = np.where(lateral_offsets >= 0.0, LEFT, RIGHT)
     sides = np.where(
         np.abs(lateral_offsets) >= np.abs(vertical_offsets),

@@ -157,10 +157,8 @@ def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps
     for i in range(1, candidates.shape[0] - 1):
         for k in range(candidates.shape[1]):
             if cost[i, k] < np.inf:
-                previous_waypoint, next_waypoint = (
-                    candidates[i - 1, sweeps.before[i, k]],
-                    candidates[i + 1, sweeps.after[i, k]],
-                )
+                previous_waypoint = candidates[i - 1, sweeps.before[i, k]]
+                next_waypoint = candidates[i + 1, sweeps.after[i, k]]
                 cost[i, k] += _corner_cost(data, limits, previous_waypoint, candidates[i, k], next_waypoint, corners)
                 cost[i, k] = cost[i, k] if cost[i, k] <= bound else np.inf
     return cost
@@ -257,12 +255,10 @@ def _corner_cost(
 
     corners: scratch, one record.
     """
-    ux, uy, vx, vy = (
-        waypoint[0] - previous_waypoint[0],
-        waypoint[1] - previous_waypoint[1],
-        next_waypoint[0] - waypoint[0],
-        next_waypoint[1] - waypoint[1],
-    )
+    ux = waypoint[0] - previous_waypoint[0]
+    uy = waypoint[1] - previous_waypoint[1]
+    vx = next_waypoint[0] - waypoint[0]
+    vy = next_waypoint[1] - waypoint[1]
     first_length, second_length = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
     if first_length == 0.0 or second_length == 0.0:
         return TURN_COST

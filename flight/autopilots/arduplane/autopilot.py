@@ -551,15 +551,11 @@ class ArduPlaneFromGround:
         parameters, launch = self.parameters, take_off.launch
         ground.stage, ground.is_on_runway = TAKING_OFF, launch.method == "runway"
         ground.motor_start = self.motor_start
-        ground.throttle_slew, ground.takeoff_throttle = (
-            takeoff_slew(parameters),
-            parameters.takeoff_throttle or parameters.throttle_max,
-        )
-        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = (
-            take_off.home_altitude,
-            take_off.end_altitude,
-            take_off.home[2],
-        )
+        ground.throttle_slew = takeoff_slew(parameters)
+        ground.takeoff_throttle = parameters.takeoff_throttle or parameters.throttle_max
+        ground.home_up = take_off.home_altitude
+        ground.takeoff_end_altitude = take_off.end_altitude
+        ground.launch_up = take_off.home[2]
         ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when the aircraft moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration

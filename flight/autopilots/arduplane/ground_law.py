@@ -295,7 +295,10 @@ def end_status(work: Record, ground: Record) -> int:
 @inner
 def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
     """Set the commands for one tick of the take-off; once the take-off is complete, begin the first leg."""
-    state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
+    state = work.state
+    estimated = work.estimated
+    ground = arduplane.ground
+    memory = arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = eas_to_tas_ratio(estimated.up)
     # The track is measured against the path only after the take-off.
@@ -451,7 +454,10 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
 
     landing_point: waypoint record of the landing point.
     """
-    state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
+    state = work.state
+    estimated = work.estimated
+    ground = arduplane.ground
+    memory = arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = eas_to_tas_ratio(estimated.up)
     work.memory.is_finished = False
@@ -601,10 +607,8 @@ def _set_landing_parameters(
     line_fraction: fraction of the line to the landing point that is already flown.
     """
     stage_parameters.tecs_time = parameters.landing_time
-    stage_parameters.airspeed_min, stage_parameters.tecs_pitch_damping = (
-        parameters.airspeed_min,
-        parameters.tecs_pitch_damping,
-    )
+    stage_parameters.airspeed_min = parameters.airspeed_min
+    stage_parameters.tecs_pitch_damping = parameters.tecs_pitch_damping
     speed_weight = parameters.landing_speed_weight
     if speed_weight < 0.0:
         speed_weight = parameters.tecs_speed_weight * (1.0 - min(1.0, max(0.0, line_fraction)))
@@ -623,8 +627,6 @@ def _set_landing_parameters(
         flare_progress = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
         pitch_min = (1.0 - flare_progress) * pitch_min + flare_progress * max(pitch_min, parameters.landing_pitch)
         if parameters.landing_pitch_max != 0.0:
-            stage_parameters.tecs_pitch_max, stage_parameters.pitch_limit_max = (
-                parameters.landing_pitch_max,
-                parameters.landing_pitch_max,
-            )
+            stage_parameters.tecs_pitch_max = parameters.landing_pitch_max
+            stage_parameters.pitch_limit_max = parameters.landing_pitch_max
     stage_parameters.pitch_limit_min = pitch_min

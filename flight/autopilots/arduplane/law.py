@@ -132,10 +132,8 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
         altitude_target = _leg_altitude(estimated, target, parameters, memory)
     lag_fraction = dt / (dt + parameters.tecs_height_demand_time)
     # In saturation the input of the demand is frozen, and the limits of the climb and sink rates fade to 0.
-    cannot_climb, cannot_sink = (
-        memory.saturation > 0 and memory.climb_rate_demand > 0.0,
-        memory.saturation < 0 and memory.climb_rate_demand < 0.0,
-    )
+    cannot_climb = memory.saturation > 0 and memory.climb_rate_demand > 0.0
+    cannot_sink = memory.saturation < 0 and memory.climb_rate_demand < 0.0
     memory.max_climb_scaler += lag_fraction * ((0.0 if cannot_climb else 1.0) - memory.max_climb_scaler)
     memory.max_sink_scaler += lag_fraction * ((0.0 if cannot_sink else 1.0) - memory.max_sink_scaler)
     if cannot_climb:

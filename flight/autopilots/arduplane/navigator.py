@@ -355,10 +355,8 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
     if loiter.loiters_to_altitude:
         if not memory.reached_target_altitude and memory.loiter_angle_sum >= memory.next_sum_lap:
             memory.reached_target_altitude = abs(estimated.up - memory.start_lap_altitude) < LOITER_ALTITUDE_TOLERANCE_M
-            memory.next_sum_lap, memory.start_lap_altitude = (
-                memory.next_sum_lap + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi,
-                estimated.up,
-            )
+            memory.next_sum_lap += _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi
+            memory.start_lap_altitude = estimated.up
         return memory.reached_target_altitude
     if math.isnan(loiter.loiter_time):
         return memory.loiter_angle_sum > loiter.loiter_turns * 2.0 * math.pi

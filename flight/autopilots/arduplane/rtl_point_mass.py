@@ -218,7 +218,10 @@ def waypoint_ahead(start: Record) -> Records:
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
     """Return the timeout of an RTL, s, from the distances and altitude changes between the start and the stages."""
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
-    east, north, altitude, seconds = start["east"], start["north"], start["up"], 0.0
+    east = start["east"]
+    north = start["north"]
+    altitude = start["up"]
+    seconds = 0.0
     for end in stages:
         distance = math.hypot(end["east"] - east, end["north"] - north)
         lap_length = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["loiter_radius"])
@@ -373,17 +376,13 @@ def _demand_climb(
     airspeed_demand: equivalent airspeed, m/s.
     """
     memory.lateral_acceleration = 0.0
-    memory.altitude_demand_in, memory.altitude_demand_limited, memory.altitude_demand = (
-        estimated.up,
-        estimated.up,
-        estimated.up,
-    )
+    memory.altitude_demand_in = estimated.up
+    memory.altitude_demand_limited = estimated.up
+    memory.altitude_demand = estimated.up
     memory.climb_rate_demand, memory.max_climb_scaler, memory.max_sink_scaler = 0.0, 1.0, 1.0
-    previous_throttle, seb_integrator, ske_integrator = (
-        memory.throttle_demand,
-        memory.seb_integrator,
-        memory.ske_integrator,
-    )
+    previous_throttle = memory.throttle_demand
+    seb_integrator = memory.seb_integrator
+    ske_integrator = memory.ske_integrator
     memory.tas_demand = airspeed_demand * eas2tas
     update_tecs(state, estimated, climb_parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
     wind_up_ste_integrator(climb_parameters, memory)
@@ -430,33 +429,28 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
         target = waypoints[k]
-        target.east, target.north, target.turn, target.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
-        target.centre_east, target.centre_north, target.up, target.loiter_radius = (
-            stage.centre_east,
-            stage.centre_north,
-            stage.up,
-            stage.loiter_radius,
-        )
-        target.is_rtl, target.slope_base, target.without_crosstrack = (
-            stage.is_rtl,
-            stage.slope_base,
-            stage.without_crosstrack,
-        )
+        target.east = stage.east
+        target.north = stage.north
+        target.turn = stage.turn
+        target.airspeed = stage.airspeed
+        target.centre_east = stage.centre_east
+        target.centre_north = stage.centre_north
+        target.up = stage.up
+        target.loiter_radius = stage.loiter_radius
+        target.is_rtl = stage.is_rtl
+        target.slope_base = stage.slope_base
+        target.without_crosstrack = stage.without_crosstrack
         target.pass_by, target.min_ground_speed, target.home_up = stage.pass_by, stage.min_ground_speed, stage.home_up
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     if is_previous_reached and not is_past_finish_line(
         estimated, stages[index - 1].east, stages[index - 1].north, stage.east, stage.north
     ):
-        memory.from_east, memory.from_north, memory.from_up = (
-            stages[index - 1].east,
-            stages[index - 1].north,
-            stages[index - 1].up,
-        )
+        memory.from_east = stages[index - 1].east
+        memory.from_north = stages[index - 1].north
+        memory.from_up = stages[index - 1].up
     if stage.loiter_radius == 0.0 and index + 1 < stages.shape[0]:
-        next_stage, course = (
-            stages[index + 1],
-            math.atan2(stage.east - memory.from_east, stage.north - memory.from_north),
-        )
+        next_stage = stages[index + 1]
+        course = math.atan2(stage.east - memory.from_east, stage.north - memory.from_north)
         turn = abs(wrap(math.atan2(next_stage.east - stage.east, next_stage.north - stage.north) - course))
         waypoints[1].turn, waypoints[2].turn = turn, turn
     memory.leg, memory.sloped_leg, memory.reached_loiter_target, memory.cross_track_integrator = 0, 0, False, 0.0

@@ -159,10 +159,8 @@ def _measure_corners(
                     if corner_flight[0] < min_excursion:
                         best_acceptance, min_excursion = acceptance, corner_flight[0]
                         corner.excursion, corner.after = corner_flight
-                min_acceptance, max_acceptance = (
-                    max(MIN_ACCEPTANCE_M, best_acceptance - step),
-                    min(MAX_ACCEPTANCE_M, best_acceptance + step),
-                )
+                min_acceptance = max(MIN_ACCEPTANCE_M, best_acceptance - step)
+                max_acceptance = min(MAX_ACCEPTANCE_M, best_acceptance + step)
             corner.acceptance = best_acceptance
             corner.before = 0.0 if fly_over else best_acceptance
 

@@ -159,10 +159,8 @@ def _calc_pitch_control(
         GRAVITY * estimated.velocity_up * spe_weighting - tas * memory.tas_rate * ske_weighting
     )
     seb_rate_per_pitch = tas * GRAVITY
-    pitch_max, pitch_min = (
-        parameters.pitch_limit_max - parameters.pitch_trim,
-        parameters.pitch_limit_min - parameters.pitch_trim,
-    )
+    pitch_max = parameters.pitch_limit_max - parameters.pitch_trim
+    pitch_min = parameters.pitch_limit_min - parameters.pitch_trim
     increment = seb_rate_error * parameters.integrator_gain_pitch / seb_rate_per_pitch * dt
     # With the setpoint at a limit the integrator may only move away from the limit.
     if memory.pitch_setpoint >= pitch_max:

@@ -191,7 +191,12 @@ def _fly_corner(
     estimated.north = -acceptance_radius_at(speed, parameters) - _RUN_IN_M
     lag = ROLL_LAG_RATIO * parameters.roll_time_constant
     decay = math.exp(-_TIME_STEP_S / lag)
-    course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    course = 0.0
+    lateral_acceleration = 0.0
+    time = 0.0
+    excursion = 0.0
+    settled_distance = 0.0
+    distance_along = -1.0
     while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, memory, _TIME_STEP_S)

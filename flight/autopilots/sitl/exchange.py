@@ -329,7 +329,10 @@ class Lockstep(ABC):
         steps: number of frames in a tick.
         gusts, ground: True to set the tick's gusts and ground in JSBSim.
         """
-        workspace, fdm, receive_commands, step = self._workspace, self._fdm, self._receive_commands, self.step
+        workspace = self._workspace
+        fdm = self._fdm
+        receive_commands = self._receive_commands
+        step = self.step
         getters = [self._access.getters[field] for field in READ_FIELDS]
         pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
         pack_commands: Callable[..., None] = struct.Struct("4d").pack_into

@@ -102,7 +102,10 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
-    nearest_piece, min_distance, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
+    nearest_piece = memory.piece
+    min_distance = math.inf
+    distance = 0.0
+    cross_track = 0.0
     for candidate in range(memory.piece, min(memory.piece + _SEARCHED_PIECES, pieces.shape[0])):
         piece = pieces[candidate]
         piece_distance, piece_cross_track, course = project(piece, true.east, true.north)

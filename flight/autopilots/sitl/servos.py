@@ -78,7 +78,10 @@ class ServoMap:
 
     def commands(self, pulses: Sequence[int]) -> Commands:
         """Return the controls for the pulses of an autopilot's outputs, microseconds, (outputs,)."""
-        elevator, aileron, rudder, throttle = self.elevator, self.aileron, self.rudder, self.throttle
+        elevator = self.elevator
+        aileron = self.aileron
+        rudder = self.rudder
+        throttle = self.throttle
         return Commands(
             elevator.value(pulses[elevator.number - 1]),
             aileron.value(pulses[aileron.number - 1]),
