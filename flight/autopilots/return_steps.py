@@ -54,7 +54,7 @@ def simulate_each(
 
 @inner
 def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
-    """Set ``estimated`` to the start of the flight, and ``result`` to the values before the flight."""
+    """Set ``estimated`` and ``result`` to their values at the start of an RTL."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -70,7 +70,7 @@ def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, resu
 
 @inner
 def initialise_state(start: Record, aircraft: Record, field: Floats, state: Record) -> None:
-    """Set time, wind, airspeed and attitude of the point mass from the motion over the ground at the start.
+    """Set the point mass's time, wind, airspeed and attitude from the ground velocity at the start.
 
     field: as in `flight.autopilots.point_mass.PointMass`.
     """
@@ -86,7 +86,7 @@ def initialise_state(start: Record, aircraft: Record, field: Floats, state: Reco
 
 @inner
 def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
-    """Return the throttle with which the aircraft holds the climb rate of the start, in steps of 0.01."""
+    """Return the throttle at which the aircraft holds the climb rate of the start, to the nearest 0.01."""
     throttle = 1.0
     while (
         throttle > 0.0 and excess_power(excess_table, throttle, state.airspeed, start.up, aircraft) > start.velocity_up
@@ -106,9 +106,9 @@ def store_position(estimated: Record, positions: Floats, result: Record) -> None
 
 @inner
 def advance_loiter(estimated: Record, target: Record, loiter: Record, arrival_radius: float, dt: float) -> bool:
-    """Update the progress around the last loiter, and return True once the loiter is complete.
+    """Update the progress around the last loiter of an RTL; return True once the loiter is complete.
 
-    The loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
+    It is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
 
     target: waypoint of the loiter.
     loiter: progress around the loiter, a record of `LOITER_PROGRESS`.
@@ -139,9 +139,10 @@ def update_clearances(
     has_terrain: bool,
     result: Record,
 ) -> None:
-    """Update the end time, the minimum height above ground and the minimum distance outside the kill spheres.
+    """Update the duration, the minimum height above ground and the minimum distance from kill spheres.
 
-    End the RTL outside the elevation data, or once the aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
+    Distances are measured from the surface of a sphere. The RTL ends where there are no elevation data, or once the
+    aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
     """
     result.end_time = time
     for m in range(spheres.shape[0]):
