@@ -123,7 +123,10 @@ class Parameters(Protocol):
         """Texts on values of the user's file that contradict another parameter."""
 
     def changed(self, origin: Origin = "file", /, **values: float) -> Self:
-        """Return a copy of the parameters in which some have other values."""
+        """Return a copy of the parameters in which some have other values.
+
+        origin: source of the new values.
+        """
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """Return the values that come from one source, by name and in the autopilot's units."""

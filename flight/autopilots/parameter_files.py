@@ -108,7 +108,12 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
 
 def _parse_entry(line: str, where: TextLine) -> Entry:
-    """Return the parameter in a line without a comment."""
+    """Return the parameter in a line without a comment.
+
+    where: position of the line.
+
+    Raises ParameterError.
+    """
     fields, component = line.split("\t"), AUTOPILOT
     if len(fields) == _QGC_COLUMN_COUNT and _INTEGER_PATTERN.fullmatch(fields[0].strip()):
         name, text = fields[2].strip(), fields[3].strip()

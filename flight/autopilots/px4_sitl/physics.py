@@ -341,7 +341,6 @@ class HilLockstep(Lockstep):
     def boot(self, rail: RailEnd, has_started: Callable[[], bool], stall_time: float, startup_timeout: float) -> None:
         """Wait until PX4's start-up script has ended.
 
-
         Meanwhile PX4 gets a step only when it waits for one.
 
         has_started: function that returns True once the script has ended.

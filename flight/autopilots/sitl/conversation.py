@@ -132,7 +132,10 @@ class Conversation:
     def _wait_until(
         self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
     ) -> Talk:
-        """Wait until a condition is true, and repeat a request every second."""
+        """Wait until a condition is true, and repeat a request every second.
+
+        Raises FlightError after a timeout.
+        """
         stopwatch, last_request = self._start_stopwatch(), None
         while not is_done():
             if stopwatch.has_passed(awaited.timeout):
@@ -186,6 +189,8 @@ class Conversation:
 
         request: function that sends the command.
         name: name of the command's effect, for messages.
+
+        Raises FlightError after a timeout.
         """
         acknowledged = self._reported.acknowledged
         acknowledged.pop(int(command), None)
