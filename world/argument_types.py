@@ -46,7 +46,8 @@ def check_types(
     the first argument of a wrong type, if a text, path, list or function is allowed there. Other arguments are numbers,
     words or data, which the called function itself checks.
 
-    signature: signature of the called function.  args, keywords: arguments of the call.
+    signature: signature of the called function.
+    args, keywords: arguments of the call.
 
     >>> def plan(scenario: str, *, seed: int | None = None) -> None: ...
     >>> check_types(inspect.signature(plan), ("tight",), {"seed": 2.0})

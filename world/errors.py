@@ -68,8 +68,10 @@ class PlanflyError(Exception):
     ) -> Self:
         """Make an error about an argument of a call; its message names the argument by its keyword.
 
-        The command line replaces the keyword by the name of the option. shown: text of the value in the message; None
-        for its str(), "" to omit it. file: file that the argument refers to, if any.
+        The command line replaces the keyword by the name of the option.
+
+        shown: text of the value in the message; None for its str(), "" to omit it.
+        file: file that the argument refers to, if any.
 
         >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "expected a port 0..65535")
         >>> print(error, "|", error.field, "|", error.value)

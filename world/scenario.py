@@ -158,7 +158,6 @@ class Scenario:
         """Return the mean wind at a position and a time, m/s, east and north.
 
         position: east, north, up, m.
-
         seconds: time after take-off, s.
 
         The components of a forecast's wind are along true east and north, those of a stated wind along the axes of the
@@ -196,7 +195,6 @@ class Scenario:
         """Return the mean profile of the wind around a position at a time.
 
         position: east, north, up, m.
-
         seconds: time after take-off, s.
 
         Without a forecast, the result is the scenario's wind.
@@ -448,7 +446,9 @@ def scenario_from_spec(
 def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
     """Return a scenario file's data with absolute paths.
 
-    The paths are those of the aircraft's folder, the parameter file and the forecast. base: folder of relative paths.
+    The paths are those of the aircraft's folder, the parameter file and the forecast.
+
+    base: folder of relative paths.
     """
     flight, wind, changes = spec.flight, spec.wind, {}
     if names_folder(flight.aircraft):

@@ -137,7 +137,7 @@ def _survey_ground(
     margin: largest distance between the positions and the edges of the area, m; smaller distances are tried if data is
         missing.
 
-    The area is (2, 2) m. The area is (2, 2) m. Raises ArgumentError for a position that the file does not cover, and
+    The area is (2, 2) m. Raises ArgumentError for a position that the file does not cover, and
     TerrainError if data is missing with every distance.
     """
     for fraction in _MARGIN_REDUCTIONS:

@@ -113,9 +113,11 @@ class Fault(NamedTuple):
 def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> Fault:
     """Return the first fault that pydantic found.
 
-    The text of the fault is ``key: value: what is allowed``. data: data that was checked. It is needed if a field
-    allows several types, because pydantic's location then contains names that are not keys of the data. model: model of
-    the data, needed to suggest a known key for an unknown key.
+    The text of the fault is ``key: value: what is allowed``.
+
+    data: data that was checked. It is needed if a field allows several types, because pydantic's location then contains
+        names that are not keys of the data.
+    model: model of the data, needed to suggest a known key for an unknown key.
 
     >>> from pydantic import ValidationError
     >>> from world.scenario_tables import WindTable

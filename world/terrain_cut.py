@@ -295,7 +295,9 @@ class _PlacedTile(NamedTuple):
 def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
     """Return the grid of a one-degree tile, with longitudes that match those of an area.
 
-    Longitudes are shifted by multiples of 360 degrees. degree: latitude and longitude of the tile's south-west corner.
+    Longitudes are shifted by multiples of 360 degrees.
+
+    degree: latitude and longitude of the tile's south-west corner.
 
     Raises TerrainError for a tile without a north-up grid of latitude and longitude over this degree.
     """

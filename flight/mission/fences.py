@@ -146,9 +146,12 @@ def fence_problem(
 ) -> tuple[str, int] | None:
     """Return the first fence that a position violates, or None.
 
-    The result is a description of the fence and the number of its first item. fences: fence items (5001..5004), in
-    which the corners of a polygon follow each other. east, north: m on the map about ``origin``. unites_inclusions:
-    True if a position must be inside at least one inclusion; False if it must be inside every inclusion.
+    The result is a description of the fence and the number of its first item.
+
+    fences: fence items (5001..5004), in which the corners of a polygon follow each other.
+    east, north: m on the map about ``origin``.
+    unites_inclusions: True if a position must be inside at least one inclusion; False if it must be inside every
+        inclusion.
 
     Raises MissionError if a polygon has fewer corners than stated.
 

@@ -574,9 +574,11 @@ class _ReturnBuilder:
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
         """Return the arc from the current position to a tangent of the target's loiter, in the shorter direction.
 
-        course: course at the start of the arc, rad. radius: radius of the arc, m.
+        course: course at the start of the arc, rad.
+        radius: radius of the arc, m.
+
         Returns the circle of the arc, the angle of the arc (rad), and the course at its end (rad). Returns None if
-            there is no such tangent.
+        there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
         turn_sign = math.copysign(1.0, course_error)

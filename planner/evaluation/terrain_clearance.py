@@ -259,7 +259,8 @@ def sample_terrain(
 ) -> None:
     """Fill the `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths and smallest heights of its legs.
 
-    extents: (w,) distance within which a point is near a waypoint, m. unfinished: (w - 1,) scratch.
+    extents: (w,) distance within which a point is near a waypoint, m.
+    unfinished: (w - 1,) scratch.
 
     Depths and heights are relative to the required clearance. Smallest heights are exact up to `NEAR_GROUND_HEIGHT_M`;
     above that they are lower bounds. Legs take turns, one sample each: the next sample of a leg depends on the result

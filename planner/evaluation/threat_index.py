@@ -238,7 +238,8 @@ def kill_density(
 ) -> tuple[float, float, float]:
     """Return the mean kill density over the segment a-b, and the distances to spheres near both ends, m.
 
-    margin: distance added to the radii, m. max_distance: a returned distance is exact if it is below this, m.
+    margin: distance added to the radii, m.
+    max_distance: a returned distance is exact if it is below this, m.
     length_a, length_b: lengths at a and b from which the distances are measured; below, above: vertical error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az

@@ -198,7 +198,8 @@ def _relax_airspace_stage(
 ) -> None:
     """Compute the costs of the routes to a stage's cells from those of the previous stage; store parents.
 
-    columns: `COLUMN` records (across,). cost, next_cost: (across, layers), of the previous stage and of this one.
+    columns: `COLUMN` records (across,).
+    cost, next_cost: (across, layers), of the previous stage and of this one.
 
     Changes of course are counted along the cheapest route to a cell only, so the result is not exactly the optimum.
     """

@@ -114,8 +114,10 @@ _DEGREE_LENGTH_M = 111_000.0
 def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
     """Return the zones of a file that are relevant for an area.
 
-    They are all inclusions, and the exclusions within `MAX_ZONE_DISTANCE` of the area. source: name of the file in
-    messages. bounds: (2, 2) m, west and east, south and north of the area.
+    They are all inclusions, and the exclusions within `MAX_ZONE_DISTANCE` of the area.
+
+    source: name of the file in messages.
+    bounds: (2, 2) m, west and east, south and north of the area.
 
     Raises ScenarioError if an omitted zone has an invalid shape; `make_zones` checks the other zones.
     """
@@ -300,8 +302,10 @@ def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Fl
 def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, default_ceiling: float) -> list[Floats]:
     """Return the walls of a zone: one array (k, 2, 3) m for each ring.
 
-    The array has the lower and the upper end of the wall at each of the k corners. default_floor: altitude of unknown
-    ground, m AMSL. default_ceiling: ceiling of a zone without a ceiling, m AMSL.
+    The array has the lower and the upper end of the wall at each of the k corners.
+
+    default_floor: altitude of unknown ground, m AMSL.
+    default_ceiling: ceiling of a zone without a ceiling, m AMSL.
 
     A floor below the ground is raised to the ground.
 

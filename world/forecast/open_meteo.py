@@ -136,7 +136,9 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 def _find_level(path: Path, hourly: dict[str, Any], match: re.Match[str]) -> tuple[str, str, str]:
     """Return the names of a level's speed, direction and geopotential height.
 
-    The last name is "" for a level at a height above ground. match: match of the name of the speed.
+    The last name is "" for a level at a height above ground.
+
+    match: match of the name of the speed.
     """
     name, level = match.group(), f"{match.group(1)}{match.group(2)}"
     direction = next((text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly), None)
