@@ -220,7 +220,7 @@ class Plan:
 
     @property
     def state(self) -> str:
-        """State of the plan: "safe", "feasible" or neither."""
+        """State of the plan in words: safe, feasible, or not feasible."""
         return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
 
     @property

@@ -150,8 +150,8 @@ class PlannerAirspace(NamedTuple):
 def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> PlannerAirspace:
     """Make the airspace of a scenario with its margins.
 
-    buffer: margin below the maximum height, m; at a fixed end with a smaller margin, a fraction
-    (`ZoneMargins.end_fraction`) of the end's own margin.
+    buffer: margin below the maximum height, m. If a fixed end has a smaller margin, only a fraction of that margin
+        (`ZoneMargins.end_fraction`) is required there.
 
     >>> from world.scenario import load_scenario
     >>> space = make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)

@@ -31,15 +31,18 @@ LEVEL_FLIGHT_ROUNDING_M = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
-    """Return the side of the columns (m); a closed area narrower than about this may be treated as open."""
+    """Return the side of the columns, m.
+
+    A closed area narrower than about this length may be treated as open.
+    """
     return max(MIN_SIDE_M, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
-    """Return True if it is proven that ground, ceiling and missiles leave no path.
+    """Return True if it is proven that ground, ceiling and missiles together block every path.
 
-    missiles: (m,) True for the `data.threats` to consider; None for all.
-    margin: distance from their spheres, m.
+    missiles: (m,) True for each of `data.threats` to consider; None for all.
+    margin: required distance from the missiles' spheres, m.
 
     A path stays above the clearance, below the ceiling and outside the missiles' spheres.
 
@@ -64,10 +67,10 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_level_flight(data: ProblemArrays) -> float:
-    """Return the highest altitude of level flight, above which no waypoint may be, m.
+    """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
-    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if
-    both slope limits are the aircraft's own, as in `planner.evaluation.leg_constraints`.
+    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if both
+    slope limits are those of the aircraft, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
@@ -94,9 +97,10 @@ def highest_level_flight(data: ProblemArrays) -> float:
 
 
 def blocking_missiles(data: ProblemArrays) -> list[int] | None:
-    """Return the indices of a minimal set of missiles that block every path, with ground and ceiling.
+    """Return the indices of a minimal set of missiles that, with ground and ceiling, block every path.
 
-    The list is empty if ground and ceiling alone block every path. Returns None if no blockage is proven.
+    The list is empty if ground and ceiling alone block every path. Returns None if it is not proven that every path is
+    blocked.
     """
     if not is_closed(data):
         return None
@@ -114,7 +118,7 @@ def blocking_missiles(data: ProblemArrays) -> list[int] | None:
 
 
 def _index_mask(indices: Ints, count: int) -> Flags:
-    """Return a mask (count,): True at the given indices."""
+    """Return a mask (count,) that is True at the given indices."""
     flags = np.zeros(count, dtype=np.bool_)
     flags[indices] = True
     return flags
@@ -122,7 +126,7 @@ def _index_mask(indices: Ints, count: int) -> Flags:
 
 @compiled
 def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
-    """Implement `is_closed` for the missiles that are True in `missiles`.
+    """Return the result of `is_closed` for the missiles that are True in `missiles`.
 
     column_size: side of the square columns, m.
     """
@@ -157,7 +161,7 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the height of the lowest pixel under a column and next to it, m; -inf if one has no data."""
+    """Return the height of the lowest pixel below a column or next to it, m; -inf if a pixel has no data."""
     first_column = math.inf
     first_row = math.inf
     last_column = -math.inf
@@ -221,9 +225,9 @@ def _close_sphere(
 def _close_range(
     range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
 ) -> None:
-    """Add an altitude range to the closed ranges of column j of a row of columns.
+    """Add an altitude range to the closed ranges of column j in a row of columns.
 
-    A range beyond the maximum number of ranges stays open.
+    If the column already has the maximum number of closed ranges, the range stays open.
     """
     kept_count = 0
     for k in range(range_counts[j]):
@@ -247,9 +251,9 @@ def _close_range(
 def _reaches_destination(
     data: ProblemArrays, column_size: float, range_bottoms: Floats, range_tops: Floats, range_counts: Ints
 ) -> bool:
-    """Return True if open altitudes of adjacent columns connect start and destination.
+    """Return True if open altitudes of neighbouring columns connect start and destination.
 
-    Each open range of a column is above the closed range with the same index.
+    Each open range of a column lies above the closed range with the same index.
     """
     columns, rows, range_limit = range_bottoms.shape
     ends = np.zeros(2, dtype=np.int64)

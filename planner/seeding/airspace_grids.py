@@ -198,14 +198,12 @@ def _relax_airspace_stage(
 ) -> None:
     """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
 
-
     cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and of this stage.
 
     A change of course is measured from the cheapest route to a cell only, so the result is not exactly the optimum.
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
-    # No tracking error at a fixed end.
-    lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
+    lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.
     turn_cost, slope_fraction = (TURN_COST * step, GENTLE_SLOPE_FRACTION) if grid.gentle else (0.0, 1.0)
     slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), slope_fraction)
     for y in range(width):

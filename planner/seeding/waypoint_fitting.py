@@ -259,7 +259,6 @@ def _move_waypoints(
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
     """Return the best candidate of each waypoint in the waypoint's frame, (w, 3), and the number of legs evaluated.
 
-
     The ends are fixed.
     """
     inner_count = len(candidates) - 2
