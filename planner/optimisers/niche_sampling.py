@@ -56,8 +56,8 @@ class NicheSampling:
     def first(self, count: int, extension: Floats | float = 0.0) -> Floats:
         """Draw samples (g, count, d), uniform in the boxes.
 
-        extension: (d,) fraction of the box by which samples extend above it before they are clipped, for variables with
-        their best values at the upper bound, which uniform samples would hardly ever reach.
+        extension: (d,) fraction of the box by which samples may exceed its upper bound before they are clipped. It is
+            for variables whose best value is at the upper bound, which uniform samples would hardly ever reach.
         """
         size = (len(self._lower), count, self._lower.shape[1])
         extended_upper = self._upper + extension * (self._upper - self._lower)

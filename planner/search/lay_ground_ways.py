@@ -217,7 +217,7 @@ class _Site:
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_path(self, path: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Return the certificate of a path, (n, 3) m, that may be lower than usual near two points.
+        """Return the certificate of a path, (n, 3) m, with a reduced required height near two points.
 
         end_points: the two points, (3,) m. The required height is reduced near a point that is itself closer to the
             ground than required.

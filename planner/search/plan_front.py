@@ -179,10 +179,14 @@ def plan_front(
 
     The front is empty if the default planner finds no safe plan. It has fewer than `count` plans if no further plan has
     a noticeable gain over the others. The fourth objective is energy. It is time if the scenario's objective is time,
-    or if the aircraft's power is unknown. default: the completed default plan; None to plan it here, and to finish it
-    like the others. waypoints: number of waypoints of the other plans during the search, including both ends; None for
-    the number in the default plan. finish: completes a plan, for example with departure and approach; only plans that
-    are then safe enter the front. The same scenario, limits, count and seed give the same front.
+    or if the aircraft's power is unknown.
+
+    default: the completed default plan; None to plan it here, and to finish it like the others.
+    waypoints: number of waypoints of the other plans during the search, including both ends; None for the number in the
+        default plan.
+    finish: completes a plan, for example with departure and approach; only plans that are then safe enter the front.
+
+    The same scenario, limits, count and seed give the same front.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario

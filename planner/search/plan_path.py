@@ -87,8 +87,8 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the algorithm of the scenario, or the default.
     progress: called with generations done, generations in total, and a short text.
-    stop: called every few hundredths of a second; a returned text ("interrupted") ends the search with the best path
-    found and is recorded in the plan.
+    stop: called every few hundredths of a second. If it returns a text ("interrupted"), the search ends with the best
+        path so far, and the plan records the text.
     improved: called with each path (w, 3) that meets the constraints better than all earlier paths; it is not yet
         certified.
     first_safe: True to end the search with the first safe path.
