@@ -69,11 +69,11 @@ class Engine:
     def settle(self, *, spin: bool) -> None:
         """Let the engine speed settle at the present airspeed and throttle.
 
-        Without ``spin`` the engine keeps its speed, and only quantities that depend on their own derivative (the lift
-        of a changing angle of attack) settle.
+        Without ``spin`` the engine keeps its speed. Then only quantities that depend on their own derivative settle,
+        such as the lift of a changing angle of attack.
 
-        A light propeller settles within milliseconds, and would oscillate in longer steps; a heavy one takes a minute.
-        A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
+        A light propeller settles within milliseconds, and would oscillate with longer steps. A heavy propeller takes a
+        minute. A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
         """
         steps = [_SETTLE_STEP_S, _SETTLE_STEP_S] if spin else [0.0, 0.0]
         self._exec.set_dt(steps[1])

@@ -305,7 +305,7 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
 def end_tick(workspace: Record, block: Floats) -> int:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    block: of the `Workspace`, with the wind field.
+    block: block of the `Workspace`, which contains the wind field.
 
     Return the code of the flight's end, a key of `ENDS`, or 0 if the flight continues.
     """
@@ -330,7 +330,7 @@ def airborne_end_code(workspace: Record) -> int:
 def fill_tick(workspace: Record, block: Floats) -> None:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    block: of the `Workspace`, with the wind field.
+    block: block of the `Workspace`, which contains the wind field.
     """
     state = workspace.state
     true = workspace.true
@@ -370,9 +370,10 @@ def fill_tick(workspace: Record, block: Floats) -> None:
 def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
     """Update the progress of an RTL around its loiter, and end the flight once the loiter is complete.
 
-    For autopilots that fly an RTL by their own control law or program: they follow no line, so the cross-track error is
-    NaN.  The loiter is complete after a full circle and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`, both counted
-    from the arrival at the loiter and its altitude, or after `rtl_loiter_timeout`.
+    This is for autopilots that fly an RTL by their own control law or program. They do not follow a line, so the
+    cross-track error is NaN. The loiter is complete after a full circle and
+    `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. Both are counted from the moment at which the aircraft has reached
+    the loiter and its altitude. The loiter also ends after `rtl_loiter_timeout`.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -399,8 +400,8 @@ def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: floa
 def update_end_loiter(motion: Record, memory: Record, dt: float) -> None:
     """Update the course change in the loiter at a mission's end, and end the flight at `END_LOITER_ANGLE_RAD`.
 
-    The course is used instead of the bearing from the waypoint: an aircraft that cannot fly the loiter's radius flies
-    loops next to the waypoint, and the bearing then turns by 360 degrees in one loop or in three.
+    The course is used instead of the bearing from the waypoint. An aircraft that cannot fly the loiter's radius flies
+    loops next to the waypoint, and the bearing may then turn by 360 degrees in one loop or in three.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
@@ -441,7 +442,7 @@ def _find_airborne_end(
 ) -> int:
     """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
 
-    The conditions, in this order: ground contact, bank, stall, end of the route, empty battery.
+    The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
     """
     if height_above_ground <= 0.0:
         return GROUND
