@@ -126,7 +126,7 @@ def jsbsim_folder() -> Path:
 
 
 def aircraft_names() -> tuple[str, ...]:
-    """Return the names that `load_aircraft` accepts, sorted.
+    """Return the names that `load_aircraft` accepts, in alphabetical order.
 
     >>> aircraft_names()
     ('aerosonde', 'c172x', 'ultrastick25e', 'x8', 'zagi')
@@ -136,7 +136,7 @@ def aircraft_names() -> tuple[str, ...]:
 
 @lru_cache
 def load_aircraft(name: str) -> Aircraft:
-    """Return the embedded aircraft with this name.
+    """Return the aircraft with a name that ships with planfly.
 
     Raises FlightError for an unknown name, and for a metadata file with a missing, unknown or invalid entry.
 
@@ -156,7 +156,7 @@ def load_aircraft(name: str) -> Aircraft:
 
 
 def find_aircraft(name: str) -> Aircraft:
-    """Return the embedded aircraft with a name, or the aircraft in a folder if the name contains a slash.
+    """Return the aircraft with a name, or the aircraft in a folder if the name contains a slash.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -170,7 +170,7 @@ def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
     """Return the aircraft that a setup or log names.
 
     name: name of the aircraft in the setup or log.
-    stated_name: name or folder of the aircraft in the scenario; it is used if it is a folder called `name`.
+    stated_name: name or folder of the aircraft in the scenario. It is used if it is a folder whose name is `name`.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -181,7 +181,7 @@ def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
 
 
 def read_aircraft(folder: Path) -> Aircraft:
-    """Return the aircraft described by ``<folder>/<folder's name>.toml``.
+    """Read the aircraft in a folder from ``<folder>/<folder's name>.toml``.
 
     Raises FlightError as `load_aircraft` does.
     """
@@ -226,7 +226,7 @@ def _missing_metadata_advice(folder: Path) -> str:
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
     """Return the numeric fields of `Aircraft` in SI units, from the table of a metadata file.
 
-    Raises FlightError, whose message does not name the file, for a missing, unknown or invalid entry.
+    Raises FlightError for a missing, unknown or invalid entry; its message does not name the file.
     """
     energy_keys = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *energy_keys}
@@ -252,10 +252,10 @@ def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
 
 
 def model_hash(aircraft: Aircraft) -> str:
-    """Return the SHA-256, in hexadecimal, of the names and contents of the model's XML and TOML files.
+    """Return the SHA-256 of the names and contents of a model's XML and TOML files, in hexadecimal.
 
-    The hash changes with any change of the model, so it identifies the model of a cached envelope or an old log. Other
-    files in the folder, such as guidance gains, are not included. Raises FlightError for a file that cannot be read.
+    Any change of the model changes the hash, so it identifies the model of a cached envelope or an old log. Other files
+    in the folder, such as guidance gains, are not included. Raises FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
     64
@@ -272,9 +272,9 @@ def model_hash(aircraft: Aircraft) -> str:
 
 @cache
 def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> str:
-    """Return the SHA-256, in hexadecimal, of the names, sizes and contents of files.
+    """Return the SHA-256 of the names, sizes and contents of files, in hexadecimal.
 
-    stamps: modification times and sizes of the files, used only as part of the cache key.
+    stamps: modification times and sizes of the files, they are only used as a part of the cache's key.
     """
     digest = hashlib.sha256()
     for file in files:
@@ -299,9 +299,10 @@ _SHIPPED_ENTRY = re.compile(r"^([ \t]*shipped_by_jsbsim\s*=\s*)\S.*\n", re.MULTI
 def copy_aircraft_folder(
     folder: Path, source: Aircraft, model: Mapping[str, bytes] | None = None, *, overwrite: bool = False
 ) -> tuple[str, ...]:
-    """Copy an aircraft into a new folder, under the folder's name; create all its files or none.
+    """Copy an aircraft into a new folder, and name it after the folder; create all files or none.
 
-    model: contents of the files of a model that JSBSim ships, by name, to copy them; None to only refer to the model.
+    model: contents of the files of a model that JSBSim ships, by name, which are copied as well; None to refer to that
+        model only.
     overwrite: True to replace the folder of an aircraft.
 
     Returns the sorted names of the created files. Raises FlightError as `check_new_folder` does, and OSError if the
@@ -322,7 +323,7 @@ def copy_aircraft_folder(
 
 
 def write_aircraft_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """Write the files of an aircraft into a folder, all of them or none.
+    """Write the files of an aircraft into a folder, either all of them or none.
 
     In an existing folder the aircraft's files are replaced; files of other kinds are kept.
     """
@@ -332,7 +333,7 @@ def write_aircraft_folder(target: Path, files: Mapping[str, bytes]) -> None:
 
 
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
-    """Check that a folder can become the folder of an aircraft, and return its absolute path.
+    """Check that a folder can become an aircraft's folder; return its absolute path.
 
     overwrite: True to accept an existing folder of an aircraft.
 
@@ -356,9 +357,9 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
 
 
 def _copied_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of the files for a copy of an aircraft, by their paths in the new folder.
+    """Return the contents of the files of an aircraft's copy, by their paths in the new folder.
 
-    name: name of the copy; the files that are named after the aircraft, and its metadata, change accordingly.
+    name: name of the copy. The metadata, and files that are named after the aircraft, get this name.
     model: contents of the JSBSim model's files by path; empty if the copy refers to a model that JSBSim ships.
     """
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]

@@ -64,7 +64,7 @@ class Contact:
 
 
 def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return default ground contacts for an aircraft whose model has none, scaled by the wing span.
+    """Return default ground contacts, scaled by the wing span, for an aircraft whose model has none.
 
     >>> from aircraft.catalog import load_aircraft
     >>> made = default_contacts(load_aircraft("aerosonde"), "belly")
@@ -83,7 +83,7 @@ def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return the contacts of an aircraft's model, or default contacts if the model has none.
+    """Return the ground contacts of an aircraft's model; default contacts if the model has none.
 
     Contacts on which the aircraft stands come first.
 
@@ -98,7 +98,7 @@ def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return a model's XML with default contacts added; return a model that has contacts unchanged."""
+    """Return the XML of a model with default contacts added; unchanged if the model has contacts."""
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)
@@ -113,7 +113,7 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
     """Return the XML of one contact.
 
-    contacts: all contacts; those on which the aircraft stands share its weight.
+    contacts: all contacts; the contacts on which the aircraft stands share its weight.
     centre: centre of gravity, m, (3,).
 
     Positions in the XML, and the centre, are in meters aft, right and up from the model's reference point.
@@ -138,7 +138,7 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
 
 
 def _model_contacts(model: bytes) -> tuple[Contact, ...]:
-    """Return the contacts in a model's XML, with the contacts on which the aircraft stands first.
+    """Return the contacts in a model's XML; the contacts on which the aircraft stands come first.
 
     The aircraft stands on its wheels, or without wheels on its lowest points.
     """
@@ -166,10 +166,10 @@ def _read_contacts(model: bytes) -> list[Contact]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the centre of gravity of the loaded aircraft, m aft, right and up of the reference point.
+    """Return the centre of gravity of the loaded aircraft, m aft, right and up of the reference point, (3,).
 
-    As in JSBSim, the load consists of the empty aircraft, its point masses and the initial contents of its tanks. The
-    result is (3,).
+    As in JSBSim, the loaded aircraft consists of the empty aircraft, its point masses and the initial contents of its
+    tanks.
     """
     root = ElementTree.fromstring(model)
     cg_elements = [element for element in root.findall("mass_balance/location") if element.get("name") == "CG"]

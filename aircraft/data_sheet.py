@@ -268,7 +268,7 @@ def _is_within(value: float, min_value: float, max_value: float) -> bool:
 
 
 def check_sheet(sheet: DataSheet) -> DataSheet:
-    """Return a sheet if it describes a small aircraft.
+    """Return a data sheet if its values are possible for a small aircraft.
 
     Raises FlightError, with the allowed range, for a value out of range.
 
@@ -319,7 +319,7 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
 
 
 def _range_error(option: str, value: float, allowed: str, unit: str) -> FlightError:
-    """Return the FlightError for a value out of range.
+    """Return the FlightError for a value that is out of range.
 
     allowed: text on the allowed range.
     """
@@ -327,7 +327,7 @@ def _range_error(option: str, value: float, allowed: str, unit: str) -> FlightEr
 
 
 def _speed_range_text(min_speed: float, max_speed: float, sheet: DataSheet) -> str:
-    """Return the text of a speed range (m/s) that depends on the sheet's cruise speed."""
+    """Return the text for a range of speeds (m/s) that depends on the cruise speed of the sheet."""
     return f"{min_speed:.4g}..{max_speed:.4g} m/s at a cruise speed of {sheet.cruise:g} m/s"
 
 
@@ -339,7 +339,7 @@ def _weight(sheet: DataSheet) -> float:
 def _wing_area(sheet: DataSheet) -> float:
     """Return the wing area, m^2.
 
-    It is the stated area, or else the area for the stall speed at the class's maximum lift.
+    The area is the stated area, or else the area that the stall speed requires at the maximum lift of the class.
     """
     if sheet.area:
         return sheet.area
@@ -368,7 +368,7 @@ class SizedAircraft:
 def size_aircraft(
     sheet: DataSheet, title: str = "", aircraft_class: AircraftClass | None = None, prior: PowerPrior = POWER_PRIOR
 ) -> SizedAircraft:
-    """Build an aircraft model that matches a data sheet.
+    """Build the model of an aircraft from its data sheet.
 
     title: title of the model; "" for a title from layout, mass and span.
     aircraft_class: class of the aircraft; None takes the layout's class.
@@ -417,7 +417,7 @@ _LAYOUT_TEXTS = {"tail": "aircraft with a tail", "wing": "flying wing", "vtail":
 
 
 def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
-    """Return the sheet with missing values filled in, and the names of the fields that were filled in."""
+    """Return the sheet with missing values filled in, and the names of the fields that were missing."""
     defaults: dict[str, Any] = {
         "area": _wing_area(sheet),
         "top": DEFAULT_TOP_RATIO * sheet.cruise,
@@ -436,7 +436,7 @@ def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
 
 
 def elliptic_slope(aspect: float) -> float:
-    """Return the lift slope, per radian, of a straight wing with an aspect ratio (Helmbold; Raymer 12.4).
+    """Return the lift slope of a straight wing with an aspect ratio, per radian (Helmbold; Raymer 12.4).
 
     >>> round(elliptic_slope(1e9), 4)  # 2 pi for an infinite aspect ratio
     6.2832
@@ -526,7 +526,7 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
 
 
 def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
-    """Match the minimum drag coefficient to a sink rate; return the coefficients and their drag function.
+    """Return the coefficients whose minimum drag matches a sink rate, and their drag function.
 
     sink: sink rate at cruise with the power off and the propeller folded, m/s.
 
@@ -563,8 +563,9 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
     sheet: the sheet with missing values filled in.
     drag: function that returns the drag in level flight (N) at an airspeed (m/s).
 
-    The performance is the climb and the top speed in the returned sheet. Raises FlightError, with the feasible range of
-    a stated value, if no propeller meets the sheet.
+    The performance is the climb and the top speed in the returned sheet. The performance is the climb and the top speed
+    in the returned sheet. Raises FlightError, with the feasible range of a stated value, if no propeller meets the
+    sheet.
     """
     try:
         return _size_any_motor(stated_sheet, sheet, drag)
@@ -573,7 +574,7 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
 
 
 def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
-    """Size the engine or the electric motor of an aircraft, with its propeller.
+    """Size the engine or the electric motor of an aircraft, and its propeller.
 
     Arguments and result are those of `_size_propulsion`. Raises _NoPropellerError if no propeller meets the sheet.
     """
@@ -584,9 +585,9 @@ def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tu
 def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
     """Size an electric motor and its propeller; return the motor and the sheet with its performance.
 
-    A stated propeller fixes diameter and pitch, a stated motor its speed per volt; free values are chosen to meet the
-    climb, and the throttle of level flight or the top speed. If motor and propeller are both stated, climb and top
-    speed follow from them where the sheet states none.
+    A stated propeller determines diameter and pitch, a stated motor determines the speed per volt. The other values are
+    chosen to meet the climb, and the throttle of level flight or the top speed. If motor and propeller are both stated,
+    they determine the climb and the top speed that the sheet does not state.
     """
     if stated_sheet.motor and stated_sheet.propeller[0]:
         target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)]
@@ -624,10 +625,10 @@ _D = TypeVar("_D", ElectricMotor, FuelEngine)
 def _solve_with_climb_limit(
     solve: Callable[[], tuple[_D, DataSheet]], solve_for_climb: Callable[[float], tuple[_D, DataSheet]]
 ) -> tuple[_D, DataSheet]:
-    """Solve for a motor, and for guessed climbs if the solution climbs too steeply or does not exist.
+    """Solve for a motor; if the climb is then too steep or there is no solution, try guessed climbs.
 
-    solve: function that solves without a climb.
-    solve_for_climb: function that solves for a climb, rad.
+    solve: function that solves without a required climb.
+    solve_for_climb: function that solves for a required climb, rad.
 
     The limit is `MAX_CLIMB`. Returns the motor and the sheet with its performance. Raises _NoPropellerError if no
     guessed climb has a solution.
@@ -647,7 +648,7 @@ def _solve_with_climb_limit(
 def _solve_first_feasible(
     stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Drag
 ) -> tuple[ElectricMotor, DataSheet]:
-    """Solve for a motor with the climb and top speed of the first sheet that has a solution.
+    """Solve for a motor with climb and top speed of the first sheet for which a solution exists.
 
     Returns the motor and the sheet with its performance. Raises _NoPropellerError if no sheet has a solution.
     """
@@ -660,14 +661,14 @@ def _solve_first_feasible(
 def _solve_motor(
     stated_sheet: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
 ) -> tuple[ElectricMotor, DataSheet]:
-    """Solve for the motor and propeller that meet some fields of a sheet; return motor and performance.
+    """Solve for the motor and propeller that meet some fields of a sheet.
 
-    stated_sheet: sheet with the stated motor and propeller only; these stay unchanged.
+    stated_sheet: sheet with only the stated motor and propeller, which stay unchanged.
     sheet: sheet with the values to meet.
     target_fields: fields of `DataSheet` whose values are met. One number is free for each field: the size of the
         propeller, and the motor's speed per volt or the propeller's pitch.
 
-    The performance is the sheet with the resulting climb and top speed. Raises _NoPropellerError if there is no
+    Returns the motor, and the sheet with the resulting climb and top speed. Raises _NoPropellerError if there is no
     solution, or only one with a propeller of unusual size.
     """
     volts, (diameter, pitch) = sheet.volts, stated_sheet.propeller
@@ -681,7 +682,7 @@ def _solve_motor(
     has_one_unknown = len(target_fields) == 1 and target_fields != ["climb"]
 
     def make_motor(free_factors: Sequence[float]) -> ElectricMotor:
-        """Return the motor for factors on the initial values of the free numbers."""
+        """Return the motor in which the free numbers are their initial values times some factors."""
         size_factor, speed_factor = (1.0, free_factors[0]) if has_one_unknown else (*free_factors, 1.0, 1.0)[:2]
         propeller = (
             base.scale(blades=size_factor * initial_size)
@@ -704,7 +705,7 @@ def _solve_motor(
 
 
 def _motor_with_typical_losses(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
-    """Return a motor whose losses, relative to its power in cruise, are those of the Aerosonde's motor.
+    """Return a motor whose losses, relative to the power in cruise, equal those of the Aerosonde's motor.
 
     volts: battery voltage, V.
     emf: back-emf constant, V s/rad.
@@ -721,10 +722,10 @@ def _motor_with_typical_losses(propeller: Propeller, volts: float, emf: float, c
 
 
 def _with_calibrated_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
-    """Return the motor with the prior's efficiency in level flight at cruise, and its avionics power.
+    """Return a motor with the avionics power and the efficiency of a prior.
 
-    `power_ratio` is set such that the battery power without avionics is drag times airspeed over the prior's propulsive
-    efficiency.
+    `power_ratio` is set so that in level flight at cruise the battery power without avionics equals drag times airspeed
+    divided by the propulsive efficiency of the prior.
     """
     thrust, min_throttle, max_throttle = drag(sheet.cruise), 0.0, 1.0
     for _ in range(60):
@@ -740,7 +741,8 @@ def _with_calibrated_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, p
 def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
     """Size an engine and its propeller; return the engine and the sheet with its performance.
 
-    The engine meets the stated climb or top speed; if both are stated, the propeller's pitch is chosen as well.
+    The engine is sized for the stated climb or top speed. If both are stated, the pitch of the propeller is chosen as
+    well.
     """
     # A stated top speed determines the climb better than a guess.
     target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
@@ -753,7 +755,7 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
 
 
 def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
-    """Solve for the engine torque that meets a field of a sheet; for two fields, also for the pitch.
+    """Solve for the engine torque that meets one field of a sheet; for two fields also solve for the pitch.
 
     Returns the engine and the sheet with its performance. Raises _NoPropellerError if there is no solution.
     """
@@ -767,7 +769,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
     initial_torque = 0.12 * needed_thrust * base_propeller.diameter
 
     def make_engine(free_factors: Sequence[float]) -> FuelEngine:
-        """Return the engine for factors on the initial torque and pitch."""
+        """Return the engine whose torque and pitch are their initial values times some factors."""
         torque_factor, pitch_factor = (*free_factors, 1.0)[:2]
         torque = torque_factor * initial_torque
         return FuelEngine(
@@ -788,10 +790,10 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the relative excess of a motor's thrust over the thrust that a field of the sheet requires.
+    """Return the excess of a motor's thrust over the thrust that a field requires, relative to the latter.
 
-    field: "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`; "trim_throttle" requires
-        the drag at that throttle.
+    field: field of the sheet. "top" requires its thrust at full throttle, "climb" at `DataSheet.climb_throttle`, and
+        "trim_throttle" requires the drag at that throttle.
     """
     speed = sheet.top if field == "top" else sheet.cruise
     throttle = {"trim_throttle": sheet.trim_throttle, "climb": sheet.climb_throttle}.get(field, 1.0)
@@ -800,7 +802,7 @@ def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> flo
 
 
 def _solve_for_factors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
-    """Find positive factors near 1 at which all errors are 0.
+    """Find positive factors near 1 for which all errors are 0.
 
     errors: function that returns `count` errors for `count` factors.
 
@@ -855,7 +857,7 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 
 
 def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
-    """Return the error for a sheet that no propeller meets, with the feasible range of a stated value.
+    """Return the error for a sheet that no propeller meets; it states the feasible range of a stated value.
 
     sheet: the sheet with missing values filled in.
     """
@@ -889,9 +891,9 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
 
 
 def _with_performance(sheet: DataSheet, motor: Motor, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb and the top speed that a motor gives.
+    """Return the sheet with the climb and the top speed that the aircraft reaches with a motor.
 
-    Raises _NoPropellerError if the climb is flatter than the lowest climb of `RANGES`.
+    Raises _NoPropellerError if the climb is below the lowest climb of `RANGES`.
     """
     excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))

@@ -72,11 +72,12 @@ class Envelope:
             object.__setattr__(self, name, table)
 
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
-        """Return the steepest climb and descent angles relative to the air, rad, by bilinear interpolation.
+        """Return the steepest climb and descent angles relative to the air, rad.
 
-        Both are positive in the direction of their name. They are NaN at an airspeed outside the table or below the
-        minimum level-flight airspeed; between this airspeed and the slowest trim of the table, the values of the
-        slowest trim apply. For altitudes outside the table, the nearest altitude of the table is used.
+        Both are positive in the direction of their name, and interpolated bilinearly. They are NaN at an airspeed
+        outside the table or below the minimum airspeed of level flight. Between this minimum and the slowest trim of
+        the table, the values of the slowest trim apply. For an altitude outside the table, the nearest altitude of the
+        table is used.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
@@ -86,10 +87,10 @@ class Envelope:
         )
 
     def with_margin(self) -> "Envelope":
-        """Return the envelope reduced by a margin of `UNDECIDED_SIGMAS` standard deviations.
+        """Return the envelope reduced by `UNDECIDED_SIGMAS` standard deviations of its uncertainty.
 
-        A positive climb or descent is not reduced below 0, nor the maximum level speed below the minimum level speed; a
-        negative climb is unchanged.
+        A positive climb or descent is not reduced below 0, and a negative climb is unchanged. The maximum level speed
+        is not reduced below the minimum level speed.
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
@@ -124,9 +125,9 @@ class Envelope:
 
         tailwind, crosswind: m/s along and across the leg's course.
 
-        Both slopes are positive in the direction of their name. A tailwind flattens the slope over the ground, a
-        headwind steepens it. Both are NaN if the aircraft cannot make progress along the leg, and where `air_angles` is
-        NaN.
+        Both slopes are positive in the direction of their name. A tailwind makes the slope over the ground flatter, a
+        headwind makes it steeper. Both are NaN if the aircraft cannot make progress along the leg, or if `air_angles`
+        is NaN.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -139,8 +140,8 @@ class Envelope:
 
         air_angle: angle relative to the air, rad, positive in a climb.
 
-        The power follows the parabola through idle, level flight and full throttle, and is constant beyond idle and
-        full throttle. It is NaN if power is unknown or the airspeed is outside the table.
+        The power lies on a parabola through idle, level flight and full throttle. Beyond idle and full throttle it is
+        constant. It is NaN if the power is unknown, or if the airspeed is outside the table.
         """
         if not self.power_level.size:
             return math.nan
@@ -193,7 +194,7 @@ def turn_radius(speed: float, bank: float) -> float:
 def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
     """Interpolate a table over `xs` (rows) and `ys` (columns) at x and y.
 
-    y is clipped, and the result is NaN for x outside `xs`. Rows before the first row with a value take the values of
+    y is clipped to `ys`. The result is NaN for x outside `xs`. Rows before the first row with a value get the values of
     that row.
     """
     rows = _interpolate_rows(ys, table, y)
@@ -203,7 +204,9 @@ def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: 
 
 
 def _interpolate_rows(ys: Floats, table: Floats, y: float) -> Floats:
-    """Interpolate each row of a table at y; bit-identical to ``np.interp``, but ten times faster.
+    """Interpolate each row of a table at y.
+
+    The result is bit-identical to that of ``np.interp``, but takes a tenth of the time.
 
     ys: increasing positions of the columns.
     """

@@ -107,7 +107,7 @@ def read_model(table: object, aircraft: str) -> Model:
 
 
 def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return a value that must be a table with known keys only. Raises FlightError otherwise."""
+    """Return a value if it is a table that has only known keys. Raises FlightError otherwise."""
     if not isinstance(value, dict):
         raise FlightError(f"{key} = {value!r} is not a table", field=key, value=value)
     if unknown := sorted(value.keys() - set(known_keys)):
@@ -119,8 +119,8 @@ def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict
 def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
     """Return the name of the model if JSBSim ships it, otherwise "".
 
-    The name is also the name of a folder, and must not lead outside JSBSim's folder. Raises FlightError for an invalid
-    name.
+    The name must not lead outside JSBSim's folder, because it is also the name of a folder. Raises FlightError for an
+    invalid name.
     """
     value = table.get("shipped_by_jsbsim", False)
     if isinstance(value, bool):
@@ -132,7 +132,7 @@ def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
 
 
 def _read_flag(table: dict[str, Any], name: str) -> bool:
-    """Return a bool of the ``[model]`` table, by default False. Raises FlightError for another type."""
+    """Return a flag of the ``[model]`` table; False if it is missing. Raises FlightError for another type."""
     value = table.get(name, False)
     if not isinstance(value, bool):
         raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)
@@ -140,7 +140,7 @@ def _read_flag(table: dict[str, Any], name: str) -> bool:
 
 
 def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
-    """Return the property and its factors from an entry such as ``["fcs/elevator-pos-rad", 1.0]``.
+    """Return the property and the factors of an entry such as ``["fcs/elevator-pos-rad", 1.0]``.
 
     factor_count: required number of factors after the property.
 

@@ -126,7 +126,8 @@ class ModelNumbers:
 def model_xml(name: str, numbers: ModelNumbers) -> str:
     """Return the text of an aircraft's ``NAME.xml``.
 
-    The model has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
+    The model has the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`. It has no ``<input>`` and ``<output>``
+    channels.
     """
     ixx, iyy, izz, ixz = (value / _KG_M2_PER_SLUG_FT2 for value in numbers.inertia)
     return f"""<?xml version="1.0"?>
@@ -176,7 +177,7 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
 
 
 def _comment_text(text: str) -> str:
-    """Return a text without characters that are not allowed in XML and its comments."""
+    """Return a text without the characters that XML and its comments do not allow."""
     return text.replace("&", "and").replace("<", "").replace(">", "").replace("--", "-")
 
 
@@ -185,7 +186,7 @@ def _comment_text(text: str) -> str:
 
 
 def _flight_control_xml(numbers: ModelNumbers) -> str:
-    """Return the XML section of the servos and of the motor's lag.
+    """Return the XML section with the servos and the lag of the motor.
 
     Elevons and ruddervators mix two commands.
     """
@@ -230,7 +231,7 @@ def _flight_control_xml(numbers: ModelNumbers) -> str:
 
 
 def _servo_xml(name: str, command: str, travel: float, numbers: ModelNumbers) -> str:
-    """Return the XML of the actuator of a surface, with lag, rate limit and stops.
+    """Return the XML of a surface's actuator, which has a lag, a rate limit and stops.
 
     name, command: properties of the surface and of its command.
     travel: travel in either direction, rad.
@@ -266,7 +267,7 @@ _TORQUE_XML = """    <!-- The reaction to the propeller's torque rolls the aircr
 
 
 def _external_reactions_xml(numbers: ModelNumbers) -> str:
-    """Return the XML section of the propulsion: factors, functions, thrust and the propeller's torque."""
+    """Return the XML section of the propulsion: its factors, functions, thrust and propeller torque."""
     factor_properties = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
     x, y, z = numbers.propulsion.direction
     # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
@@ -359,7 +360,7 @@ def _axis_xml(axis: str, name: str, content: str, frame: str = "") -> str:
 
 
 def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
-    """Return a tuple of the property of a factor; () if the model lacks the factor."""
+    """Return the property of a factor as a tuple; () if the model does not have the factor."""
     return (f"ident/{name}",) if name in factors else ()
 
 
@@ -417,7 +418,7 @@ def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tu
 def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
     """Return the XML of the lift by angle of attack.
 
-    It is a straight line, and beyond the stall the lift of a flat plate.
+    The lift is a straight line up to the stall, and that of a flat plate beyond it.
     """
     straight_line = add(
         f"<v> {number(aero.lift_0)} </v>",
@@ -444,7 +445,7 @@ def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
 
 
 def _separation_table(stall_alpha: float, sharpness: float) -> str:
-    """Return the rows of a JSBSim table: angle of attack (rad), and the separated fraction of the flow.
+    """Return the rows of a JSBSim table of the separated fraction of the flow by angle of attack (rad).
 
     The fraction follows Beard and McLain, eq. 4.10, and is exactly 0 in attached flow.
     """
@@ -453,10 +454,8 @@ def _separation_table(stall_alpha: float, sharpness: float) -> str:
     points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})
     rows = []
     for alpha in points:
-        upper_blend, lower_blend = (
-            math.exp(-sharpness * (alpha - stall_alpha)),
-            math.exp(sharpness * (alpha + stall_alpha)),
-        )
+        upper_blend = math.exp(-sharpness * (alpha - stall_alpha))
+        lower_blend = math.exp(sharpness * (alpha + stall_alpha))
         fraction = (1.0 + upper_blend + lower_blend) / ((1.0 + upper_blend) * (1.0 + lower_blend))
         fraction = 0.0 if abs(alpha) <= stall_alpha - width + 1e-9 else min(1.0, fraction)
         rows.append(f"          {alpha:.6f}  {fraction:.8f}")

@@ -101,7 +101,7 @@ class Limits:
         return float(climb), float(dive)
 
     def with_margin(self) -> "Limits":
-        """Return the limits with an envelope reduced by a margin for its uncertainty."""
+        """Return the limits with the envelope reduced for its uncertainty."""
         return replace(self, envelope=self.envelope.with_margin())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
@@ -111,7 +111,7 @@ class Limits:
         amsl: altitude, m.
         airspeed: m/s; None for the airspeed of the limits.
 
-        The arc is sized for the highest ground speed on it.
+        The radius is that for the highest ground speed on the arc.
         """
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
@@ -143,8 +143,9 @@ class Limits:
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
         """Return the performance at a true airspeed (m/s), for compiled functions.
 
-        airspeed: None for the airspeed of the limits, which an autopilot with a tracking error uses as an equivalent
-            airspeed: its true airspeed increases with altitude, where the aircraft climbs less.
+        airspeed: true airspeed; None for the airspeed of the limits. An autopilot with a tracking error holds the
+            airspeed of the limits as an equivalent airspeed. Its true airspeed then increases with altitude, where the
+            aircraft climbs less.
 
         Climb and descent are NaN where `Envelope.air_angles` is NaN.
         """
@@ -154,11 +155,9 @@ class Limits:
 
     def _make_table(self, airspeed: float | None) -> PerformanceTable:
         """Make the performance table for a true airspeed, or for the airspeed of the limits if it is None."""
-        cruise_airspeed, altitudes, wind = (
-            self.airspeed if airspeed is None else airspeed,
-            self.envelope.amsl,
-            self.wind,
-        )
+        cruise_airspeed = self.airspeed if airspeed is None else airspeed
+        altitudes = self.envelope.amsl
+        wind = self.wind
         is_equivalent = airspeed is None and self.tracking is not None
         speed_factors = [air_density_factor(float(amsl)) if is_equivalent else 1.0 for amsl in altitudes]
         angles = np.array(
@@ -190,13 +189,13 @@ def derate(
     unused_climb: float = 0.0,
     unused_sink: float = 0.0,
 ) -> PerformanceTable:
-    """Return the performance with a reduced climb and descent.
+    """Return the performance with reduced climb and descent angles.
 
     climb_fraction, sink_fraction: fractions (0..1) of the climb and descent angles that may be used.
     unused_climb, unused_sink: climb and sink rates to be left unused, m/s.
 
-    The smaller of both reduced angles applies. A negative climb, which is a loss of altitude, is unchanged. An angle
-    does not become negative if the unused rate exceeds the aircraft's rate.
+    The fraction and the unused rate give two reduced angles, of which the smaller applies. A negative climb, which is a
+    loss of altitude, is unchanged. An angle does not become negative if the unused rate exceeds the aircraft's rate.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
@@ -206,17 +205,15 @@ def derate(
     airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
 
     def reduce_angles(angles: Floats, fraction: float, unused_rate: float) -> Floats:
-        """Return the reduced angles (h,) of one of the two tables."""
+        """Return the reduced angles (h,) of the climb table or the descent table."""
         reduced = np.where(angles > 0.0, fraction * angles, angles)
         if unused_rate <= 0.0:
             return _read_only(reduced)
         max_angles = np.arcsin(np.maximum(0.0, np.sin(angles) - unused_rate / airspeeds))
         return _read_only(np.where(reduced > 0.0, np.minimum(reduced, max_angles), reduced))
 
-    climb, descent = (
-        reduce_angles(table.climb, climb_fraction, unused_climb),
-        reduce_angles(table.descent, sink_fraction, unused_sink),
-    )
+    climb = reduce_angles(table.climb, climb_fraction, unused_climb)
+    descent = reduce_angles(table.descent, sink_fraction, unused_sink)
     return table._replace(climb=climb, descent=descent)
 
 
@@ -230,15 +227,13 @@ def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) ->
     """
     airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
     climb_limit, descent_limit = [np.arcsin(np.minimum(1.0, rate / airspeeds)) for rate in (climb_rate, sink_rate)]
-    climb, descent = (
-        _read_only(np.minimum(table.climb, climb_limit)),
-        _read_only(np.minimum(table.descent, descent_limit)),
-    )
+    climb = _read_only(np.minimum(table.climb, climb_limit))
+    descent = _read_only(np.minimum(table.descent, descent_limit))
     return table._replace(climb=climb, descent=descent)
 
 
 def _read_only(values: Floats) -> Floats:
-    """Return a contiguous read-only copy: with another layout, numba would compile the kernels again."""
+    """Return a contiguous read-only copy, because numba would compile kernels again for another layout."""
     copy = np.array(values, dtype=np.float64)
     copy.setflags(write=False)
     return copy
@@ -276,7 +271,7 @@ def slopes_along(
 ) -> tuple[float, float]:
     """Return the steepest climb and dive over the ground on a course, rad.
 
-    tail_fraction, cross_fraction: components of the wind's direction along and across the course (cosine and sine).
+    tail_fraction, cross_fraction: components of the unit wind vector along and across the course.
 
     The result is (0, 0) if the course cannot be held.
     """
@@ -322,7 +317,7 @@ def _turn_radius_of_courses(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the radius (m) of the arc at the bank limit between the unit courses u and v.
+    """Return the radius (m) of the arc at the bank limit from the unit course u to the unit course v.
 
     ux, uy, vx, vy: east and north components of u and v.
     turn_sign: sign of the turn, 0 for either direction.
@@ -352,11 +347,14 @@ def turn_radius_between(table: PerformanceTable, course_in: float, course_out: f
     """Return the radius (m) of the arc at the bank limit between two courses (rad).
 
     The radius is for the highest ground speed in the turn, and inf if a course cannot be held. In turbulence one
-    standard deviation of the gusts is added, because the airspeed, and with it the bank for an arc over the ground,
-    varies by that much.
+    standard deviation of the gusts is added to the ground speed. The airspeed varies by this amount, and with it the
+    bank that an arc over the ground requires.
     """
     turn = wrap(course_out - course_in)
-    ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
+    ux = math.sin(course_in)
+    uy = math.cos(course_in)
+    vx = math.sin(course_out)
+    vy = math.cos(course_out)
     wx, wy = downwind_vector(table)
     # A U-turn may be flown in either direction.
     turn_sign = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
@@ -387,10 +385,9 @@ def corner_tangent(
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:
     """Return the tangent of the slope along a fly-by arc.
 
-    It is the altitude difference of the arc's tangent points over the arc's length.
-    tan_in, tan_out: tangents of the legs' slopes.
-    tangent: radius x tan(theta/2); the arc, radius x theta, is shorter than its two tangents and therefore steeper, by
-        a factor of 1.27 at 90 degrees.
+    It is the difference in altitude between the arc's tangent points, divided by the length of the arc. tan_in,
+    tan_out: tangents of the legs' slopes. tangent: length of the tangent, radius x tan(theta/2), m. The arc, radius x
+    theta, is shorter than its two tangents. Therefore it is steeper than they are, by a factor of 1.27 at 90 degrees.
     """
     if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
         return 0.0
@@ -400,13 +397,13 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
 
 @compiled_inline
 def fly_over_run(turn: float) -> float:
-    """Return the distance after a fly-over turn at which the track is back on the leg, in turn radii.
+    """Return the distance after a fly-over turn at which the track joins the next leg, in turn radii.
 
     turn: rad.
 
-    The distance along the leg is sin turn + 2 sin phi, with the overshoot angle phi given by cos phi = (1 + cos
-    turn)/2. For turns beyond the turn with the largest distance, the largest distance is returned, so the result never
-    decreases.
+    The distance along the leg is sin turn + 2 sin phi, where cos phi = (1 + cos turn)/2 defines the overshoot angle
+    phi. The result never decreases with the turn: beyond the turn with the largest distance, it stays at the largest
+    distance.
     """
     # The maximum of sin turn + 2 sin phi is 2 sqrt 2, at this angle.
     angle = min(turn, math.acos(-1.0 / 3.0))
@@ -420,7 +417,7 @@ def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:
 
     waypoints: m, (w, 3).
 
-    The length is R tan(theta/2), and inf for a U-turn, which has no tangent point.
+    The length is R tan(theta/2). It is inf for a U-turn, which has no tangent point.
     """
     count = waypoints.shape[0]
     tangents = np.zeros(count)
@@ -447,7 +444,7 @@ def roll_reversal_length(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the length of leg (m) that the aircraft needs to roll from a turn into an opposite turn.
+    """Return the length of leg (m) that the aircraft needs to roll from one turn into an opposite turn.
 
     ux, uy: unit vector of the leg's course.
     radius_in, radius_out: radii of the two arcs, m.

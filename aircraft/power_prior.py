@@ -73,7 +73,7 @@ POWER_PRIOR = PowerPrior(tail_drag=0.0315, wing_drag=0.0171, aspect_power=-0.42,
 
 
 def power_log_sd(min_drag_fraction: float, avionics_fraction: float, min_drag_sd: float = MIN_DRAG_LOG_SD) -> float:
-    """Return the standard deviation of the logarithm of the power in level flight.
+    """Return the standard deviation of the logarithm of the power for level flight.
 
     min_drag_fraction: ratio of the minimum drag to the total drag.
     avionics_fraction: ratio of the avionics' power to the total power.

@@ -56,8 +56,8 @@ class Propeller:
     def scale(self, *, diameter: float = 1.0, blades: float = 1.0, pitch: float = 1.0) -> "Propeller":
         """Return a propeller whose diameter, blade area and pitch are multiplied by factors.
 
-        The coefficients scale with the blade area, and J scales with the pitch. A propeller of steeper pitch gives its
-        thrust up to a higher J and needs proportionally more torque.
+        The coefficients scale with the blade area, and J scales with the pitch. A propeller with a steeper pitch gives
+        thrust up to a higher J, and needs proportionally more torque.
         """
         ct, cq = self.thrust, self.torque
         return Propeller(
@@ -287,7 +287,7 @@ class ActuatorDisc:
     def functions_xml(self, factors: tuple[str, ...]) -> str:
         """Return the XML of JSBSim functions for exit speed, thrust, torque, power and current.
 
-        factors: names of the factors by which an aircraft of a campaign differs from its model.
+        factors: names of the factors by which an aircraft in a campaign may differ from its model.
         """
         factor = _factor_element(factors)
         speed = multiply(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
@@ -398,9 +398,9 @@ class ShaftPower:
     </function>"""
 
     def _advance_table(self) -> str:
-        """Return the rows of a JSBSim table: the cube root of CP(J) / J^3, increasing, and J.
+        """Return the rows of a JSBSim table: the cube root of CP(J) / J^3 in increasing order, and J.
 
-        The first row has the J at which CP is 0; the last rows belong to an aircraft that nearly stands still.
+        The first row has the J at which CP is 0. The last rows are for an aircraft that is almost at rest.
         """
         max_ratio = next(k / 1000.0 for k in range(50, 3000) if _evaluate(self.power, k / 1000.0) <= 0.0)
         rows = [(0.0, max_ratio)]
@@ -418,7 +418,7 @@ _SEA_LEVEL_DENSITY = 1.225
 
 
 def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
-    """Return a function that returns the XML element of a factor by its name.
+    """Return a function that returns the XML element of a factor, by the factor's name.
 
     The element is 1 for a factor that the model lacks.
     """
@@ -426,14 +426,14 @@ def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
 
 
 def _evaluate(coefficients: tuple[float, ...], x: float) -> float:
-    """Return the value of a polynomial, whose coefficients are given by rising power."""
+    """Return the value of a polynomial, whose coefficients are in the order of increasing power."""
     return sum(value * x**k for k, value in enumerate(coefficients))
 
 
 def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
-    """Return the JSBSim element of a polynomial, by Horner's method.
+    """Return the JSBSim element of a polynomial, evaluated by Horner's method.
 
-    coefficients: by rising power.
+    coefficients: in the order of increasing power.
     x: element of the variable.
     """
     *lower_coefficients, leading_coefficient = coefficients

@@ -137,7 +137,7 @@ def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: floa
 
 @inlined
 def corner_deviation(tracking: Record, turn: float, ground_speed: float) -> tuple[float, float, float]:
-    """Return the maximum distance from the legs at a corner, and the affected lengths of both legs, m.
+    """Return the maximum distance from the legs at a corner, and the affected length of each leg, m.
 
     turn: rad, positive.
     ground_speed: m/s.
@@ -170,7 +170,7 @@ CORRIDOR_RADII = 2.0
 def corridor_half_width(stated_half_width: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
-    It is the scenario's value if there is one; otherwise it is computed from the autopilot's acceptance radius.
+    It is the value that the scenario states. Otherwise it is computed from the autopilot's acceptance radius.
 
     stated_half_width: the scenario's `[limits] corridor_m`; None if not stated.
     acceptance_radius: default acceptance radius of the autopilot, m; None for guidance that flies corners as planned.

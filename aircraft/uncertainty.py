@@ -142,7 +142,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
 def _check_keys(table: dict[str, Any], file: Path) -> None:
     """Raise FlightError if a required key is missing or a key is unknown.
 
-    Without a required key the model would seem certain.
+    If a required key were missing, the model would seem certain.
     """
     known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
     missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
@@ -183,7 +183,7 @@ def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = F
 
 
 def uncertainty_text(uncertainty: Uncertainty) -> str:
-    """Return the text of an ``uncertainty.toml`` with an uncertainty."""
+    """Return an uncertainty as the text of an ``uncertainty.toml``."""
     lines = [
         "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
         "",
@@ -232,18 +232,19 @@ class Draws:
     source: str = ""
 
     def row(self, seed: int) -> int:
-        """Return the row of the draw that a flight with this seed uses."""
+        """Return the row of the draw that a flight with a seed uses."""
         return seed % len(self.values)
 
     def properties(self, seed: int) -> tuple[tuple[str, float], ...]:
-        """Return the names and values of the properties in the draw that a flight with this seed uses."""
+        """Return the names and values of the properties in the draw that a flight with a seed uses."""
         return tuple(zip(self.names, self.values[self.row(seed)].tolist(), strict=True))
 
 
 def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW_COUNT, seed: int = 1) -> Draws:
     """Draw each quantity independently, `count` times.
 
-    A factor is drawn log-normally with its estimate as the median, another value normally.
+    A factor is drawn from a log-normal distribution with its estimate as the median, any other value from a normal
+    distribution.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
     >>> drawn = draw_quantities((one,)).values
@@ -261,7 +262,7 @@ def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW
 
 
 def draws_text(draws: Draws) -> str:
-    """Return the text of a ``draws.csv`` with draws."""
+    """Return draws as the text of a ``draws.csv``."""
     lines = [",".join(draws.names), *(",".join(f"{value:.9g}" for value in row) for row in draws.values.tolist())]
     return "\n".join(lines) + "\n"
 

@@ -74,7 +74,10 @@ class DepartureAndApproach:
 
 
 def _lock_arrays(procedure: ClimbOut | Descent, *names: str) -> None:
-    """Replace the named arrays of a departure or approach by read-only copies; paths get the shape (n, 3)."""
+    """Replace the named arrays of a departure or approach by read-only copies.
+
+    Paths get the shape (n, 3).
+    """
     for name in names:
         array = np.array(getattr(procedure, name), dtype=np.float64)
         array = array.reshape(-1, 3) if name in ("waypoints", "final_waypoints") else array
@@ -114,7 +117,7 @@ class DepartureAndApproachFile(_FileTable):
     descent: _DescentFile | None = None
 
     def to_procedures(self) -> DepartureAndApproach:
-        """Convert the file's entries to a departure and an approach; each is None if it is missing."""
+        """Convert the entries of the file to a departure and an approach; each is None if it is missing."""
         climb_file, descent_file = self.climb, self.descent
         climb = descent = None
         if climb_file is not None:
@@ -138,7 +141,7 @@ class DepartureAndApproachFile(_FileTable):
 
 
 def departure_and_approach_json(procedures: DepartureAndApproach) -> dict[str, Any]:
-    """Convert departure and approach to JSON data, which `DepartureAndApproachFile` reads.
+    """Convert a departure and an approach to JSON data, from which `DepartureAndApproachFile` reads them.
 
     >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
     >>> data = departure_and_approach_json(DepartureAndApproach(climb))

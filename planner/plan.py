@@ -115,12 +115,12 @@ class Certificate:
 
     @property
     def ok(self) -> bool:
-        """True if no constraint is violated anywhere on the path."""
+        """True if the path violates no constraint at any point."""
         return not self.problems
 
     @property
     def margins(self) -> tuple[float, ...]:
-        """All margins of the path, from `turn` to `headroom`, (8,)."""
+        """Margins of the path, from `turn` to `headroom`, (8,)."""
         return (
             self.turn,
             self.available_length,
@@ -134,7 +134,7 @@ class Certificate:
 
 
 def path_digest(waypoints: Floats) -> str:
-    """Return a digest that identifies a path (w, 3), by which a certificate is matched to its path.
+    """Return a digest that identifies a path (w, 3); a certificate states the digest of its path.
 
     >>> path_digest(np.zeros((2, 3))) == path_digest(np.ones((2, 3)))
     False
@@ -174,9 +174,9 @@ class Plan:
     ways: DepartureAndApproach | None = None
 
     def __post_init__(self) -> None:
-        """Lock the arrays, and name the scores, which may be given as any four numbers.
+        """Lock the arrays, and name the four scores.
 
-        Raises ArgumentError if the certificate is that of other waypoints.
+        The scores may be given as any four numbers. Raises ArgumentError if the certificate belongs to other waypoints.
         """
         for name in ("waypoints", "history"):
             array = np.array(getattr(self, name), dtype=np.float64)
@@ -193,7 +193,7 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """True if the path meets all four constraints, at the paper's points and continuously."""
+        """True if the path meets all four constraints, at the paper's points and everywhere between them."""
         return self.certificate.ok and not any(self.violations)
 
     @property
@@ -203,11 +203,11 @@ class Plan:
 
     @property
     def margins(self) -> tuple[float, ...]:
-        """Margins of the plan, (9,): all are 0 or more exactly if the plan is safe.
+        """Margins of the plan, (9,); the plan is safe if all of them are 0 or more, and only then.
 
-        The first eight are those of the certificate, from `Certificate.turn` to `Certificate.headroom`, rad and m.  The
-        last is 0, or minus the number of the certificate's problems and of the violations at the paper's points: some
-        problems have no margin, such as a blocked approach.
+        The first eight are those of the certificate, from `Certificate.turn` to `Certificate.headroom`, rad and m. The
+        last is 0, or minus the number of the certificate's problems and of the violations at the paper's points. It is
+        needed because some problems, such as a blocked approach, have no margin.
 
         >>> from world.scenario import load_scenario
         >>> scenario = load_scenario("tight")
@@ -220,14 +220,14 @@ class Plan:
 
     @property
     def state(self) -> str:
-        """State of the plan in words: safe, feasible or neither."""
+        """State of the plan in words: safe, feasible, or not feasible."""
         return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
 
     @property
     def unmet_margins(self) -> tuple[str, ...]:
-        """Margins of the planner that given waypoints do not meet; empty for a searched plan.
+        """Margins of the planner that given waypoints do not meet; empty for a plan that was searched.
 
-        A verdict on given waypoints judges their flight, which may be flyable without these margins.
+        A verdict on given waypoints judges the flight, which may be flyable without these margins.
         """
         if self.algorithm != GIVEN_WAYPOINTS:
             return ()
@@ -235,15 +235,15 @@ class Plan:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Problems that make every flight of the plan not flyable: those of a searched path or of its ends.
+        """Problems that make every flight of the plan not flyable.
 
-        The ends are the departure and the approach.
+        They are the problems of a searched path, and those of the departure and the approach.
         """
         return tuple(problem for problem in self._problems if problem not in self.unmet_margins)
 
     @property
     def _problems(self) -> tuple[str, ...]:
-        """Problems of the certificate; if it has none, the violations at the paper's points."""
+        """Problems of the certificate, or without such problems the violations at the paper's points."""
         if self.certificate.problems or not any(self.violations):
             return self.certificate.problems
         return ("it violates constraints at its sampled points",)
@@ -282,7 +282,7 @@ class _CertificateFile(_Model):
     problems: list[str]
 
     def certificate(self, certified_path: Floats) -> Certificate:
-        """Return the certificate in the file, for a path (w, 3), m."""
+        """Return the certificate that the file states, for a path (w, 3), m."""
         return Certificate(
             turn=self.turn_margin_rad,
             available_length=_none_to_inf(self.turn_room_m),
@@ -318,18 +318,18 @@ class _PlanFile(_Model):
 
 
 def _finite_or_none(value: float) -> float | None:
-    """Return a finite number, or None (null in JSON) for inf and NaN."""
+    """Return a finite number unchanged, and None (null in JSON) for inf and NaN."""
     return float(value) if np.isfinite(value) else None
 
 
 def _airspace_entries(certificate: Certificate) -> dict[str, float]:
-    """Return the certificate's entries for zones and maximum height; empty if the scenario has neither."""
+    """Return the certificate's entries for zones and maximum height; empty without both in the scenario."""
     values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
     return {key: float(value) for key, value in values.items() if np.isfinite(value)}
 
 
 def plan_json(plan: Plan) -> str:
-    """Return the plan as the text of a ``plan.json``; the same plan always gives the same bytes.
+    """Return the plan as the text of a ``plan.json``; equal plans give equal bytes.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -382,7 +382,7 @@ def parse_plan(
 ) -> Plan:
     """Parse the plan in the text of a ``plan.json``.
 
-    source: origin of the text, with which error messages begin.
+    source: origin of the text, which stands at the beginning of error messages.
     base: folder to which the scenario's paths are relative.
     terrain: file that replaces the scenario's terrain.
     ground: terrain already loaded (from a log); then no elevation file is opened.
@@ -460,13 +460,13 @@ def _reject_constant(name: str) -> float:
 
 
 def _check_names(source: str, field: str, found_names: dict[str, Any], expected_names: Sequence[str]) -> None:
-    """Raise MissionError if the keys of a JSON object are not exactly the expected ones."""
+    """Raise MissionError if a JSON object does not have exactly the expected keys."""
     if sorted(found_names) != sorted(expected_names):
         raise MissionError.at(source, field, sorted(found_names), f"expected keys {sorted(expected_names)}")
 
 
 def plan_html(plan: Plan) -> str:
-    """Return an HTML table of a plan for notebooks: its state, margins and failures."""
+    """Return an HTML table with the state, the margins and the failures of a plan, for notebooks."""
     certificate = plan.certificate
     rows = [
         ("waypoints", len(plan.waypoints)),

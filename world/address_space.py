@@ -20,7 +20,7 @@ class AddressSpaceError(MemoryError):
 
 
 def has_address_space(size: int) -> bool:
-    """Return True if ``size`` bytes can be mapped; the test mapping is released.
+    """Return True if ``size`` bytes of memory can be mapped; the test mapping is released at once.
 
     >>> has_address_space(2**20)
     True

@@ -74,8 +74,8 @@ class Launch:
 
         min_speed: lowest speed in level flight, m/s.
 
-        It is the stated speed, or else the method's default, which is 0 for a runway, where the aircraft accelerates
-        under its own power.
+        The speed is the stated speed, or else the default of the launch method. The default is 0 for a runway, where
+        the aircraft accelerates under its own power.
 
         >>> [Launch(method).release_speed(15.0) for method in ("catapult", "hand", "runway")]
         [18.0, 10.0, 0.0]
@@ -85,7 +85,7 @@ class Launch:
         return {"catapult": _CATAPULT_SPEED_RATIO * min_speed, "hand": _THROW_SPEED_MPS, "runway": 0.0}[self.method]
 
     def acceleration(self, min_speed: float) -> float:
-        """Return the mean acceleration along the launch, v^2 / (2 L), m/s^2; 0 for a runway.
+        """Return the mean acceleration along the launch, v^2 / (2 L), m/s^2; 0 on a runway.
 
         min_speed: lowest speed in level flight, m/s.
 
@@ -124,7 +124,7 @@ class LandingStrip:
 
         amsl: altitude of the wind, m AMSL.
 
-        Returns None if no course is stated and there is no wind: then any course is suitable.
+        Returns None if no course is stated and there is no wind, because any course is then suitable.
 
         >>> LandingStrip(0.0, 0.0).landing_course(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
         2.0
@@ -141,8 +141,8 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
     course: rad.
 
-    A slope that rises along the course, or to its right, is positive. Each slope is the mean between two opposite ends
-    of the strip, and NaN if the ground height at one of these ends is not known.
+    A slope is positive if it rises along the course or to the right of it. It is measured between two opposite ends of
+    the strip, and NaN if the ground height at one of them is unknown.
     """
     slopes = []
     for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):
@@ -182,11 +182,11 @@ class ReturnRequirements:
 def make_home(
     table: HomeTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats, start: Floats
 ) -> Floats | None:
-    """Convert a scenario's [home] table to a position on the ground, (3,) m; return None without a table.
+    """Convert a scenario's [home] table to a position on the ground, (3,) m; None without a table.
 
     source: name of the file in messages.
     bounds: area of the scenario, (2, 2) m.
-    start: (3,) m; home is below it if place = "start".
+    start: (3,) m; with place = "start", home is the point on the ground below it.
 
     Raises ScenarioError if home is outside the area, or if the ground height at home is not known.
     """
@@ -197,7 +197,7 @@ def make_home(
 
 
 def make_launch(table: LaunchTable | None) -> Launch | None:
-    """Convert a scenario's [launch] table to a launch; return None if there is no table."""
+    """Convert a scenario's [launch] table to a launch; None without a table."""
     if table is None:
         return None
     incline = _LAUNCH_INCLINE_RAD[table.method] if table.incline_deg is None else math.radians(table.incline_deg)
@@ -208,7 +208,7 @@ def make_launch(table: LaunchTable | None) -> Launch | None:
 def make_landing(
     table: LandingTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats
 ) -> LandingStrip | None:
-    """Convert a scenario's [landing] table to a landing strip; return None if there is no table.
+    """Convert a scenario's [landing] table to a landing strip; None without a table.
 
     Raises ScenarioError as `make_home` does.
     """
@@ -224,7 +224,7 @@ def make_landing(
 def make_return_requirements(
     table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
 ) -> ReturnRequirements | None:
-    """Convert a scenario's [returns] table to RTL requirements; return None if there is no table.
+    """Convert a scenario's [returns] table to RTL requirements; None without a table.
 
     Raises ScenarioError for a rally point that is not above the ground, and for a height above ground at a position
     with unknown ground.

@@ -17,9 +17,9 @@ _Result = TypeVar("_Result")
 
 
 def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
-    """Decorate a function of the API without options: it raises the ArgumentError of `check_types`.
+    """Decorate a function of the API so that wrong argument types raise the ArgumentError of `check_types`.
 
-    `takes_options` of planfly does the same for a function with options.
+    The function has no options; for a function with options use `takes_options` of planfly.
 
     >>> @checks_types
     ... def read(log: str | Path) -> None: ...
@@ -40,12 +40,14 @@ def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Paramete
 def check_types(
     signature: inspect.Signature, args: tuple[Any, ...], keywords: dict[str, Any]
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Return the arguments of a call, with Python's numbers in place of numpy's and of whole numbers such as 2.0.
+    """Return the arguments of a call with plain Python numbers, and check their types.
 
-    Raises ArgumentError for the first argument that may be a text, a path, a list or a function, and is of no type that
-    is allowed.  Other arguments are numbers, words or data, which the called functions check.
+    Numbers of numpy, and whole numbers such as 2.0 where integers are expected, are converted. Raises ArgumentError for
+    the first argument of a wrong type, if a text, path, list or function is allowed there. Other arguments are numbers,
+    words or data, which the called function itself checks.
 
-    signature: signature of the called function.  args, keywords: arguments of the call.
+    signature: signature of the called function.
+    args, keywords: arguments of the call.
 
     >>> def plan(scenario: str, *, seed: int | None = None) -> None: ...
     >>> check_types(inspect.signature(plan), ("tight",), {"seed": 2.0})
@@ -66,9 +68,9 @@ def check_types(
 
 
 def _python_number(value: Any, annotation: Any) -> Any:
-    """Return a number as Python's integer or float, as an annotation asks; any other value unchanged.
+    """Return a number as the integer or float that an annotation requires; other values unchanged.
 
-    A number that is not whole, where integers are allowed, is unchanged, too.
+    A number that is not whole is unchanged if only integers are allowed.
     """
     if not isinstance(value, Real) or isinstance(value, int):
         return value
@@ -81,7 +83,7 @@ def _python_number(value: Any, annotation: Any) -> Any:
 
 
 def _expected_type(value: Any, annotation: Any) -> str | None:
-    """Return the types that an annotation allows, in words, if a value is of none of them; otherwise None."""
+    """Return the types that an annotation allows, as text, if a value has none of them; otherwise None."""
     classes, item_classes = _allowed_classes(annotation)
     if classes:
         is_allowed = isinstance(value, classes) or _is_sequence_of(value, item_classes)
@@ -101,16 +103,16 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
 
 
 def _is_sequence_of(value: Any, classes: tuple[type, ...]) -> bool:
-    """Return True if a value is a sequence of instances of some classes; text and bytes are none."""
+    """Return True if a value is a sequence of instances of some classes; text and bytes do not count."""
     is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     return bool(classes) and is_sequence and all(isinstance(item, classes) for item in value)
 
 
 @functools.cache
 def _allowed_classes(annotation: Any) -> tuple[tuple[type, ...], tuple[type, ...]]:
-    """Return the classes of an annotation that allows a text or a path, and the classes in a sequence that it allows.
+    """Return two tuples: the classes that an annotation allows, and the classes in an allowed sequence.
 
-    Both are empty for other annotations.
+    Both are empty for an annotation that allows neither a text nor a path.
 
     >>> _allowed_classes(str | None), _allowed_classes(float | None)
     (((<class 'str'>, <class 'NoneType'>), ()), ((), ()))
@@ -129,7 +131,7 @@ def _allowed_classes(annotation: Any) -> tuple[tuple[type, ...], tuple[type, ...
 
 
 def _classes_text(classes: Sequence[type], item_classes: Sequence[type]) -> str:
-    """Return the names of classes for a message, such as "a Plan, text or a path"."""
+    """Return the names of classes as a part of a message, such as "a Plan, text or a path"."""
     words: dict[type, str] = {str: "text", Path: "a path"}
     names = [words.get(one, f"a {one.__name__}") for one in classes if one not in (NoneType, os.PathLike)]
     names += ["a list of these"] if item_classes else []

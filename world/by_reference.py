@@ -32,7 +32,10 @@ class Reference(types.Type):
     """Numba's type of a pointer to the fields of a named tuple in memory."""
 
     def __init__(self, tuple_type: Any) -> None:
-        """Point to this named tuple type, under a short name that keeps the names of compiled functions short."""
+        """Make a reference to a named tuple type.
+
+        Its short name keeps the names of compiled functions short.
+        """
         self.tuple_type = tuple_type
         digest = hashlib.sha256(tuple_type.name.encode()).hexdigest()[:16]
         super().__init__(f"{tuple_type.instance_class.__name__}_{digest}")
@@ -51,10 +54,10 @@ class _Layout(NamedTuple):
 
 
 def by_reference(cls: _Class) -> _Class:
-    """Decorate a `typing.NamedTuple` class: kernels take its instances as one pointer and read the fields.
+    """Decorate a `typing.NamedTuple` class so that kernels take its instances as one pointer.
 
-    The fields must be numbers, arrays, records or named tuples of these. Records are copied when an instance is first
-    passed to a kernel. Returns a subclass.
+    The fields must be numbers, arrays, records or named tuples of these. Kernels read the fields through the pointer.
+    Records are copied when an instance is first passed to a kernel. Returns a subclass.
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
@@ -71,7 +74,7 @@ def by_reference(cls: _Class) -> _Class:
 
 
 def _get_layout(value: Any) -> _Layout:
-    """Return the layout of an instance, made at the first call and stored in the instance."""
+    """Return the memory layout of an instance; it is made at the first call and stored in the instance."""
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
         tuple_type = _replace_references(typeof_impl.dispatch(tuple)(value, None))
@@ -85,7 +88,7 @@ def _instance_address(value: Any) -> int:
 
 
 def _replace_references(numba_type: Any) -> Any:
-    """Return a numba type in which each reference is replaced by the named tuple type that it points to."""
+    """Return a numba type in which each reference is replaced by the named tuple type that it refers to."""
     if isinstance(numba_type, Reference):
         return numba_type.tuple_type
     if isinstance(numba_type, types.Array):
@@ -107,7 +110,7 @@ def _is_tuple(numba_type: Any) -> bool:
 
 
 def _lay_out_in_memory(numba_type: Any, value: Any) -> Any:
-    """Lay out a value of a numba type in memory, as ctypes data with an address."""
+    """Lay out a value of a numba type in memory; return ctypes data that has an address."""
     if isinstance(numba_type, types.Array):
         # Numba's array structure: two owner pointers, both null, then these fields.
         array_fields = [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
@@ -153,7 +156,7 @@ class _Field(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, name: str) -> Any:
-    """Generate the code that reads a field.
+    """Generate the code that reads a field of a named tuple through its pointer.
 
     A field whose class is marked `by_reference` is read as a pointer.
     """

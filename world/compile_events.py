@@ -14,9 +14,9 @@ _callbacks: list[BeforeCompiling] = []
 
 @contextmanager
 def notify_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
-    """Call a function before each kernel that is compiled within the block, in any thread.
+    """Call a function before each kernel that any thread compiles within this block.
 
-    Of nested callbacks only the innermost is called.
+    If blocks are nested, only the innermost function is called.
 
     >>> with notify_before_compiling(lambda: print("compiling")):
     ...     announce_compilation()
@@ -41,13 +41,13 @@ class CompileTimer:
         self._start = 0.0
 
     def begin(self) -> None:
-        """Begin a compilation, which may be within another compilation."""
+        """Record the start of a compilation; compilations may be nested."""
         if not self._running_count:
             self._start = time.monotonic()
         self._running_count += 1
 
     def end(self) -> None:
-        """End a compilation."""
+        """Record the end of a compilation."""
         self._running_count -= 1
         if not self._running_count:
             self.seconds += time.monotonic() - self._start
@@ -58,6 +58,6 @@ COMPILE_TIMER = CompileTimer()
 
 
 def announce_compilation() -> None:
-    """Call the innermost callback, because a kernel that is not in the cache is about to be compiled."""
+    """Call the innermost callback, because a kernel that is not in the cache will be compiled."""
     if _callbacks:
         _callbacks[-1]()

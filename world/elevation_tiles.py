@@ -29,7 +29,7 @@ MAX_GRID_OFFSET_PIXELS = 0.01
 
 
 def tile_files(path: Path) -> list[Path] | None:
-    """Return the files of a folder or of a virtual raster, sorted by name; None for any other file.
+    """Return the elevation files in a folder or virtual raster, by name; None for any other path.
 
     Raises TerrainError for a folder without elevation files, and for a virtual raster that cannot be read.
     """
@@ -48,7 +48,7 @@ def tile_files(path: Path) -> list[Path] | None:
 
 
 def _virtual_files(path: Path) -> list[Path]:
-    """Return the files of a virtual raster; all must be in its folder or below."""
+    """Return the files of a virtual raster, which must be in its folder or in folders below it."""
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise TerrainError(f"{path}: a virtual raster has at most {_MAX_BYTES:,} bytes", file=path)
@@ -90,7 +90,8 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
 
     name: name of the raster in messages.
 
-    Where tiles overlap, the first tile with data is used. Raises TerrainError for tiles that are not on one grid.
+    Where tiles overlap, the heights of the first tile with data are used. Raises TerrainError for tiles that are not on
+    one grid.
     """
     first = tiles[0]
     if len(tiles) == 1:
@@ -102,7 +103,7 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     offsets = [(row - top, col - left) for row, col in positions]
 
     def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
-        """Return the heights of a window of rows and columns, from the first tile with data at each pixel."""
+        """Return the heights of a window of rows and columns; each pixel is from the first tile with data."""
         block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
         for (row, col), tile in zip(offsets, tiles, strict=True):
             first_row, last_row = max(r0, row), min(r1, row + tile.shape[0])
@@ -138,9 +139,9 @@ def _shift_pixels(
 
 
 def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
-    """Return the row and the column of a tile's first pixel on the grid of the first tile.
+    """Return the row and column of a tile's first pixel on the grid of the first tile.
 
-    Raises TerrainError if the pixels of both tiles do not coincide, or if their reference systems differ.
+    Raises TerrainError if the two grids do not coincide, or if the reference systems differ.
     """
     if tile.crs != first.crs:
         allowed = f"all tiles need the reference system of {first.name}"

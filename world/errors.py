@@ -40,12 +40,15 @@ class PlanflyError(Exception):
         self, message: str, *, file: str | Path = "", field: str = "", value: Any = None, allowed: str = ""
     ) -> None:
         super().__init__(message)
-        self.file, self.field, self.value, self.allowed = str(file), field, value, allowed
+        self.file = str(file)
+        self.field = field
+        self.value = value
+        self.allowed = allowed
         self.argument = ""
 
     @classmethod
     def at(cls, file: str | Path, field: str, value: Any, allowed: str, *, shown: str | None = None) -> Self:
-        """Make an error about one value in a file, with a message of these four parts.
+        """Make an error about one value in a file; its message names these four parts.
 
         shown: text of the value in the message; None for its str(), "" to omit it.
 
@@ -63,9 +66,10 @@ class PlanflyError(Exception):
     def of_argument(
         cls, argument: str, value: Any, allowed: str, *, shown: str | None = None, file: str | Path = ""
     ) -> Self:
-        """Make an error about an argument of a call, which the message names by its keyword.
+        """Make an error about an argument of a call; its message names the argument by its keyword.
 
-        The command line replaces the keyword by the name of its option.
+        The command line replaces the keyword by the name of the option.
+
         shown: text of the value in the message; None for its str(), "" to omit it.
         file: file that the argument refers to, if any.
 
@@ -83,10 +87,11 @@ class PlanflyError(Exception):
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
         """Convert an error to this class, with the location of the value that caused it.
 
-        file, field, value: location that led to the error, added before the message; empty to keep the message.
+        file, field, value: location of the value that led to the error. It is added before the message; if it is empty,
+            the message is unchanged.
 
-        The error's attributes are kept. The location becomes the attributes if the error names no field; otherwise its
-        own field and value are kept, and its file if it has one.
+        If the error names a field, its own field and value are kept, and also its file if it has one. Otherwise the
+        attributes are set to the location.
 
         >>> inner = FlightError("mine.toml: mass_kg = -1", file="mine.toml", field="mass_kg", value=-1)
         >>> found = ScenarioError.from_error(inner, "tight", "flight.aircraft", "./mine")

@@ -85,7 +85,7 @@ EXTRAS = {
 
 
 def require_extra(name: str, needs: str = "") -> None:
-    """Raise MissingExtraError, in one line, if a module of an extra is not installed.
+    """Raise MissingExtraError, in one line, if a module of an optional extra is not installed.
 
     needs: beginning of the line, which names the feature; the extra's own `needs` by default.
 
@@ -100,7 +100,7 @@ def require_extra(name: str, needs: str = "") -> None:
 
 
 def _is_installed(module: str) -> bool:
-    """Return True if a module is installed; the module is not imported."""
+    """Return True if a module is installed, without importing it."""
     try:
         return find_spec(module) is not None
     except (ImportError, ValueError):

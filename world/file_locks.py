@@ -15,9 +15,10 @@ LOCKS_FOLDERS = fcntl is not None
 
 
 def try_lock(handle: int) -> bool:
-    """Lock an open file, or on Linux and macOS a folder, until it is closed; return True if successful.
+    """Lock an open file until it is closed; return True if successful.
 
-    Returns False if it is already locked. Raises OSError if the file system does not support locks.
+    On Linux and macOS an open folder can be locked, too. Returns False if the file is already locked. Raises OSError if
+    the file system does not support locks.
 
     >>> from tempfile import TemporaryFile
     >>> with TemporaryFile() as file:

@@ -45,7 +45,7 @@ class TextLine(NamedTuple):
 
 
 def read_small_file(path: Path, max_bytes: int, kind: str, error: type[PlanflyError]) -> bytes:
-    """Return the bytes of a file that has at most ``max_bytes`` bytes.
+    """Return the bytes of a file of at most ``max_bytes`` bytes.
 
     kind: kind of the file in messages, such as "mission".
     Raises ``error``, in one line, for a file that is missing, too large or not readable.
@@ -75,7 +75,7 @@ _FOLDER_COMMANDS = {
 
 
 def missing_text(path: Path) -> str:
-    """Return the reason why a path is not a file: there is none, or it is a folder, with what the folder holds.
+    """Return why a path is not a file: nothing is there, or it is a folder; name the folder's contents.
 
     >>> missing_text(Path("missing.plan")), missing_text(Path("/proc/self/task"))
     ('no such file', 'is a folder')
@@ -95,11 +95,13 @@ def missing_text(path: Path) -> str:
 
 
 def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
-    """Return the bytes of a file that has at most ``max_bytes`` bytes.
+    """Return the bytes of a file of at most ``max_bytes`` bytes.
 
     kind: kind of the file in messages, such as "mission".
-    Raises OSError, and ValueError for a larger file and for anything but a plain file: a named pipe without a writer
-    would block, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
+
+    Raises OSError, and ValueError for a larger file. Also raises ValueError for anything but a plain file, because a
+    named pipe without a writer would block, and a device has no end. A pipe of the shell (``/dev/stdin``,
+    ``/dev/fd/63``) is read to its end.
 
     >>> read_at_most(Path("/dev/zero"), 100, "mission")
     Traceback (most recent call last):
@@ -123,7 +125,7 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
 def absolute_path(path: Path) -> str:
     """Return the absolute path of a file or folder, with links resolved.
 
-    A link that leads to itself is not resolved.
+    A link that refers to itself is not resolved.
 
     >>> absolute_path(Path("/usr/../none/"))
     '/none'
@@ -135,7 +137,7 @@ def absolute_path(path: Path) -> str:
 
 
 def read_toml(path: Path, kind: str, max_bytes: int = 2**20) -> dict[str, Any]:
-    """Read the table of a TOML file.
+    """Read a TOML file, and return its table.
 
     Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
 
@@ -147,10 +149,10 @@ def read_toml(path: Path, kind: str, max_bytes: int = 2**20) -> dict[str, Any]:
 
 
 def toml_table(text: str) -> dict[str, Any]:
-    """Parse the table of a TOML text.
+    """Parse a TOML text, and return its table.
 
-    Raises ValueError for invalid TOML, and for too deeply nested brackets or names: the parser's memory grows with the
-    square of their number.
+    Raises ValueError for invalid TOML. Also raises ValueError for too many nested brackets or dotted names, because the
+    parser's memory grows with the square of their number.
 
     >>> toml_table("a.b = 1")
     {'a': {'b': 1}}
@@ -164,7 +166,9 @@ def toml_table(text: str) -> dict[str, Any]:
 
 
 def toml_text(table: Mapping[str, Any]) -> str:
-    """Return the TOML text of a table of texts, numbers, True, False, lists and tables, which `toml_table` reads.
+    """Return a table as TOML text, which `toml_table` reads.
+
+    The values are texts, numbers, True, False, lists and tables.
 
     >>> print(toml_text({"name": "a", "wind": {"speed_mps": 4.0}, "zones": [{"radius_m": 1e3}]}))
     name = "a"
@@ -180,7 +184,7 @@ def toml_text(table: Mapping[str, Any]) -> str:
 
 
 def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
-    """Yield the lines of a table: its values first, then the tables in it.
+    """Yield the lines of a table: first its values, then the tables that it contains.
 
     path: keys of the table, () for the whole text.
     """
@@ -198,17 +202,17 @@ def _toml_lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str
 
 
 def _is_list_of_tables(value: Any) -> bool:
-    """Return True for a list that contains a table; such a list may contain only tables."""
+    """Return True for a list that contains tables; such a list must not contain anything else."""
     return isinstance(value, list) and any(isinstance(item, Mapping) for item in value)
 
 
 def _toml_key(key: str) -> str:
-    """Return a key as TOML, in quotes if it needs them."""
+    """Return a key in TOML syntax, in quotes if necessary."""
     return key if _BARE_KEY.fullmatch(key) else _toml_value(key)
 
 
 def _toml_value(value: Any) -> str:
-    """Return a text, a number, True, False or a list of these as TOML."""
+    """Return a text, a number, True, False or a list of these in TOML syntax."""
     if isinstance(value, list):
         return f"[{', '.join(map(_toml_value, value))}]"
     # JSON's texts, numbers, true and false are TOML's, but for the control character that JSON leaves as it is.
@@ -218,7 +222,7 @@ def _toml_value(value: Any) -> str:
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
     r"""Decode a file's bytes to text without a byte order mark.
 
-    Raises ``error``, with line and byte, if they are not UTF-8.
+    Raises ``error``, with line and byte, if the bytes are not UTF-8.
 
     >>> from world.errors import MissionError
     >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)
@@ -235,7 +239,7 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
 
 
 def did_you_mean(name: str, known_names: Iterable[str], folder: Path | None = None) -> str:
-    """Return the end of a message about an unknown name: the most similar known name, or "".
+    """Return a suggestion for an unknown name, as the end of a message; "" if no known name is similar.
 
     folder: folder of files with these names, for the message.
 
@@ -264,8 +268,8 @@ def did_you_mean(name: str, known_names: Iterable[str], folder: Path | None = No
 def write_atomically(path: Path, data: str | bytes) -> None:
     """Write a file completely or not at all, by renaming a temporary file next to it.
 
-    Text is written in UTF-8.  A target that is a link stays a link: the file that it leads to is replaced.  Raises
-    OSError, which names the target, and leaves the old file.
+    Text is written in UTF-8. If the target is a link, the file to which it leads is replaced. Raises OSError, which
+    names the target; the old file then stays unchanged.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -291,10 +295,10 @@ def write_atomically(path: Path, data: str | bytes) -> None:
 
 
 def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[str] | None = None) -> None:
-    """Make a folder with files, completely or not at all.
+    """Make a folder with files, either completely or not at all.
 
     files: content of each file, by its path within the folder.
-    kept_names: entries of an existing folder that are kept when the folder is replaced; None to replace no folder.
+    kept_names: entries of an existing folder to keep when the folder is replaced; None to refuse an existing folder.
     Raises OSError, which names the folder; no partly written folder is left.
 
     >>> from tempfile import TemporaryDirectory
@@ -332,7 +336,7 @@ def _resolve_link(link: Path) -> Path:
 
 @contextlib.contextmanager
 def temporary_folder(prefix: str) -> Iterator[Path]:
-    """Make a folder among the system's temporary files, and remove it with its contents at the end.
+    """Make a temporary folder, and remove it with its contents at the end of the block.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     _ = (folder / "notes").write_text("gone soon")
@@ -346,7 +350,9 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process_id: int) -> bool:
-    """Remove the folders that a killed process made by `temporary_folder`; return True if there were none.
+    """Remove the temporary folders of a killed process; return True if there are none left.
+
+    They are folders that the process made by `temporary_folder`.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()
@@ -362,10 +368,10 @@ def remove_temporary_folders(process_id: int) -> bool:
 
 @contextlib.contextmanager
 def lock_path(path: Path) -> Iterator[None]:
-    """Lock an existing file or folder for this process, until the end of the block.
+    """Lock an existing file or folder for this process until the end of the block.
 
-    The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
-    lock, and OSError if the file cannot be opened.
+    The operating system releases the lock when the process ends for any reason. Raises PlanflyError if another process
+    holds the lock, and OSError if the file cannot be opened.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder, lock_path(Path(folder)):

@@ -58,7 +58,7 @@ def _make_projection(origin: GeoOrigin) -> "Proj":
 
 
 def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[Floats, Floats]:
-    """Convert geodetic positions in degrees to east and north in metres, in arrays of the same shape.
+    """Convert latitudes and longitudes in degrees to east and north in metres, arrays of the same shape.
 
     >>> east, north = to_map(GeoOrigin(46.0, 8.0), [46.0, 46.01], [8.01, 8.0])
     >>> east.round(1).tolist(), north.round(1).tolist()
@@ -70,7 +70,7 @@ def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[F
 
 
 def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats, Floats]:
-    """Convert map positions in metres to latitude and longitude in degrees, in arrays of the same shape.
+    """Convert east and north in metres to latitude and longitude in degrees, arrays of the same shape.
 
     >>> lat, lon = to_geo(GeoOrigin(46.0, 8.0), 0.0, 10_000.0)
     >>> float(lat.round(6)), float(lon.round(6))
@@ -82,7 +82,9 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
 
 
 def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
-    """Convert geodetic positions in degrees to a plane in which every area is that on WGS84, x and y in metres.
+    """Convert latitudes and longitudes in degrees to a plane in which areas equal those on WGS84.
+
+    The results are x and y, m.
 
     >>> x, y = to_equal_area(GeoOrigin(0.0, 8.0), np.array([0.0, 90.0]), np.array([188.0, 8.0]))
     >>> bool(abs(4.0 * abs(x[0] * y[1]) / 5.10065621724e14 - 1.0) < 1e-9)
@@ -94,9 +96,9 @@ def to_equal_area(origin: GeoOrigin, lat_deg: Floats, lon_deg: Floats) -> tuple[
 
 
 def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Transform both coordinates of points with pyproj, and keep their shape.
+    """Transform the coordinates of points with pyproj without changing their shape.
 
-    With NumPy before 2.4, which warns of it, pyproj treats an array of one point as a scalar and loses its shape.
+    With NumPy before 2.4, pyproj treats an array of one point as a scalar, so its shape is lost and NumPy warns.
 
     >>> transform_points(lambda x, y: (x + 1.0, y), np.array([1.0]), np.array([2.0]))
     (array([2.]), array([2.]))
@@ -109,10 +111,10 @@ def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tup
 
 
 def crs_transformer(crs: str) -> "Transformer":
-    """Return the transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
+    """Return a transformer from WGS84 longitude and latitude (degrees) to the horizontal part of a CRS.
 
-    Heights must not be transformed with it: without a geoid grid PROJ silently returns them unchanged.
-    Raises ValueError for a CRS that PROJ does not know.
+    Heights must not be transformed with it, because PROJ without a geoid grid silently returns them unchanged. Raises
+    ValueError for a CRS that PROJ does not know.
     """
     from pyproj import CRS, Transformer
     from pyproj.exceptions import ProjError
@@ -124,9 +126,9 @@ def crs_transformer(crs: str) -> "Transformer":
 
 
 def height_unit(crs: str) -> tuple[str, float]:
-    """Return the name of a CRS's unit of height and its length, m.
+    """Return the name of a CRS's height unit, and the length of this unit, m.
 
-    The unit is ("metre", 1) for a CRS without heights. Raises ValueError for a CRS that PROJ does not know.
+    The result is ("metre", 1) for a CRS without heights. Raises ValueError for a CRS that PROJ does not know.
     """
     from pyproj import CRS
     from pyproj.exceptions import ProjError
@@ -180,15 +182,16 @@ class PolyMap:
         object.__setattr__(self, "record", locked[0])
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-        """Return both components of the map at positions, each in the common shape of x and y."""
+        """Return both components of the map at positions, in the common shape of x and y."""
         xs, ys = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         components = _evaluate_polymap(self.record, xs.ravel(), ys.ravel())
         return components[0].reshape(xs.shape), components[1].reshape(xs.shape)
 
     def to_rows(self) -> Floats:
-        """Return the polynomial as rows of numbers, (2 + 2n, n), as stored in a log; `from_rows` reads them.
+        """Return the polynomial as rows of numbers, (2 + 2n, n), as a log stores it; `from_rows` reads them.
 
-        Row 0 starts with the centre, row 1 with the half-widths; the coefficients of u and of v follow.
+        Row 0 starts with the centre, and row 1 with the half-widths. Then come the n rows of the coefficients of u, and
+        those of v.
         """
         record, size = self.record, int(self.record["size"])
         rows = np.zeros((2 + 2 * size, size))
@@ -207,7 +210,7 @@ class PolyMap:
 def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
     """Make a record of `POLYMAP`.
 
-    u, v: coefficients of both components, (n, n) each.
+    u, v: coefficients of the two components of the map, (n, n) each.
     """
     size = len(u)
     record = np.zeros(1, dtype=POLYMAP)[0]
@@ -221,10 +224,12 @@ def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> P
 def fit_polymap(
     function: Callable[[Floats, Floats], tuple[Floats, Floats]], bounds: ArrayLike, tolerance: float
 ) -> PolyMap:
-    """Fit a polynomial to ``function`` over ``bounds`` [[x0, x1], [y0, y1]] to within ``tolerance``.
+    """Fit a polynomial to a function over a rectangle, to within a tolerance.
 
-    The degree increases from 1 to 9 until the largest error at points between the fitted nodes is within the tolerance.
-    The best polynomial is returned even if its error is larger; see its residual.
+    bounds: the rectangle, [[x0, x1], [y0, y1]].
+
+    The degree is increased from 1 to 9 until the largest error at points between the fitted nodes is within the
+    tolerance. If no degree is sufficient, the best polynomial is returned; its residual is its largest error.
 
     >>> copy = fit_polymap(lambda x, y: (x * y, x + y), [[0.0, 2.0], [0.0, 4.0]], 1e-9)
     >>> u, v = copy(1.0, 3.0)

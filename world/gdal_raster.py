@@ -50,7 +50,7 @@ def open_geotiff(file: Path, _name: str) -> RasterFile:
 
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
-    """Open an SRTM tile, whose name gives its position. Raises TerrainError."""
+    """Open an SRTM tile, whose file name gives its position. Raises TerrainError."""
     expected = "expected a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights"
     return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile; {expected}")
 
@@ -63,7 +63,7 @@ def open_dataset(file: Path, driver: str) -> Any:
 
 
 def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
-    """Open and check a file with one GDAL driver.
+    """Open a file with one GDAL driver, and check it.
 
     failure_text: beginning of the message if GDAL cannot open the file.
 
@@ -102,14 +102,17 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
 
 
 def first_error_line(error: BaseException) -> str:
-    """Return the first error of a chain of causes as one line; the last error only refers to earlier ones."""
+    """Return the first error in a chain of causes, in one line.
+
+    Later errors only refer to earlier ones.
+    """
     while error.__cause__ is not None:
         error = error.__cause__
     return one_line(error)
 
 
 def _check_layout(file: Path, source: Any) -> None:
-    """Raise TerrainError unless the file has one band of real numbers in blocks that can be unpacked.
+    """Raise TerrainError unless the file has one band of real numbers, in blocks that fit into memory.
 
     A block has at most `MAX_BLOCK_PIXELS` pixels.
     """
@@ -125,14 +128,14 @@ def _check_layout(file: Path, source: Any) -> None:
 
 
 def _raise_unplaced(file: Path) -> NoReturn:
-    """Raise TerrainError for a file without georeferencing."""
+    """Raise TerrainError, because a file has no georeferencing."""
     auxiliary_file = file.with_name(f"{file.name}.aux.xml")
     unread_text = f" in the file itself; {auxiliary_file.name} is not read" if auxiliary_file.exists() else ""
     raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread_text}", file=file)
 
 
 def _read_crs(file: Path, driver: str, source: Any) -> str | None:
-    """Read the reference system of an open file as WKT; None if it has none."""
+    """Read the reference system of an open file as WKT; None if the file states none."""
     import rasterio
 
     if source.crs is None:
@@ -145,9 +148,10 @@ def _read_crs(file: Path, driver: str, source: Any) -> str | None:
 
 
 def _stated_height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
-    """Return the unit of a file's heights: that of its band, or feet if a tag says so; "" if not stated.
+    """Return the unit of a file's heights: the unit of its band, or feet if a tag says so; "" if not stated.
 
-    GDAL treats the tags of other programs as remarks, and would report such heights as metres although they are feet.
+    GDAL ignores the tags of other programs. Without this function, heights in feet with such a tag would be read as
+    metres.
     """
     for key, value in tags:
         if (
@@ -162,9 +166,9 @@ def _stated_height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
 def _make_raster_file(
     file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any
 ) -> RasterFile:
-    """Make a raster file from its georeferencing.
+    """Make a raster file from an open file's georeferencing.
 
-    Raises TerrainError, also if its heights are not in metres.
+    Raises TerrainError, also if the heights are not in metres.
     """
     a, b, c, d, e, f = grid
     determinant = a * e - b * d
@@ -182,7 +186,7 @@ def _make_raster_file(
     middle_longitude = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
 
     def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        """Convert longitudes and latitudes (deg) to fractional columns and rows of pixel centres."""
+        """Convert longitudes and latitudes (deg) to fractional columns and rows, counted between pixel centres."""
         x, y = (
             np.asarray(coordinates)
             for coordinates in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
@@ -193,7 +197,7 @@ def _make_raster_file(
         return col - 0.5, row - 0.5
 
     def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
-        """Convert fractional columns and rows of pixel centres to longitudes and latitudes (deg)."""
+        """Convert fractional columns and rows, counted between pixel centres, to longitudes and latitudes (deg)."""
         pixel_x, pixel_y = col + 0.5, row + 0.5
         x, y = a * pixel_x + b * pixel_y + c, d * pixel_x + e * pixel_y + f
         lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
@@ -212,7 +216,10 @@ def _make_raster_file(
 
 
 def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
-    """Read the heights of a window (top, bottom, left, right) in strips of rows; NaN for missing data."""
+    """Read the heights of a window in strips of rows; NaN for missing data.
+
+    window: top, bottom, left, right, in rows and columns.
+    """
     top, bottom, left, right = window
     heights = np.empty((bottom - top, right - left), dtype=np.float32)
     rows_at_once = max(1, PIXELS_AT_ONCE // (right - left))
@@ -226,11 +233,11 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set the heights in blocks that a GeoTIFF omits to NaN.
+    """Set heights to NaN in those blocks that a GeoTIFF omits.
 
     top, left: first row and column of ``heights`` in the file.
 
-    GDAL reads 0 there if no nodata value is stated.
+    GDAL reads 0 in an omitted block if the file states no nodata value.
     """
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
@@ -244,7 +251,7 @@ def clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: i
 
 
 def _block_bytes(source: Any, block_row: int, block_column: int) -> tuple[int, int] | None:
-    """Return the bytes [begin, end) of a block of an open GeoTIFF; None for a block never written."""
+    """Return the bytes [begin, end) that a block occupies in a GeoTIFF; None for a block never written."""
     offset, size = (
         source.get_tag_item(f"BLOCK_{tag}_{block_column}_{block_row}", "TIFF", bidx=1) for tag in ("OFFSET", "SIZE")
     )
@@ -252,7 +259,7 @@ def _block_bytes(source: Any, block_row: int, block_column: int) -> tuple[int, i
 
 
 def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
-    """Yield the bytes [begin, end) of each block of a GeoTIFF that a window touches.
+    """Yield the bytes [begin, end) that each block of a window occupies in a GeoTIFF.
 
     window: top, bottom, left, right.
     """
@@ -274,7 +281,7 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
 
 
 def geotiff_bytes(values: NDArray[np.float32], grid: Grid, crs: str, nodata: float, unit: str = "m") -> bytes:
-    """Return the bytes of a GeoTIFF of heights or other values, compressed with deflate.
+    """Return a GeoTIFF of heights or other values as bytes, compressed with deflate.
 
     values: (rows, columns), rows from north to south.
     crs: a definition that PROJ accepts.

@@ -17,7 +17,7 @@ MIN_RANGE_M = 1.0
 
 
 def turning_angles(waypoints: ArrayLike) -> Floats:
-    """Return the course change at each inner waypoint, rad in [0, pi], shape (..., w - 2) (paper eq. 1).
+    """Return the course change at each inner waypoint, rad in [0, pi], (..., w - 2) (paper eq. 1).
 
     waypoints: (..., w, 3) metres; altitudes are ignored.
     A leg with no horizontal length has no course and gives no turn.
@@ -97,7 +97,7 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Return the distance from a waypoint at which a fly-by arc leaves its leg, R tan(turn / 2), m.
+    """Return the distance from the waypoint at which a fly-by arc leaves its leg, R tan(turn / 2), m.
 
     turn: rad, from 0 to below pi.
     radius: m.
@@ -111,7 +111,7 @@ def tangent_length(turn: float, radius: float) -> float:
 
 
 def fly_by_offset(turn: float, radius: float) -> float:
-    """Return the distance at which a fly-by arc passes its waypoint, R (1 / cos(turn / 2) - 1), m.
+    """Return the distance between a waypoint and its fly-by arc, R (1 / cos(turn / 2) - 1), m.
 
     turn: rad, from 0 to below pi.
     radius: m.
@@ -130,8 +130,11 @@ def wrap(angle: float) -> float:
 
 @inlined
 def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    """Return the course change at b on the path a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
-    ux, uy, vx, vy = bx - ax, by - ay, cx - bx, cy - by
+    """Return the course change at b on the path a, b, c, rad in [0, pi] (paper eq. 1, by atan2)."""
+    ux = bx - ax
+    uy = by - ay
+    vx = cx - bx
+    vy = cy - by
     # + 0.0 for a leg without length: see `signed_turns`.
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
@@ -143,9 +146,9 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
     a, b, centre: (3,) m.
     radius: m.
 
-    Returns the smallest distance from the segment to the centre, m, and the fractions of the segment at which it enters
-    and leaves the sphere, in [0, 1]; both are 0 if the segment stays outside. A point on the surface is inside (paper
-    eq. 9: d <= R).
+    Returns the smallest distance from the segment to the centre, m, and the fractions (0..1) of the segment at which it
+    enters and leaves the sphere. Both fractions are 0 if the segment stays outside. A point on the surface counts as
+    inside (paper eq. 9: d <= R).
     """
     length2 = 0.0
     dot = 0.0
@@ -170,12 +173,14 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
 
 @inlined
 def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale: float) -> tuple[float, float]:
-    """Return the fraction of the segment a-b inside a sphere, and the segment's exposure to its centre.
+    """Return the fraction of the segment a-b that is inside a sphere, and the segment's exposure.
 
-    The exposure is the mean of (scale/d)^4 over the whole segment, with 0 outside the sphere, for the distance d from
-    the centre. Exact: with perpendicular distance h (at least `MIN_RANGE_M`) and path coordinate s from the closest
-    point, the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3). The exposure follows the paper's eq.
-    9 and 10, as a density along the path instead of a sum over six points.
+    The exposure is the mean of (scale/d)^4 over the whole segment, where d is the distance from the centre and the
+    value is 0 outside the sphere. It follows the paper's eq. 9 and 10, but as a density along the path instead of a sum
+    over six points.
+
+    The result is exact. With the perpendicular distance h (at least `MIN_RANGE_M`) and the path coordinate s from the
+    closest point, the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).
     """
     _, begin_fraction, end_fraction = sphere_window(a, b, centre, radius)
     if end_fraction <= begin_fraction:
@@ -196,12 +201,12 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
 def window_exposure(
     begin_fraction: float, end_fraction: float, length2: float, dot: float, start2: float, scale: float
 ) -> float:
-    """Return the exposure of the part of a segment between two fractions, averaged over the whole segment.
+    """Return the exposure of a part of a segment, averaged over the whole segment.
 
     length2: squared length of the segment, m^2.
     dot: dot product of the segment's vector and the vector from the centre to the segment's start.
     start2: squared distance of the start from the centre, m^2.
-    scale: see `segment_exposure`, also for the formula.
+    scale: see `segment_exposure`, which also states the formula.
     """
     if length2 < 1e-12:
         return (end_fraction - begin_fraction) * scale**4 / max(start2, MIN_RANGE_M * MIN_RANGE_M) ** 2

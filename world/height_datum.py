@@ -40,7 +40,7 @@ class HeightDatum:
 
 
 def is_above_ellipsoid(crs: str) -> bool:
-    """Return True if a reference system's heights are above an ellipsoid; False without heights.
+    """Return True if the heights of a reference system are above an ellipsoid; False without heights.
 
     >>> is_above_ellipsoid("EPSG:4979"), is_above_ellipsoid("EPSG:4326+5773"), is_above_ellipsoid("EPSG:4326")
     (True, False, False)
@@ -61,7 +61,7 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
     crs: the file's reference system, or None if unknown.
     stated_datum: datum stated by the user, a `NamedDatum` or a number, which overrides the file's; None if not stated.
 
-    Raises ValueError for heights above an ellipsoid without an installed grid of a geoid, and for depths.
+    Raises ValueError for depths, and for heights above an ellipsoid if no geoid grid is installed.
     """
     if stated_datum is not None and not isinstance(stated_datum, str):
         return HeightDatum(
@@ -93,7 +93,10 @@ def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Flo
     """
 
     def heights(lon: Floats, lat: Floats) -> Floats:
-        """Return minus the converted ellipsoidal height 0 at longitudes and latitudes (deg), m."""
+        """Return the geoid's height above the ellipsoid at longitudes and latitudes (deg), m.
+
+        It is minus the height above the geoid of a point on the ellipsoid.
+        """
         _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
         return -np.asarray(negated_heights, dtype=np.float64)
 
@@ -102,7 +105,7 @@ def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Flo
 
 @cache
 def _find_geoid() -> tuple[str, Any]:
-    """Find the first geoid with an installed grid; return its name and the conversion to heights above it."""
+    """Find the first geoid whose grid is installed; return its name and the conversion to heights above it."""
     from pyproj import Transformer
     from pyproj.transformer import TransformerGroup
 
@@ -117,7 +120,7 @@ def _find_geoid() -> tuple[str, Any]:
 
 
 def _is_depth(crs: str) -> bool:
-    """Return True if a reference system has depths, which are positive downwards."""
+    """Return True if a reference system states depths, which are positive downwards."""
     from pyproj import CRS
 
     return any(axis.direction == "down" for axis in CRS.from_user_input(crs).axis_info)

@@ -20,7 +20,7 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell_side: flo
     west, south: outer corner of the first cell, m.
     cell_side: side of a cell, m.
 
-    Rows go north, columns east. The value is NaN for a cell that is partly without data.
+    Rows go north, columns east. The value is NaN for a cell in which any data is missing.
 
     >>> from world.terrain import make_gridded_terrain
     >>> line = np.arange(-100.0, 101.0, 50.0)
@@ -38,7 +38,10 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell_side: flo
 def _fill_cells(
     heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float, max_heights: Floats
 ) -> None:
-    """Set `max_heights` to the highest ground on the sides of each cell and at the pixels inside it."""
+    """Set `max_heights` to the highest ground of each cell.
+
+    It is the highest ground on the sides of a cell and at the pixels inside it.
+    """
     rows, columns = max_heights.shape
     start, end = np.zeros(3), np.zeros(3)
     for i in range(rows + 1):
@@ -67,7 +70,7 @@ def _fill_cells(
 
 @inner
 def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
-    """Raise the value of cell (i, j) to ``height`` if that is higher or NaN.
+    """Raise the value of cell (i, j) to a height, if the height is larger or NaN.
 
     A cell outside the array is ignored.
     """
@@ -88,7 +91,10 @@ def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south
     col, row = polymap(to_pixel, west, south)
     east_col, east_row = polymap(to_pixel, west + cell_side, south)
     north_col, north_row = polymap(to_pixel, west, south + cell_side)
-    east_col, east_row, north_col, north_row = east_col - col, east_row - row, north_col - col, north_row - row
+    east_col = east_col - col
+    east_row = east_row - row
+    north_col = north_col - col
+    north_row = north_row - row
     area = east_col * north_row - north_col * east_row
     first_row = math.ceil(row + min(0.0, east_row) + min(0.0, north_row))
     last_row = math.floor(row + max(0.0, east_row) + max(0.0, north_row))

@@ -5,7 +5,7 @@ from html import escape
 
 
 def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
-    """Return the HTML of a table under a title; all text is escaped, so that no name is read as HTML.
+    """Return a table under a title as HTML; all text is escaped, so that a name cannot contain HTML.
 
     head: names of the columns, if any.
 

@@ -53,7 +53,7 @@ _state = _State()
 
 
 def interrupt(number: int, _frame: FrameType | None = None) -> None:
-    """Handle a signal by raising `Interrupted`, immediately or at the end of a `delay_signals` block.
+    """Raise `Interrupted` for a signal, at once or at the end of a `delay_signals` block.
 
     >>> import signal
     >>> try:
@@ -87,7 +87,7 @@ class delay_signals:
         _state.depth += 1
 
     def __exit__(self, *_: object) -> None:
-        """Raise `Interrupted` at the end of the outermost block if a signal arrived in the block."""
+        """Raise `Interrupted` at the end of the outermost block if a signal arrived during the block."""
         _state.depth -= 1
         if _state.pending_signal and not _state.depth:
             number, _state.pending_signal = _state.pending_signal, 0
@@ -98,8 +98,8 @@ class delay_signals:
 def remove_at_end(path: Path) -> Iterator[None]:
     """Register a temporary file or folder, and remove it at the end of the block.
 
-    `remove_temporary_paths` removes registered paths. A folder that cannot be removed at the end, because another
-    process still writes in it, stays registered.
+    `remove_temporary_paths` removes all registered paths. A folder stays registered if it cannot be removed at the end
+    of the block because another process still writes into it.
 
     >>> with remove_at_end(Path("never-made")):
     ...     pass
@@ -114,7 +114,7 @@ def remove_at_end(path: Path) -> Iterator[None]:
 
 
 def remove_temporary_paths() -> bool:
-    """Remove all registered temporary files and folders, for a process that must end at once.
+    """Remove all registered temporary files and folders, in a process that must end at once.
 
     Returns True if all are removed.
 
@@ -137,11 +137,11 @@ def _remove_path(path: Path) -> bool:
 
 @contextlib.contextmanager
 def children_ignore_sigint() -> Iterator[None]:
-    """Block SIGINT in child processes that are started in this block.
+    """Block SIGINT in the child processes that are started in this block.
 
-    Ctrl-C reaches child processes too, but their parent ends them.  This process receives a SIGINT that arrives in the
-    block at the end of the block.  Use it with `delay_signals`: if another signal interrupts the start, the child waits
-    for its task and ends with a traceback.
+    Ctrl-C also reaches child processes, but their parent has to end them. If a SIGINT arrives during the block, this
+    process receives it at the end of the block. Use `delay_signals` around this block, because a child whose start is
+    interrupted by another signal waits for its task and ends with a traceback.
 
     >>> from multiprocessing import Process
     >>> with children_ignore_sigint():
@@ -166,9 +166,11 @@ def children_ignore_sigint() -> Iterator[None]:
 
 
 def end_with_parent(detects_parent_end: threading.Event | None = None) -> None:
-    """Make this child process end at once on SIGTERM and with its parent, and remove its temporary files.
+    """Make this child process end at once on SIGTERM, and when its parent ends.
 
-    detects_parent_end: event that is set once the process detects by itself that its parent has ended.
+    Its temporary files are then removed.
+
+    detects_parent_end: event that becomes set once the process detects by itself that its parent has ended.
 
     >>> import multiprocessing
     >>> child = multiprocessing.get_context("spawn").Process(target=end_with_parent)
@@ -194,7 +196,7 @@ def _end_process(number: int, _frame: FrameType | None = None) -> None:
 
 
 def end_children(children: Sequence["BaseProcess"], patience: float = CHILD_TIMEOUT_S) -> None:
-    """End processes: SIGTERM to all, and after ``patience`` s SIGKILL to the remaining ones.
+    """End processes: send SIGTERM to all, and SIGKILL after ``patience`` s to those that still run.
 
     >>> end_children([])
     """

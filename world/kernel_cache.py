@@ -26,7 +26,7 @@ _IMPORT = re.compile(rb"((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import
 
 
 def kernel_sources(root: Path) -> dict[str, bytes]:
-    """Return the contents of all source files of kernels, by their paths below the folder of the packages.
+    """Return the contents of all source files that define kernels, by path below the packages' folder.
 
     >>> files = kernel_sources(Path(__file__).parents[1])
     >>> "world/terrain.py" in files, "logs/views/report/page.py" in files
@@ -45,7 +45,10 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
 
 
 def _imported_paths(content: bytes) -> list[str]:
-    """Return the paths of modules that a source may import; an imported name may also be a module."""
+    """Return the paths of modules that a source may import.
+
+    An imported name may be a module, too.
+    """
     paths = []
     # Splitting takes a tenth of the time of a search for lines that begin with "from".
     for match in filter(None, map(_IMPORT.match, (b"\n" + content).split(b"\nfrom ")[1:])):
@@ -76,7 +79,7 @@ _PREFIX = "kernels-"
 
 
 def versioned_folder(base: Path, root: Path) -> Path:
-    """Return the subfolder of `base` for the kernels compiled from the sources below `root`.
+    """Return the subfolder of `base` for kernels compiled from the sources below `root`.
 
     If `base` is already such a subfolder, or this process's temporary folder, it is returned unchanged.
 
@@ -101,10 +104,10 @@ def can_write(folder: Path) -> bool:
 
 
 def usable_folder(preferred_folder: Path) -> Path | None:
-    """Return the preferred folder for compiled kernels if it can be written, or else a temporary folder.
+    """Return the preferred folder for compiled kernels if it is writable, or else a temporary folder.
 
-    A temporary folder serves this process and its children, and is removed at exit.  Returns None if no folder can be
-    written.
+    The temporary folder is used by this process and its children, and removed at exit. Returns None if no folder is
+    writable.
     """
     if can_write(preferred_folder):
         return preferred_folder

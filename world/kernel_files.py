@@ -34,7 +34,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
         return None if name is None else _read_checked(self._folder / name, repr(key))
 
     def save(self, key: Any, data: Any) -> None:
-        """Save a compiled form.  A kernel that cannot be saved is compiled again by the next process."""
+        """Save a compiled form; if this fails, the next process compiles the kernel again."""
         with contextlib.suppress(OSError):
             forms = self._load_index()
             if key not in forms:
@@ -58,16 +58,16 @@ class CheckedCacheFiles(IndexDataCacheFile):
 
 
 def use_checked_files(dispatcher: Any) -> None:
-    """Let a kernel that numba caches use files with a digest, `CheckedCacheFiles`."""
+    """Make numba cache a kernel in files with a digest, `CheckedCacheFiles`."""
     cache = dispatcher._cache
     cache_file = cache._cache_file
     cache._cache_file = CheckedCacheFiles(cache.cache_path, cache._impl.filename_base, cache_file._source_stamp)
 
 
 def _read_checked(path: Path, label: str) -> Any:
-    """Return the object in a file, or None if its digest does not match or it cannot be read.
+    """Return the object in a file; None if the file cannot be read or its digest does not match.
 
-    label: text that is part of the digest.
+    label: text that is included in the digest.
     """
     try:
         content = path.read_bytes()

@@ -40,7 +40,7 @@ class CacheWriteLock:
         listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
     def _track_depth(self, step: int) -> None:
-        """Count how often this thread holds the compiler; release the file lock once the compiler is released."""
+        """Count how often this thread holds the compiler lock, and release the file lock with the last release."""
         state = self._thread_state
         state.depth = getattr(state, "depth", 0) + step
         if step < 0 and state.depth < getattr(state, "lock_depth", 0):
@@ -48,7 +48,10 @@ class CacheWriteLock:
             os.close(state.handle)
 
     def _acquire(self) -> None:
-        """Acquire the lock; continue without it if the folder has no locks, or after `LOCK_TIMEOUT_S`."""
+        """Acquire the file lock.
+
+        Continue without it if the folder does not support locks, or after `LOCK_TIMEOUT_S`.
+        """
         state = self._thread_state
         if getattr(state, "lock_depth", 0):
             return

@@ -40,7 +40,7 @@ class _CompileListener(event.Listener):
     """Listener that reports and times the compilation of kernels that are not in numba's cache."""
 
     def on_start(self, event: Any) -> None:
-        """Report a kernel before it is compiled."""
+        """Report a kernel before its compilation."""
         COMPILE_TIMER.begin()
         announce_compilation()
 
@@ -57,7 +57,7 @@ if _usable_folder is not None:
 def cache_folder() -> Path:
     """Return the folder of compiled kernels: `PREFERRED_FOLDER`, or a temporary folder.
 
-    A temporary folder is used if the preferred folder cannot be written.
+    The temporary folder is used if the preferred folder is not writable.
 
     >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
     True
@@ -66,9 +66,10 @@ def cache_folder() -> Path:
 
 
 def compiled(kernel: _Kernel) -> _Kernel:
-    """Compile a function of numbers, arrays and records to machine code on first use, and keep it.
+    """Compile a function of numbers, arrays and records to machine code at its first call.
 
-    A division by zero gives infinity or NaN, as in numpy: checking for it takes a tenth of the guidance's time.
+    The machine code is cached. A division by zero gives infinity or NaN, as in numpy, because a check would take a
+    tenth of the time of the guidance.
 
     The function must be defined in a file, as `world.terrain.steepest_slopes` is:
 
@@ -90,10 +91,10 @@ def compiled_inline(kernel: _Kernel) -> _Kernel:
 
 
 def inner(kernel: _Kernel) -> _Kernel:
-    """Compile a function for calls by other kernels, without its Python wrapper.
+    """Compile a function that only other kernels call, without a wrapper for Python.
 
-    The wrapper takes a seventh of the time to compile a kernel.  Tests may still call the function: a wrapper is then
-    compiled and kept separately.
+    The wrapper would take a seventh of the compile time of a kernel. Tests may still call the function; a wrapper is
+    then compiled and cached separately.
 
     >>> from world.airspace.zone_kernels import box_distance
     >>> callable(box_distance)
@@ -105,9 +106,9 @@ def inner(kernel: _Kernel) -> _Kernel:
 def inlined(kernel: _Kernel) -> _Kernel:
     """Compile a function as `inner` does, and let LLVM inline it into the kernels that call it.
 
-    A call passes seven numbers per array and increments its reference count, which is more work than many kernels do
-    themselves. The planner's graded scores take a quarter longer with calls only. Inlined by numba (`inline="always"`)
-    the function would run no faster, but each copy would be typed and translated again.
+    A call passes seven numbers for each array, and increments the array's reference count. Many kernels do less work
+    than that. Without inlining the planner's graded scores take a quarter longer. Numba's own inlining
+    (`inline="always"`) would not be faster, but numba would type and translate each copy again.
     """
     return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
 
@@ -130,7 +131,10 @@ class _InnerKernel:
 
     @functools.cached_property
     def dispatcher(self) -> Any:
-        """Numba's dispatcher, made when a kernel that calls it is compiled; cached kernels contain it already."""
+        """Numba's dispatcher.
+
+        It is made when a kernel that calls this one is compiled; a cached kernel already contains its machine code.
+        """
         return _make_dispatcher(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
 
     @functools.cached_property
@@ -143,7 +147,7 @@ class _InnerKernel:
         return str(vars(self)["__qualname__"])
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the function from Python through the wrapper; without a wrapper the process would crash."""
+        """Call the function from Python through its wrapper; a call without the wrapper would crash."""
         return self._wrapper(*arguments)
 
 
@@ -151,9 +155,9 @@ class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states 
     """Numba's type of an inner function, which has one compiled form for all literal numbers of a type."""
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """Return numba's call type without literals.
+        """Return numba's call type with literal numbers replaced by their types.
 
-        With literals, numba would compile the function again for each literal number.
+        Otherwise numba would compile the function again for each literal number.
         """
         plain_types = tuple(numba.types.unliteral(argument_type) for argument_type in args)
         return super().get_call_type(context, plain_types, {name: numba.types.unliteral(kws[name]) for name in kws})
@@ -171,7 +175,7 @@ def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
 def copy_into(target: NDArray[Any], values: NDArray[Any]) -> None:
     """Copy numbers (n,) into an array, or part of one, of the same length, which is not checked.
 
-    Numba's ``out[:] = values`` checks the length, and compiles its error message with Unicode handling into each
+    Numba's ``out[:] = values`` checks the length. It would compile the error message, with Unicode handling, into each
     kernel.
 
     >>> out = np.zeros(2)
@@ -185,7 +189,9 @@ def copy_into(target: NDArray[Any], values: NDArray[Any]) -> None:
 
 @inner
 def sort_few(values: NDArray[Any]) -> None:
-    """Sort a few numbers (n,) in place by insertion, which compiles a second faster than numba's own sort.
+    """Sort a few numbers (n,) in place by insertion.
+
+    This compiles a second faster than numba's own sort.
 
     >>> some = np.array([3.0, 1.0, 2.0])
     >>> sort_few(some)
@@ -203,8 +209,8 @@ def sort_few(values: NDArray[Any]) -> None:
 def read_only(array: _Array) -> _Array:
     """Return a view of the array that cannot be written.
 
-    Numba compiles a kernel once for writable arrays and once for read-only arrays.  This function gives a kernel that
-    would be called with both only read-only arrays.
+    Numba compiles a kernel separately for writable and for read-only arrays. With this function a kernel gets only
+    read-only arrays, and is compiled once.
 
     >>> read_only(np.zeros(2)).flags.writeable
     False
@@ -217,7 +223,7 @@ def read_only(array: _Array) -> _Array:
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
     """Make the type of a record whose fields are attributes, in Python and in compiled code.
 
-    entries: fields in order, each the name of a float64, or (name, type) or (name, type, shape) as in numpy.
+    entries: fields in order. Each is the name of a float64, or (name, type) or (name, type, shape) as in numpy.
 
     >>> POINT = record_dtype("east", "north", ("leg", np.int64), ("velocity", np.float64, (3,)))
     >>> points = np.zeros(2, POINT)

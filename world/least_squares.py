@@ -20,8 +20,8 @@ def least_squares(basis: Floats, values: Floats) -> Floats:
     basis: (n, k).
     values: (n,).
 
-    By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6). The coefficient of
-    a column that depends linearly on earlier columns, to 1e-6 of the longest column, is 0.
+    The method is modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6). A
+    column that depends linearly on earlier columns, to within 1e-6 of the longest column, gets the coefficient 0.
 
     >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
     [1.0, 2.0]

@@ -13,7 +13,7 @@ from world.threats import Threats, threat_label
 
 
 def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
-    """Return the east and north coordinates that a table states, in m or degrees, converted to m."""
+    """Return the east and north coordinates in a table, m; degrees are converted."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
     east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
@@ -21,12 +21,11 @@ def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, flo
 
 
 def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
-    """Return the position that a table states: east, north, altitude AMSL, (3,) m.
+    """Return the position that a table states, (3,) m: east, north, altitude AMSL.
 
     key, source: names of the table and its file in messages.
 
-    A stated height above ground is added to the terrain height. Raises ScenarioError if there is no terrain to add it
-    to.
+    A stated height above ground is added to the terrain height. Raises ScenarioError if there is no terrain.
     """
     east, north = map_coordinates(table, origin)
     if table.amsl_m is not None:
@@ -45,7 +44,7 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
 
 
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: GeoOrigin) -> None:
-    """Raise ScenarioError for a position outside the area, with its distance from the area.
+    """Raise ScenarioError, with the distance from the area, for a position outside an area.
 
     point: (2,) or (3,) m.
     bounds: area, (2, 2) m.
@@ -62,13 +61,13 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: 
 
 
 def _area_text(bounds: Floats, origin: GeoOrigin) -> str:
-    """Return the range of latitudes and longitudes of an area, (2, 2) m, as text."""
+    """Return the latitudes and longitudes of an area, (2, 2) m, as text."""
     lat, lon = to_geo(origin, bounds[0, [0, 1, 0, 1]], bounds[1, [0, 0, 1, 1]])
     return f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
 
 
 def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: float, ground: Terrain | None) -> None:
-    """Raise ScenarioError for a start or destination outside the altitudes of the area, or in the ground.
+    """Raise ScenarioError for a start or destination in the ground, or above or below the area's altitudes.
 
     key, source: names of the point and its file in messages.
     point: (3,) m.
@@ -82,7 +81,10 @@ def check_altitude(key: str, point: Floats, source: str, floor: float, ceiling: 
 
 
 def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | None) -> None:
-    """Raise ScenarioError for a point (3,) that is not above the terrain; unknown terrain raises no error."""
+    """Raise ScenarioError for a point (3,) that is not above the terrain.
+
+    A point above unknown terrain is accepted.
+    """
     ground_height = float(ground.height(point[0], point[1])) if ground is not None else math.nan
     if point[2] <= ground_height:
         allowed = f"not above the terrain, which is at {ground_height:.0f} m"
@@ -92,8 +94,8 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
     """Convert the threats of a scenario file to threats on the map.
 
-    A threat without a height is on the ground. Raises ScenarioError for a threat that states no altitude AMSL, at a
-    position without terrain.
+    A threat without a height is on the ground. Raises ScenarioError for a threat without an altitude AMSL at a position
+    without terrain.
     """
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):

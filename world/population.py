@@ -63,7 +63,9 @@ class Population:
 
 
 def density_band(density: float) -> int:
-    """Return the number of a density's band, from 0 below 5 people per km2 to 5 from 50,000 people per km2.
+    """Return the number of a population density's band.
+
+    Band 0 is below 5 people per km2, band 5 is from 50,000 people per km2.
 
     >>> density_band(4.9), density_band(5.0), density_band(60_000.0)
     (0, 1, 5)
@@ -127,7 +129,7 @@ def read_population(file: Path, unit: PopulationUnit, origin: GeoOrigin, area: B
 
 
 def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
-    """Raise PlanflyError unless an open file has one band of numbers, a position on Earth, and a unit of people."""
+    """Raise PlanflyError unless a file has one band of numbers, a position on Earth, and people as its unit."""
     number_kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or number_kind not in "iuf":
         allowed = "a population raster has 1 band of numbers"
@@ -145,7 +147,7 @@ def _check_source(file: Path, source: Any, unit: PopulationUnit) -> None:
 
 
 def _check_densities(file: Path, window: "_Window", densities: Floats, is_inside: Flags, unit: PopulationUnit) -> None:
-    """Raise PlanflyError if a cell in the area has an impossible number of people."""
+    """Raise PlanflyError if a cell in the area has an implausible number of people."""
     is_bad = is_inside & ((densities < 0.0) | (densities > _MAX_DENSITY_PER_KM2))
     if not is_bad.any():
         return
@@ -199,7 +201,7 @@ class _Window:
         in_degrees = is_geographic(wkt)
 
         def to_raster(points: Floats) -> Floats:
-            """Convert positions on the map, (n, 2), to coordinates of the raster's reference system."""
+            """Convert map positions, (n, 2), to coordinates in the raster's reference system."""
             lat, lon = to_geo(origin, points[:, 0], points[:, 1])
             x, y = transformer.transform(lon, lat)
             return np.column_stack([longitude_near(np.asarray(x), middle_longitude) if in_degrees else x, y])
@@ -244,7 +246,7 @@ class _Window:
         return values
 
     def touched_cells(self) -> Flags:
-        """Return True for each cell that the area touches, (rows, columns)."""
+        """Return a mask of the cells that the area touches, (rows, columns)."""
         from rasterio.features import geometry_mask
 
         return np.asarray(
@@ -272,7 +274,7 @@ class _Window:
         return float(lat[0]), float(longitude_near(float(lon[0]), 0.0))
 
     def cover_text(self) -> str:
-        """Return the latitudes and longitudes that the raster covers, for messages."""
+        """Return the range of latitudes and longitudes that the raster covers, as text."""
         rows, columns = self.source_shape
         x, y = _transformed(self.source_transform, np.array([0, columns, 0, columns]), np.array([0, 0, rows, rows]))
         lon, lat = (np.asarray(values) for values in self.transformer.transform(x, y, direction="INVERSE"))
@@ -281,7 +283,7 @@ class _Window:
         return f"the file covers latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
     def density_bands(self, densities: Floats) -> tuple[tuple[int, BaseGeometry], ...]:
-        """Return the areas on the map with densities in each band, the lowest first."""
+        """Return the parts of the area with densities in each band, lowest band first."""
         from rasterio.features import shapes
 
         bands = np.searchsorted(DENSITY_LIMITS_PER_KM2, densities, side="right").astype(np.int16)
@@ -290,7 +292,7 @@ class _Window:
             areas.setdefault(int(band), []).append(shapely.geometry.shape(outline))
 
         def to_plane(points: Floats) -> Floats:
-            """Convert coordinates of the raster's reference system, (n, 2), to positions on the map."""
+            """Convert coordinates in the raster's reference system, (n, 2), to map positions."""
             lon, lat = self.transformer.transform(points[:, 0], points[:, 1], direction="INVERSE")
             return np.column_stack(to_map(self.origin, lat, lon))
 

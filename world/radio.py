@@ -62,14 +62,14 @@ class RadioLink:
 
 
 def station_position(table: LinkTable | None, origin: GeoOrigin) -> tuple[float, float] | None:
-    """Return the position of the ground station's antenna that a scenario's [link] table states, m, or None."""
+    """Return the position of the ground station's antenna in a scenario's [link] table, m, or None."""
     if table is None or (table.east_m is None and table.lat_deg is None):
         return None
     return map_coordinates(table, origin)
 
 
 def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: Terrain | None) -> RadioLink | None:
-    """Convert a scenario's [link] table to a radio link; return None if there is no table.
+    """Convert a scenario's [link] table to a radio link; None without a table.
 
     Raises ScenarioError for a station at a position with unknown ground.
     """
@@ -100,7 +100,7 @@ def free_space_loss(distance: float, frequency: float) -> float:
 def knife_edge_loss(diffraction_parameter: float) -> float:
     """Return the loss of a knife edge, dB (ITU-R P.526-15, equation 31).
 
-    diffraction_parameter: without unit, positive if the edge is above the ray (equation 26).
+    diffraction_parameter: dimensionless; positive if the edge is above the ray (equation 26).
 
     >>> round(knife_edge_loss(0.0), 2), knife_edge_loss(-1.0)
     (6.03, 0.0)
@@ -112,7 +112,7 @@ def knife_edge_loss(diffraction_parameter: float) -> float:
 
 
 def earth_bulge(distance: Floats, length: float) -> Floats:
-    """Return the height of the Earth's curve above the straight line between two places, m.
+    """Return the height by which the curved Earth rises above a straight line between two places, m.
 
     distance: distances from one of the places, m.
     length: distance between the places, m.
@@ -124,9 +124,9 @@ def earth_bulge(distance: Floats, length: float) -> Floats:
 
 
 def line_of_sight(terrain: Terrain, station: Floats, aircraft: Floats) -> bool | None:
-    """Return True if the straight line between two antennas is clear of the ground; None if the ground is unknown.
+    """Return True if the straight line between two antennas is clear of the ground; None if unknown.
 
-    The ground is interpolated bilinearly, raised by the bulge of the Earth, and compared exactly, not sampled.
+    The ground is interpolated bilinearly and raised by the bulge of the Earth. It is compared exactly, not at samples.
 
     station, aircraft: positions of the antennas, (3,) m.
     """
@@ -166,7 +166,9 @@ class PathLoss(NamedTuple):
 
 
 def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathProfile:
-    """Sample the ground between two antennas at the spacing of the terrain; an aircraft above the station has none.
+    """Return the ground profile between two antennas, sampled at the spacing of the terrain.
+
+    An aircraft straight above the station has no profile.
 
     station, aircraft: positions of the antennas, (3,) m.
     """
@@ -180,7 +182,7 @@ def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathPro
 
 
 def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: float, frequency: float) -> PathLoss:
-    """Return the radio loss between two antennas over a ground profile; NaN if the ground is unknown.
+    """Return the radio loss between two antennas over a ground profile, dB; NaN if the ground is unknown.
 
     station_altitude, aircraft_altitude: altitudes of the antennas, m AMSL.
     frequency: Hz.
@@ -208,7 +210,7 @@ def _bullington_loss(
     aircraft_altitude: float,
     wavelength: float,
 ) -> float:
-    """Return the diffraction loss of a profile, dB (ITU-R P.526-15, section 4.5.1).
+    """Return the diffraction loss of a ground profile, dB (ITU-R P.526-15, section 4.5.1).
 
     excess: (n,) height of the ground over the straight line between the antennas, m.
     """
@@ -250,7 +252,7 @@ class LinkPoints(NamedTuple):
 
 
 def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> LinkPoints:
-    """Compute the radio link between a station and each position of the aircraft.
+    """Compute the radio link between a ground station and each position of the aircraft.
 
     station: antenna, (3,) m.
     positions: (t, 3) m; the aircraft's antenna is at least `MIN_AIRCRAFT_HEIGHT_M` above ground.
@@ -269,13 +271,16 @@ def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: F
 
 
 def link_margins(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> Floats:
-    """Compute only the margin of `link_points` at positions (t, 3), m, in half of the time; dB, (t,)."""
+    """Return only the margins of `link_points` at positions (t, 3) m, dB, (t,).
+
+    This takes half of the time of `link_points`.
+    """
     losses = _path_losses(link, terrain, station, _aircraft_antennas(terrain, positions))[:, 0]
     return np.asarray(link.allowed_loss - losses)
 
 
 def _aircraft_antennas(terrain: Terrain, positions: Floats) -> Floats:
-    """Return positions (t, 3), m, raised to `MIN_AIRCRAFT_HEIGHT_M` above known ground."""
+    """Return positions (t, 3), m, raised to `MIN_AIRCRAFT_HEIGHT_M` above the ground where the ground is known."""
     antennas = np.array(positions, dtype=np.float64)
     lowest = terrain.height(antennas[:, 0], antennas[:, 1]) + MIN_AIRCRAFT_HEIGHT_M
     antennas[:, 2] = np.fmax(antennas[:, 2], lowest)
@@ -283,7 +288,7 @@ def _aircraft_antennas(terrain: Terrain, positions: Floats) -> Floats:
 
 
 def _path_losses(link: RadioLink, terrain: Terrain, station: Floats, antennas: Floats) -> Floats:
-    """Return the fields of `PathLoss` between a station and each antenna (t, 3), m, as rows (t, 3)."""
+    """Return the fields of `PathLoss` for the station and each antenna (t, 3), m, as rows (t, 3)."""
     losses = [
         path_loss(path_profile(terrain, station, antenna), float(station[2]), float(antenna[2]), link.frequency)
         for antenna in antennas

@@ -99,8 +99,8 @@ _SHIPPED_TILE_TOLERANCE_DEG = 1e-5
 def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz file of heights. Raises TerrainError.
 
-    The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The order
-    within each pair does not matter, except in the tile that planfly ships: see `_corrected_edges`.
+    The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The two
+    values of a pair may be in any order, except in the tile that planfly ships; see `_corrected_edges`.
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":
@@ -111,11 +111,12 @@ def open_npz(file: Path, name: str) -> RasterFile:
 
 
 def _corrected_edges(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
-    """Return the west, east, south and north edges, deg, from a file's xmin, xmax, ymin and ymax.
+    """Return the west, east, south and north edges (deg) from a file's xmin, xmax, ymin and ymax.
 
     stated_edges: xmin, xmax, ymin, ymax.
 
-    Correct the edges of the tile that planfly ships: its ymin lies one tile height north of its ymax, not south of it.
+    The edges of the tile that planfly ships are corrected, because its ymin lies one tile height north of its ymax
+    instead of south of it.
     """
     west, east = sorted(stated_edges[:2])
     south, north = sorted(stated_edges[2:])
@@ -132,7 +133,7 @@ def _corrected_edges(stated_edges: list[float], rows: int) -> tuple[float, float
 
 
 def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
-    """Return the heights as stored in the file, and xmin, xmax, ymin, ymax."""
+    """Return the heights in a file, and its xmin, xmax, ymin and ymax."""
     edge_keys = ("xmin", "xmax", "ymin", "ymax")
     try:
         with zipfile.ZipFile(file) as archive:
@@ -172,8 +173,8 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     base: folder of relative paths.
     datum: vertical datum of the heights; None for the datum that the file states.
 
-    Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`, and for
-    heights above an ellipsoid that this machine cannot convert.
+    Raises TerrainError for anything but a file of one band in one of `world.elevation_formats.FORMATS`. Also raises
+    TerrainError for heights above an ellipsoid if no geoid grid is installed to convert them.
 
     >>> open_raster("jacksboro").shape
     (344, 403)
@@ -262,8 +263,8 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     bounds: area, [[e0, e1], [n0, n1]] m.
     buffer: width of the buffer, m.
 
-    Ground beyond the tile, and ground without data, is unknown: `require_covered` and `require_no_holes` refuse it.
-    Raises TerrainError if no ground in the area is known, or if it has too many pixels.
+    Ground is unknown beyond the tile and where the tile has no data. `require_covered` and `require_no_holes` refuse
+    such ground. Raises TerrainError if no ground in the area is known, or if it has too many pixels.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -310,7 +311,10 @@ def _no_data_error(raster: RasterFile) -> TerrainError:
 
 
 def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) -> None:
-    """Raise TerrainError if an area [[e0, e1], [n0, n1]], m, extends beyond the outer pixel centres of the tile."""
+    """Raise TerrainError if an area extends beyond the outer pixel centres of a raster.
+
+    bounds: area, [[e0, e1], [n0, n1]] m.
+    """
     box = np.asarray(bounds, dtype=np.float64)
     if not is_covered(raster, origin, box):
         raise TerrainError(
@@ -323,7 +327,7 @@ def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) ->
 
 
 def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
-    """Return True if the tile covers a map box [[e0, e1], [n0, n1]], m.
+    """Return True if a raster covers a box on the map, [[e0, e1], [n0, n1]] m.
 
     >>> raster = open_raster("jacksboro")
     >>> is_covered(raster, raster.centre, np.array([[0.0, 14_000.0], [0.0, 1.0]]))
@@ -337,11 +341,12 @@ def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
 
 
 def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
-    """Convert the heights of a window to heights above mean sea level, in place.
+    """Convert the heights in a window to heights above mean sea level, in place.
 
     top, left: first row and column of the window in the file.
-    Mean sea level is sampled at points so close together that it is nearly a plane between them.
-    Raises TerrainError if mean sea level is not known there.
+
+    Mean sea level is sampled at points so close together that it is nearly a plane between them. Raises TerrainError if
+    mean sea level is unknown in the window.
     """
     if raster.datum.sea_level is None:
         return
@@ -368,14 +373,17 @@ def _convert_to_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
 
 
 def _pixels_per_metre(to_pixel: PolyMap, box: Floats) -> Floats:
-    """Return columns and rows per metre of the map, (2, 2), in the centre of a box."""
+    """Return columns and rows per metre of the map at the centre of a box, (2, 2)."""
     centre = box.mean(axis=1)
     col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
     return np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
 
 
 def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
-    """Raise TerrainError if a height inside an area [[e0, e1], [n0, n1]], m, depends on a pixel without data."""
+    """Raise TerrainError if a height in an area depends on a pixel without data.
+
+    bounds: area, [[e0, e1], [n0, n1]] m.
+    """
     box = np.asarray(bounds, dtype=np.float64)
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:
@@ -404,7 +412,10 @@ def require_no_holes(terrain: Terrain, bounds: ArrayLike) -> None:
 def _outline_window(
     raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
-    """Return the columns and rows that a map box and a buffer around it cover: col0, col1, row0, row1."""
+    """Return the columns and rows that cover a box on the map and a buffer around it.
+
+    The result is col0, col1, row0, row1.
+    """
     ramp = np.linspace(0.0, 1.0, 41)
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
@@ -416,14 +427,14 @@ def _outline_window(
 def _to_window_pixels(
     to_pixels: PixelMap, origin: GeoOrigin, east: Floats, north: Floats, left: int, top: int
 ) -> tuple[Floats, Floats]:
-    """Convert map positions to columns and rows relative to a window's first pixel."""
+    """Convert map positions to columns and rows, counted from a window's first pixel."""
     lat, lon = to_geo(origin, east, north)
     col, row = to_pixels(lon, lat)
     return np.asarray(col) - left, np.asarray(row) - top
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Return the largest upright map box inside the tile: [[e0, e1], [n0, n1]] m.
+    """Return the largest box on the map inside a raster, [[e0, e1], [n0, n1]] m.
 
     Its sides run east and north, and its size is found to within half a percent. Raises TerrainError if no box fits.
 
@@ -449,7 +460,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 def cover_text(raster: RasterFile) -> str:
-    """Return the tile's range of latitudes and longitudes as text, for messages.
+    """Return the range of latitudes and longitudes of a raster, as text.
 
     >>> cover_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'

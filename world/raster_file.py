@@ -55,10 +55,10 @@ class RasterFile:
 
     @property
     def centre(self) -> GeoOrigin:
-        """Middle of the smallest and largest latitude and longitude of the outer pixel centres; longitude in -180..180.
+        """Middle between the smallest and largest latitude and longitude of the outer pixel centres.
 
-        This also holds for a tile that lies across the 180th meridian.  The centre of a projected grid is some metres
-        away from it.
+        The longitude is in -180..180, also for a tile that lies across the 180th meridian. The centre of a projected
+        grid differs from this position by some metres.
         """
         lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
         lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
@@ -66,7 +66,7 @@ class RasterFile:
 
 
 def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return a mask: True for heights (m) of ground, False for NaN and values that mark missing data.
+    """Return a mask: True for heights (m) of ground, False for NaN and for values that mark missing data.
 
     >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
     [False, True, False]
@@ -81,7 +81,7 @@ def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
 
 
 def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
-    """Return the columns and rows of points along the outline of a raster's pixel centres, (84,) each."""
+    """Return columns and rows of 84 points along the outline of a raster's pixel centres, (84,) each."""
     fractions = np.linspace(0.0, 1.0, 21)
     zeros, ones = np.zeros(21), np.ones(21)
     col = np.concatenate([fractions, fractions, zeros, ones]) * (cols - 1)
@@ -90,7 +90,7 @@ def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
 
 
 def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
-    """Return the grid with its first pixel shifted by ``rows`` and ``cols``.
+    """Return a grid whose first pixel is moved by ``rows`` and ``cols``.
 
     >>> shift_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
     (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)

@@ -102,9 +102,9 @@ class RemoteFile:
                     time.sleep(_PAUSE * 2.0**attempt)
 
     def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
-        """Fetch [begin, end) into the copy, or the whole file from a server without range requests.
+        """Fetch [begin, end) into the copy; fetch the whole file if the server has no range requests.
 
-        Raises _IncompleteAnswer, with the received bytes kept, and errors of the connection.
+        Raises errors of the connection, and _IncompleteAnswer; the bytes received so far are kept.
         """
         headers = {"Range": f"bytes={begin}-{end - 1}"} | ({"If-Range": self.version} if self.version else {})
         with _open_url(self.url, headers) as answer:
@@ -118,7 +118,10 @@ class RemoteFile:
                 raise _IncompleteAnswer(f"bytes {begin}-{end - 1} were requested, and the server sent {sent_range}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
-                position, digest, start_time, is_slow = begin, sha256(), time.monotonic(), False
+                position = begin
+                digest = sha256()
+                start_time = time.monotonic()
+                is_slow = False
                 # read1 returns the bytes received so far, because read would wait for hours for a slow server.
                 while position < end and not is_slow and (chunk := answer.read1(min(_CHUNK_BYTES, end - position))):
                     file.write(chunk)
@@ -141,7 +144,7 @@ class RemoteFile:
                 raise _IncompleteAnswer(f"{position - begin:,} of {end - begin:,} bytes were received")
 
     def clear_copy(self) -> None:
-        """Replace the copy by an empty file of the same size, without parts. Raises OSError."""
+        """Replace the copy by an empty file of the same size, which contains no parts. Raises OSError."""
         _notes_path(self.copy).unlink(missing_ok=True)
         self.parts = {}
         # A new file, so that another process that reads the old one can go on.
@@ -151,7 +154,7 @@ class RemoteFile:
 
 
 def find_remote(url: str, folder: Path) -> RemoteFile | None:
-    """Find a file on a server; return it with its local copy, or None if the server has no such file.
+    """Find a file on a server; return it with its local copy, or None if the server does not have it.
 
     folder: cache folder for the copies.
     Raises TerrainError if the server cannot be reached, and OSError if the cache cannot be written.
@@ -193,7 +196,7 @@ class _TimedHead(http.client.HTTPConnection):
     """Connection whose answer's head must arrive in time; a socket's timeout starts again with each byte."""
 
     def getresponse(self) -> http.client.HTTPResponse:
-        """Return the answer after its head has arrived. Raises OSError if the head does not arrive in time."""
+        """Return the server's answer once its head has arrived. Raises OSError if the head does not arrive in time."""
         is_late = threading.Event()
 
         def shut_down_connection() -> None:
@@ -235,7 +238,7 @@ class _HttpsHandler(urllib.request.HTTPSHandler):
 
 @cache
 def _make_opener() -> urllib.request.OpenerDirector:
-    """Make an opener for http and https only, also for redirects."""
+    """Make an opener that allows only http and https, also after a redirect."""
     opener = urllib.request.OpenerDirector()
     for handler in (
         urllib.request.ProxyHandler,
@@ -293,7 +296,7 @@ def _notes_path(copy: Path) -> Path:
 
 
 def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
-    """Return the parts of a copy whose digests match its notes; an empty mapping if the notes are damaged."""
+    """Return the parts of a copy that match the digests in its notes; an empty mapping for damaged notes."""
     try:
         entries = json.loads(_notes_path(copy).read_text(encoding="ascii"))
         parts = {(int(part_begin), int(part_end)): str(digest) for part_begin, part_end, digest in entries}

@@ -28,7 +28,7 @@ class RunningClock:
         self._seconds = 0.0
 
     def __call__(self) -> float:
-        """Return the running time of this process since the clock was made, s."""
+        """Return the time for which this process has run since the clock was made, s."""
         now = self._real()
         self._seconds += min(max(now - self._last, 0.0), MAX_STEP_S)
         self._last = now

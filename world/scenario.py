@@ -77,7 +77,7 @@ _Class = TypeVar("_Class")
 
 
 def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
-    """Decorate a class: wrong arguments raise an ArgumentError that names `planfly.make_scenario`."""
+    """Decorate a class so that wrong arguments raise an ArgumentError that names `planfly.make_scenario`."""
     initialise = scenario_class.__init__
 
     @wraps(initialise)
@@ -155,9 +155,13 @@ class Scenario:
             object.__setattr__(self, name, array)
 
     def wind_velocity(self, position: Sequence[float], seconds: float = 0.0) -> tuple[float, float]:
-        """Return the mean wind at a position (east, north, up, m) and time (s after take-off), m/s, east and north.
+        """Return the mean wind at a position and a time, m/s, east and north.
 
-        The wind of a forecast is along true east and north, and a stated wind along the map's axes.
+        position: east, north, up, m.
+        seconds: time after take-off, s.
+
+        The components of a forecast's wind are along true east and north, those of a stated wind along the axes of the
+        map.
 
         >>> windy = with_wind(load_scenario("tight"), 5.0, math.radians(270.0), None)
         >>> windy.wind_velocity((0.0, 0.0, 75.0))
@@ -176,21 +180,24 @@ class Scenario:
 
     @property
     def geo_map(self) -> PolyMap | None:
-        """Map from east and north (m) to longitude and latitude (deg), which a forecast needs; None without one."""
+        """Map from east and north (m) to longitude and latitude (deg); None without a forecast, which needs it."""
         if self.wind.field is None:
             return None
 
         def to_near_geo(east: Floats, north: Floats) -> tuple[Floats, Floats]:
-            """Return longitude and latitude; the longitude does not jump at 180 degrees."""
+            """Return longitude and latitude (deg); the longitude does not jump at 180 degrees."""
             latitudes, longitudes = to_geo(self.origin, east, north)
             return self.origin.lon_deg + (longitudes - self.origin.lon_deg + 180.0) % 360.0 - 180.0, latitudes
 
         return fit_polymap(to_near_geo, self.bounds, _GEO_TOLERANCE_DEG)
 
     def local_wind(self, position: Sequence[float], seconds: float) -> Wind:
-        """Return the mean profile of the wind around a position (east, north, up, m) at a time (s after take-off).
+        """Return the mean profile of the wind around a position at a time.
 
-        Without a forecast, it is the scenario's wind.
+        position: east, north, up, m.
+        seconds: time after take-off, s.
+
+        Without a forecast, the result is the scenario's wind.
         """
         if self.wind.field is None:
             return self.wind
@@ -209,7 +216,7 @@ class Scenario:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on zones changed or omitted on reading, on inactive zones, and on implausibly small threats."""
+        """Notes on zones that were changed or omitted, on inactive zones, and on implausibly small threats."""
         notes = [*(self.spec.zone_notes or ()), *self._small_threat_notes()]
         timed_tables = [table for table in self.spec.zones or () if table.times]
         if timed_tables and self.spec.at is None:
@@ -228,7 +235,7 @@ class Scenario:
         return tuple(notes)
 
     def _small_threat_notes(self) -> list[str]:
-        """Return a note on the threats whose radius is implausibly small, perhaps because it is not in metres."""
+        """Return a note on threats whose radius is implausibly small, and perhaps not in metres."""
         threats = self.threats
         small_radii = [
             f"the {kind} radius of {name} is {radius:g} m"
@@ -265,7 +272,7 @@ class Scenario:
         return html_table(f"Scenario {self.name}", rows)
 
     def _flight_rows(self) -> list[tuple[str, str]]:
-        """Return the rows of the table for notebooks about aircraft, autopilot and the corridor of the verdict."""
+        """Return the rows of the notebook's table about aircraft, autopilot and corridor."""
         flight, steering = self.flight, self.flight.steering
         corridor = self.limits.corridor_m
         airspeed = "the aircraft's" if flight.airspeed_mps is None else f"{flight.airspeed_mps:g} m/s"
@@ -306,7 +313,7 @@ class Scenario:
 
 @cache
 def embedded_scenarios() -> dict[str, ScenarioFile]:
-    """Return the checked files of the scenarios that ship with planfly, by name, in a fixed order.
+    """Return the checked files of the scenarios that planfly ships, by name, in a fixed order.
 
     >>> embedded_scenarios()["tight"].limits.min_clearance_m
     60.0
@@ -322,7 +329,7 @@ def embedded_scenarios() -> dict[str, ScenarioFile]:
 def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     """Read a scenario by its built-in name or from a TOML file.
 
-    terrain: elevation file that replaces the scenario's terrain; None to keep that terrain.
+    terrain: elevation file that replaces the scenario's terrain; None to keep the scenario's terrain.
     Raises ScenarioError for a file that is missing or has a fault, and TerrainError for its elevation file.
 
     >>> scenario = load_scenario("tight")
@@ -349,7 +356,10 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
 
 
 def _sibling_toml_files(missing_file: Path) -> list[str]:
-    """List the .toml files in the folder of a missing file, as paths relative or absolute like its path."""
+    """Return the .toml files in the folder of a missing file.
+
+    Their paths are relative or absolute like the path of the missing file.
+    """
     try:
         return [str(file) for file in sorted(missing_file.parent.glob("*.toml"))]
     except OSError:
@@ -357,7 +367,7 @@ def _sibling_toml_files(missing_file: Path) -> list[str]:
 
 
 def embedded_names() -> list[str]:
-    """Return the names of the scenarios that ship with planfly, the default first.
+    """Return the names of the scenarios that planfly ships; the default is first.
 
     >>> embedded_names()[0]
     'jacksboro'
@@ -377,14 +387,15 @@ def scenario_from_spec(
     external: bool = False,
     is_stored: bool = False,
 ) -> Scenario:
-    """Make a scenario from a checked file, or from the data of `Scenario.to_json`.
+    """Make a scenario from a checked scenario file, or from the data of `Scenario.to_json`.
 
     source: name of the file in messages.
     base: folder of relative paths.
     terrain: an elevation file that replaces the scenario's own.
     ground: terrain that is already loaded (from a log).
     external: see `Scenario`.
-    is_stored: True for the scenario of a log, whose wind has the mean profile of its forecast: no forecast is read.
+    is_stored: True for the scenario of a log. Its wind already has the mean profile of the forecast, so the forecast is
+        not read.
     Raises ScenarioError, TerrainError and ForecastError as `load_scenario` does.
 
     >>> again = scenario_from_spec(load_scenario("tight").to_json(), "a plan")
@@ -433,7 +444,9 @@ def scenario_from_spec(
 
 
 def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
-    """Return a scenario's file with absolute paths of the aircraft's folder, the parameter file and the forecast.
+    """Return a scenario file's data with absolute paths.
+
+    The paths are those of the aircraft's folder, the parameter file and the forecast.
 
     base: folder of relative paths.
     """
@@ -448,11 +461,11 @@ def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
 
 
 def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
-    """Return a scenario's file with its terrain replaced by an elevation file and its map origin kept.
+    """Return a scenario file's data with another terrain and the same map origin.
 
     terrain: path of the elevation file.
 
-    A scenario without a stated origin has the centre of the replaced tile as its origin, which is then stated.
+    Without a stated origin, the origin is the centre of the replaced elevation file, and it is then stated in the data.
     """
     changes: dict[str, Any] = {
         "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "terrain"),
@@ -468,9 +481,9 @@ def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path |
 def _with_file_zones(
     spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
-    """Return a scenario's file with those zones of zone files that are near its area.
+    """Return a scenario file's data with the zones of its zone files.
 
-    A note states how many zones are omitted.
+    Zones that are not near the scenario's area are omitted; a note states their number.
     """
     if not file_zones.zones and not file_zones.notes:
         return spec
@@ -494,9 +507,9 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file; return it and the [terrain] table that identifies it.
+    """Open a scenario's elevation file; return it and a [terrain] table that identifies it.
 
-    The table has its absolute path and SHA-256.
+    The table has the file's absolute path and SHA-256.
     """
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
     path_text = ", ".join(paths)
@@ -521,7 +534,7 @@ def _assemble_scenario(
     external: bool,
     replaced: bool,
 ) -> Scenario:
-    """Make a scenario from its file, map and terrain.
+    """Make a scenario from the data of its file, its map and its terrain.
 
     replaced: True if the scenario's own terrain was replaced.
     """
@@ -574,7 +587,7 @@ def _assemble_scenario(
 def _read_terrain_of_area(
     raster: RasterFile, origin: GeoOrigin, bounds: Floats, station: tuple[float, float] | None
 ) -> Terrain:
-    """Read the terrain of a scenario's area, and on to the ground station of its link if it stands elsewhere.
+    """Read the terrain of a scenario's area and, if it lies outside, up to the ground station of its link.
 
     station: position of the link's antenna, m; None for a link without one.
     Raises TerrainError if the area extends beyond the elevation file.
@@ -584,7 +597,10 @@ def _read_terrain_of_area(
 
 
 def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: tuple[float, float] | None) -> Floats:
-    """Return an area that also holds a position, m, (2, 2); the same area if the position is beyond the file."""
+    """Return an area that is extended to contain a position, m, (2, 2).
+
+    If the elevation file does not cover the position, the area is returned unchanged.
+    """
     if position is None:
         return bounds
     point = np.array(position)
@@ -597,10 +613,10 @@ def _box_with(raster: RasterFile, origin: GeoOrigin, bounds: Floats, position: t
 
 
 def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenario:
-    """Return a scenario whose terrain reaches to a position, m, if its elevation file has data there.
+    """Return a scenario whose terrain extends to a position, m, if its elevation file has data there.
 
-    The scenario itself is returned if its ground there is known, or if its terrain is not from an elevation file.
-    Raises TerrainError or ScenarioError for a file that cannot be read or that has changed.
+    The scenario itself is returned if its terrain already covers the position, or if its terrain is not from an
+    elevation file. Raises TerrainError or ScenarioError for a file that cannot be read or that has changed.
     """
     terrain, table = scenario.terrain, scenario.spec.terrain
     if terrain is None or table.kind != "dem" or math.isfinite(float(terrain.height(*position))):
@@ -658,9 +674,9 @@ def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
 
 
 def with_amsl_endpoints(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
-    """Return a scenario's JSON data with the altitudes of start and destination in m AMSL.
+    """Return a scenario's JSON data in which start and destination have altitudes AMSL.
 
-    start, destination: (3,) m, altitude AMSL. The altitude replaces a height above ground (`height_m`).
+    start, destination: (3,) m, altitude AMSL. An altitude AMSL replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
     >>> with_amsl_endpoints(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
@@ -675,9 +691,9 @@ def with_amsl_endpoints(spec: dict[str, Any], start: Floats, destination: Floats
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
-    """Return a scenario in another wind; None keeps the present value.
+    """Return a scenario with another wind; None keeps the present value.
 
-    speed, from_course: m/s, and direction that the wind blows from, rad; they only apply together.
+    speed, from_course: speed, m/s, and direction that the wind blows from, rad; either both or neither is given.
     turbulence: "none", "light" or "moderate".
 
     Raises ScenarioError for a wind that is not allowed in a scenario file.
@@ -709,10 +725,10 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 
 
 def with_forecast(scenario: Scenario, forecast: str, source: str = "") -> Scenario:
-    """Return a scenario in the wind of a weather forecast, from the scenario's time of flight on.
+    """Return a scenario with the wind of a weather forecast, which begins at the scenario's time of flight.
 
     forecast: file that `world.forecast.read_forecast` reads.
-    source: beginning of messages about the value.
+    source: beginning of messages about the file.
 
     Without a time of flight, the scenario has no wind until `with_flight_time` states one.
     Raises ForecastError for a file that cannot be used, or that does not cover the start and the destination.
@@ -725,7 +741,10 @@ def with_forecast(scenario: Scenario, forecast: str, source: str = "") -> Scenar
 
 
 def without_forecast(scenario: Scenario) -> Scenario:
-    """Return a scenario without its forecast, in the forecast's mean profile; unchanged if it has none."""
+    """Return a scenario whose wind is the mean profile of its forecast, without the forecast itself.
+
+    A scenario without a forecast is returned unchanged.
+    """
     table = scenario.spec.wind
     if table.forecast is None:
         return scenario
@@ -743,7 +762,7 @@ def forecast_of_scenario(scenario: Scenario) -> Forecast:
 
 
 def _with_forecast_wind(scenario: Scenario) -> Scenario:
-    """Return the scenario with the wind of the forecast that its file names, if it states the time of flight.
+    """Return the scenario with the wind of its forecast, if it names a forecast and states a time of flight.
 
     Raises ForecastError.
     """
@@ -753,7 +772,7 @@ def _with_forecast_wind(scenario: Scenario) -> Scenario:
 
 
 def in_forecast_member(scenario: Scenario, forecast: Forecast, member: int) -> Scenario:
-    """Return a scenario in the wind of a member of its forecast, from the scenario's time of flight on.
+    """Return a scenario with the wind of one member of its forecast, from the time of flight on.
 
     Raises ForecastError if the forecast does not cover the start and the destination at this time.
     """
@@ -789,8 +808,8 @@ def with_link(scenario: Scenario, **entries: Any) -> Scenario:
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     """Return a scenario with changed entries of [flight]; None keeps the present value.
 
-    A guidance law replaces an autopilot and its parameters, and an autopilot or parameters replace a guidance law.
-    Raises ScenarioError for a value that is not allowed in a scenario file.
+    A given guidance law replaces the autopilot and its parameters. A given autopilot, or given parameters, replace the
+    guidance law. Raises ScenarioError for a value that is not allowed in a scenario file.
 
     >>> with_flight(load_scenario("tight"), airspeed_mps=28.0, nav=None).flight.airspeed_mps
     28.0
@@ -808,7 +827,7 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
 
 
 def without_ground_phases(scenario: Scenario) -> Scenario:
-    """Return a scenario without launch and landing: its flights begin and end in the air.
+    """Return a scenario without launch and landing, whose flights begin and end in the air.
 
     >>> field = without_ground_phases(load_scenario("jacksboro-field"))
     >>> field.launch, field.landing, "landing" in field.to_json()
@@ -821,13 +840,14 @@ def without_ground_phases(scenario: Scenario) -> Scenario:
 
 
 def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
-    """Return a scenario with additional zones, if they are near its area.
+    """Return a scenario with additional zones; zones far from its area are left out.
 
     source: name of the zones in messages.
     notes: notes on reading their file.
 
     Raises ScenarioError for an invalid shape, for a level above ground without terrain, and for more zones than a
-    scenario may have; also for a zone that an end violates, except in an external scenario.
+    scenario may have. Also raises ScenarioError if the start or the destination violates a zone, except in an external
+    scenario.
 
     >>> mast = ZoneTable(name="mast", kind="exclusion", east_m=1300.0, north_m=400.0, radius_m=200.0)
     >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
@@ -876,13 +896,13 @@ def with_threats(
 ) -> Scenario:
     """Return a scenario with additional threats.
 
-    added_threats: values of each by the keys of [[threats]].
+    added_threats: values of each threat, by the keys of [[threats]].
     source: name of the threats in messages.
     preceding: tables to insert before the added threats.
 
-    The ratio of a scale that is not given to its radius is the median of the scenario's threats, or a quarter for kill
-    and a third for detection. Raises ScenarioError for a threat that is not allowed in a scenario file, and for one on
-    the ground outside the terrain data.
+    A scale that is not given follows from its radius. The ratio of scale to radius is then the median ratio of the
+    scenario's threats, or by default a quarter for kill and a third for detection. Raises ScenarioError for a threat
+    that is not allowed in a scenario file, and for a threat on the ground outside the terrain data.
 
     >>> threat = {"east_m": 1300.0, "north_m": 90.0, "kill_radius_m": 20.0}
     >>> more = with_threats(load_scenario("tight"), [threat], "--threat")
@@ -891,7 +911,7 @@ def with_threats(
     """
 
     def scale_ratio(radius: Floats, scale: Floats, default: float) -> float:
-        """Return the median ratio of scale to radius, or a default without any radius."""
+        """Return the median ratio of scale to radius; the default if there is no radius."""
         has_radius = radius > 0.0
         return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 

@@ -99,9 +99,9 @@ def make_draft(
     raster: elevation file; None for flat ground.
     terrain: path of that file as the scenario file states it.
 
-    The area extends about a third of the line's length beyond the line on all sides, clipped to the elevation file's
-    data. Raises ArgumentError for positions that are outside the file, or too near to or too far from each other, and
-    TerrainError if there is no data even near the line.
+    The area extends beyond the line from start to destination by about a third of the line's length on all sides. It is
+    clipped to the data of the elevation file. Raises ArgumentError for positions that are outside the file, or too near
+    to or too far from each other, and TerrainError if there is no data even near the line.
     """
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
@@ -130,14 +130,15 @@ def make_draft(
 def _survey_ground(
     raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return an area around start and destination that has elevation data, and its highest ground, m.
+    """Return an area around start and destination that has elevation data, and the highest ground in it, m.
 
     positions: start and destination, by their keywords.
     endpoints: the same two positions on the map, (2, 2) m.
-    margin: largest width of the area around the positions, m; smaller widths are tried if data is missing.
+    margin: largest distance between the positions and the edges of the area, m; smaller distances are tried if data is
+        missing.
 
-    The area is (2, 2) m. Raises ArgumentError for a position that the file does not cover, and TerrainError if every
-    width lacks data.
+    The area is (2, 2) m. Raises ArgumentError for a position that the file does not cover, and
+    TerrainError if data is missing with every distance.
     """
     for fraction in _MARGIN_REDUCTIONS:
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
@@ -173,7 +174,7 @@ def _position_text(position: GeoPosition, distance: float | None = None) -> str:
 
 
 def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Clip a box, (2, 2) m, to the largest box that the elevation file covers."""
+    """Clip a box, (2, 2) m, to the area that the elevation file covers."""
     if is_covered(raster, origin, area):
         return area
     tile_area = tile_bounds(raster, origin)
@@ -324,7 +325,7 @@ def _flight_text(draft: Draft) -> str:
 def _examples_text(draft: Draft) -> str:
     """Return the commented examples of a scenario file: a threat and a zone near the straight line.
 
-    They are small enough to fly around.
+    The examples are small enough to fly around.
     """
     radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
     threat, zone = (
@@ -360,13 +361,12 @@ def _examples_text(draft: Draft) -> str:
 def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return two positions for examples, (east, north) m, one on each side of the straight line.
 
-    Each is a third of the line's length from one end, and half of ``radius`` (m) off the line.
+    Each position is a third of the line's length from one end of the line, and half of ``radius`` (m) to the side of
+    it.
     """
     endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
     straight_line = endpoints[1] - endpoints[0]
     offset = np.array([-straight_line[1], straight_line[0]]) / (math.hypot(*straight_line) or 1.0) * radius * 0.5
-    first_position, second_position = (
-        endpoints[0] + straight_line / 3.0 + offset,
-        endpoints[1] - straight_line / 3.0 - offset,
-    )
+    first_position = endpoints[0] + straight_line / 3.0 + offset
+    second_position = endpoints[1] - straight_line / 3.0 - offset
     return (float(first_position[0]), float(first_position[1])), (float(second_position[0]), float(second_position[1]))

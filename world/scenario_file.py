@@ -66,7 +66,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def checked_table(make_table: Callable[[], Table], source: str) -> Table:
-    """Return the table that a function makes, with pydantic's error as a ScenarioError.
+    """Return the table that a function makes; raise pydantic's error as a ScenarioError.
 
     source: name of the file in messages.
     """
@@ -111,10 +111,13 @@ class Fault(NamedTuple):
 
 
 def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> Fault:
-    """Return the first fault that pydantic found; its text is ``key: value: what is allowed``.
+    """Return the first fault that pydantic found.
 
-    data: the checked data; needed if a field takes several types, to separate its keys from pydantic's union branches.
-    model: the model of the data; needed to suggest a known key for an unknown one.
+    The text of the fault is ``key: value: what is allowed``.
+
+    data: data that was checked. It is needed if a field allows several types, because pydantic's location then contains
+        names that are not keys of the data.
+    model: model of the data, needed to suggest a known key for an unknown key.
 
     >>> from pydantic import ValidationError
     >>> from world.scenario_tables import WindTable
@@ -157,12 +160,12 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
 
 
 def _spelling_suggestion(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
-    """Return the end of a message that suggests a known key for an unknown one; "" without one."""
+    """Return a suggestion for an unknown key, as the end of a message; "" if no known key is similar."""
     return "" if model is None else did_you_mean(str(parts[-1]), _known_keys(parts[:-1], model))
 
 
 def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
-    """Return the known keys of the tables at or below the first key of a location, or of the whole model."""
+    """Return the known keys of the table at a location, or of the whole model."""
     key_field = model.model_fields.get(str(parts[0])) if parts else None
     if key_field is None:
         return list(model.model_fields)
@@ -179,7 +182,7 @@ def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a location that are keys of the data, without pydantic's union branches."""
+    """Return the parts of pydantic's location that are keys of the data."""
     keys = []
     for part in parts:
         known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
@@ -190,7 +193,7 @@ def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
 
 
 def _value_text(value: Any) -> str:
-    """Return a value as JSON text for a message, shortened to 60 characters."""
+    """Return a value as JSON text for a message; at most 60 characters."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     text = json.dumps(value, default=str)

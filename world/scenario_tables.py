@@ -32,7 +32,7 @@ def in_range(
     """Make a validator that allows ``min_value``..``max_value`` and names this range in its error.
 
     exclude_min, exclude_max: True to exclude ``min_value`` or ``max_value``.
-    also: text for the message about other values that the field takes.
+    also: text for the message about other values that the field allows.
     """
 
     def check(value: float) -> float:
@@ -109,7 +109,7 @@ def _check_period(text: str) -> str:
 
 
 def _check_span(text: str) -> str:
-    """Return the text; raise ValueError if it states neither a flight's start time nor its time span."""
+    """Return the text; raise ValueError if it states neither a start time nor a time span."""
     parse_span(text)
     return text
 
@@ -123,7 +123,7 @@ _DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MAX_CORNERS)]
 
 
 def _check_one_position(table: "PositionTable | ZoneTable") -> None:
-    """Raise ValueError unless the position is given exactly once, in metres or in degrees."""
+    """Raise ValueError unless the position is stated exactly once, in metres or in degrees."""
     pairs = [{key: getattr(table, key) for key in keys} for keys in (("east_m", "north_m"), ("lat_deg", "lon_deg"))]
     given_pairs = [pair for pair in pairs if any(value is not None for value in pair.values())]
     if len(given_pairs) > 1:
@@ -209,7 +209,7 @@ class PeakTable(ScenarioTable):
 def _check_datum(datum: StatedDatum) -> StatedDatum:
     """Return the datum; raise ValueError unless it is a known name or a plausible height, m.
 
-    The height is that of mean sea level in the file.
+    A height as the datum means the height that mean sea level has in the file.
     """
     names = get_args(NamedDatum)
     if datum in names or (not isinstance(datum, str) and abs(datum) <= MAX_SEA_LEVEL):
@@ -418,7 +418,9 @@ class PlannerTable(ScenarioTable):
 
 
 def names_folder(aircraft: str) -> bool:
-    """Return True if an aircraft's name is a folder (it has a slash), not a built-in aircraft.
+    """Return True if an aircraft's name is a folder, not an aircraft that planfly ships.
+
+    The name of a folder contains a slash.
 
     >>> names_folder("aerosonde"), names_folder("models/mine")
     (False, True)
@@ -496,7 +498,7 @@ class FlightTable(ScenarioTable):
 
     @property
     def steering(self) -> Steering:
-        """Autopilot, guidance law and navigation accuracy.
+        """Return autopilot, guidance law and navigation accuracy.
 
         The default accuracy is "perfect" for planfly's guidance, and "gnss" for other autopilots.
         """
@@ -651,9 +653,9 @@ class RallyTable(PointTable):
 
 
 def _check_autoland(value: Any) -> Any:
-    """Return the value; raise ValueError if it is not one of RTL_AUTOLAND.
+    """Return the value; raise ValueError unless it is a value of RTL_AUTOLAND.
 
-    True and 1.0, which equal 1, are not allowed either.
+    True and 1.0 are not allowed, although they equal 1.
     """
     if type(value) is not int or value not in (1, 2, 3):
         raise ValueError("allowed 1, 2 or 3")

@@ -54,7 +54,7 @@ class Terrain:
         object.__setattr__(self, "heights", heights)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle with a function that locks the raster again: compiled code distinguishes writable arrays."""
+        """Pickle the terrain with a function that locks the raster again."""
         return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
@@ -63,12 +63,12 @@ class Terrain:
         return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
-        """Return the smallest height of the segment a-b above ground, m, and its position.
+        """Return the smallest height of the segment a-b above ground, m, and where it is.
 
         a, b: (3,) m.
 
-        The position is a fraction of the segment. The height is exact for the bilinearly interpolated ground, and NaN
-        if the segment leaves the raster or its data.
+        The place is a fraction of the segment. The height is exact for the bilinearly interpolated ground, and NaN if
+        the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
@@ -76,7 +76,7 @@ class Terrain:
 
 
 def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
-    """Make a terrain from pickled heights, locked again, and its other fields."""
+    """Make a terrain from pickled heights, which are locked again, and the other fields."""
     heights.setflags(write=False)
     return Terrain(heights, *others)
 
@@ -97,7 +97,10 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
     v = row - i
     u = col - j
     # Unsigned, so that numba does not check each index for being negative.
-    upper_row, lower_row, left_col, right_col = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
+    upper_row = np.uintp(i)
+    lower_row = np.uintp(i + 1)
+    left_col = np.uintp(j)
+    right_col = np.uintp(j + 1)
     upper_height = heights[upper_row, left_col] * (1.0 - u) + heights[upper_row, right_col] * u
     lower_height = heights[lower_row, left_col] * (1.0 - u) + heights[lower_row, right_col] * u
     return upper_height * (1.0 - v) + lower_height * v
@@ -105,11 +108,12 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 
 @compiled
 def steepest_slopes(heights: Heights, spacing: float) -> Heights:
-    """Return an upper bound of the slope of the bilinearly interpolated ground in each tile, m per m.
+    """Return an upper bound on the slope of the interpolated ground in each tile, m per m.
 
     spacing: distance between pixels, m.
 
-    A tile has `TILE_PIXELS` x `TILE_PIXELS` cells. Pixels without data (NaN) are ignored.
+    The ground is interpolated bilinearly. A tile has `TILE_PIXELS` x `TILE_PIXELS` pixel cells. Pixels without data
+    (NaN) are ignored.
     """
     rows, cols = heights.shape
     tiles = np.zeros(((rows - 2) // TILE_PIXELS + 1, (cols - 2) // TILE_PIXELS + 1), dtype=np.float32)
@@ -147,9 +151,9 @@ def _ground_heights(
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height of the segment a-b above ground, m, and its position.
+    """Return the smallest height of the segment a-b above ground, m, and where it is.
 
-    The position is a fraction of the segment. The ground is interpolated bilinearly. The height is NaN if the segment
+    The place is a fraction of the segment. The ground is interpolated bilinearly. The height is NaN if the segment
     leaves the raster.
     """
     col, row = polymap(to_pixel, a[0], a[1])
@@ -159,11 +163,11 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
 
 @inner
 def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height above ground of each segment of a path, m, and its position, (n - 1,) each.
+    """Return the smallest height above ground of each segment of a path, m, and where it is, (n - 1,) each.
 
     points: ends of the segments, m, (n, 3).
 
-    The values are those of `segment_clearance`, computed with half of its map transformations.
+    The values equal those of `segment_clearance`, but need only half as many map transformations.
     """
     count = max(0, points.shape[0] - 1)
     clearance, fraction = np.empty(count), np.empty(count)
@@ -183,7 +187,7 @@ def path_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -
 def _clearance_from_pixel(
     heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats, start_col: float, start_row: float
 ) -> tuple[float, float, float, float]:
-    """Return the results of `segment_clearance`, and the pixel coordinates of the segment's end.
+    """Return the results of `segment_clearance` and the pixel coordinates of the segment's end.
 
     start_col, start_row: pixel coordinates of `a`.
     The end's column is NaN if the segment leaves the raster.
@@ -210,7 +214,7 @@ def _clearance_from_pixel(
 
 @inlined
 def _next_crossing(start: float, step: float, fraction: float) -> float:
-    """Return the next larger fraction at which start + fraction * step is a whole number; inf if none."""
+    """Return the next larger fraction at which start + fraction * step is an integer; inf if there is none."""
     if step == 0.0:
         return math.inf
     position = start + fraction * step
@@ -222,10 +226,10 @@ def _next_crossing(start: float, step: float, fraction: float) -> float:
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:
-    """Return the smallest height above ground on a piece that is straight in pixels, m, and its position.
+    """Return the smallest height above ground on a straight piece in pixel coordinates, m, and where it is.
 
     col, row, up: coordinates of the two ends.
-    The position is a fraction of the piece.  The height is NaN if the piece leaves the data.  Within a pixel cell the
+    The place is a fraction of the piece. The height is NaN if the piece leaves the data. Within a pixel cell the
     height above the bilinearly interpolated ground is a parabola.
     """
     delta_col, delta_row, delta_up = col1 - col0, row1 - row0, up1 - up0
@@ -266,10 +270,8 @@ def _piece_clearance(
                     + curvature * vertex_fraction * vertex_fraction
                 )
                 if vertex_clearance < min_clearance:
-                    min_clearance, min_fraction = (
-                        vertex_clearance,
-                        start_fraction + vertex_fraction * (end_fraction - start_fraction),
-                    )
+                    min_clearance = vertex_clearance
+                    min_fraction = start_fraction + vertex_fraction * (end_fraction - start_fraction)
         start_clearance = end_clearance
         start_fraction = end_fraction
     return min_clearance, min_fraction
@@ -278,7 +280,7 @@ def _piece_clearance(
 def make_gridded_terrain(
     heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
 ) -> Terrain:
-    """Make terrain from heights on a regular grid.
+    """Make terrain from heights on a regular grid of map positions.
 
     heights: (n, e) m.
     east, north: (e,) and (n,) m, evenly increasing.
@@ -320,8 +322,8 @@ def make_peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> 
     bounds: [[e0, e1], [n0, n1]] m.
     buffer: width of terrain around the bounds, m.
 
-    The grid spacing is a sixteenth of the smallest sigma (at most 1,500 pixels a side), which keeps each summit within
-    0.05 % of its height.
+    The grid spacing is a sixteenth of the smallest sigma, with at most 1,500 pixels a side. This keeps each summit
+    within 0.05 % of its height.
     """
     width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * buffer
     spacing = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0

@@ -75,9 +75,10 @@ class CutTerrain(NamedTuple):
 
 
 def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
-    """Write the part of local tiles that covers an area, in their reference system and on their grid.
+    """Write the part of local tiles that covers an area as one file.
 
-    Raises TerrainError if the tiles do not reach beyond the area, have no data in it, or cannot be read.
+    The file has the reference system and the grid of the tiles. Raises TerrainError if the tiles do not reach beyond
+    the area, have no data in it, or cannot be read.
     """
     raster = open_raster(str(source))
     top, bottom, left, right = _window(raster, box)
@@ -87,7 +88,7 @@ def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
 
 
 def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return the window (top, bottom, left, right) of rows and columns that covers an area.
+    """Return the window of rows and columns that covers an area: top, bottom, left, right.
 
     Raises TerrainError if the raster does not cover the area.
     """
@@ -145,7 +146,7 @@ def tile_name(lat: int, lon: int) -> str:
 
 
 def degree_corners(box: Box) -> list[tuple[int, int]]:
-    """Return the south-west corners of the one-degree squares that an area touches.
+    """Return the south-west corner of each one-degree square that an area touches.
 
     Longitudes are in -180..179.
 
@@ -160,10 +161,10 @@ def degree_corners(box: Box) -> list[tuple[int, int]]:
 def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: CutProgress, *, sea: bool) -> CutTerrain:
     """Fetch the part of a server's tiles that covers an area, and write it as one GeoTIFF.
 
-    server: the address of the folder of tiles.
+    server: address of the folder with the tiles.
     cache: folder for the fetched parts.
     progress: progress callback.
-    sea: True if degrees without a tile are sea, at 0 m; otherwise they have no data.
+    sea: True if one-degree squares without a tile are sea, at 0 m; otherwise they have no data.
 
     Where tiles of different pixel size meet (at latitudes of 50, 60, 70, 75, 80 and 85 degrees), the coarser tiles are
     interpolated to the grid of the finest tile. Raises TerrainError if the server cannot be reached or does not answer
@@ -207,9 +208,10 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
 
 
 def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]) -> RasterFile:
-    """Fetch the blocks of a tile that cover an area, and open the tile's copy. Raises TerrainError.
+    """Fetch the blocks of a tile that cover an area, and open the local copy of the tile.
 
-    A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
+    Raises TerrainError. If the copy cannot be read, for example after a power cut or because of a proxy, the tile is
+    fetched once more.
     """
     for is_last in (not remote.parts, True):
         try:
@@ -233,11 +235,12 @@ class _UnreadableError(Exception):
 
 
 def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
-    """Fetch the directory of a tile, and open its copy. Raises TerrainError and _UnreadableError.
+    """Fetch the directory of a tile, and open the local copy of the tile.
 
     sizes: numbers of bytes to fetch from the start of the file, tried in turn.
 
-    The directory may be longer than in a cloud-optimised file, or at the end of the file.
+    Raises TerrainError and _UnreadableError. The directory of a file that is not cloud-optimised may be longer, or at
+    the end of the file.
     """
     for size in sizes:
         remote.fetch(0, size, count_bytes)
@@ -290,7 +293,9 @@ class _PlacedTile(NamedTuple):
 
 
 def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Return the grid of a one-degree tile, its longitudes shifted by multiples of 360 degrees to match the area.
+    """Return the grid of a one-degree tile, with longitudes that match those of an area.
+
+    Longitudes are shifted by multiples of 360 degrees.
 
     degree: latitude and longitude of the tile's south-west corner.
 
@@ -315,7 +320,7 @@ def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _
 
 
 def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Return the heights of an area on the grid of the finest tile, and that grid.
+    """Return the heights of an area on the grid of the finest tile, and this grid.
 
     Heights are NaN where there is no tile.
     """
@@ -338,14 +343,12 @@ def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[flo
 
 
 def _fill_from_tile(heights: Heights, lat: Floats, lon: Floats, tile: _PlacedTile) -> None:
-    """Fill the empty points of a grid of latitudes and longitudes with heights interpolated in a tile."""
+    """Fill the empty points of a grid of latitudes and longitudes from a tile, by interpolation."""
     rows, cols = tile.raster.shape
     col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
     # A tile of another pitch reaches half of its own pixel beyond the centres of its outermost pixels.
-    columns, rows_covered = (
-        np.flatnonzero((col > -0.5) & (col < cols - 0.5)),
-        np.flatnonzero((row > -0.5) & (row < rows - 0.5)),
-    )
+    columns = np.flatnonzero((col > -0.5) & (col < cols - 0.5))
+    rows_covered = np.flatnonzero((row > -0.5) & (row < rows - 0.5))
     if not columns.size or not rows_covered.size:
         return
     # Snap to the tile's own grid: heights there stay unchanged, and need no neighbouring pixel.
@@ -377,7 +380,7 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
 
 
 def _fill_sea(heights: Heights, grid: Sequence[float], sea_degrees: Sequence[tuple[int, int]]) -> None:
-    """Set missing heights to 0 m in one-degree squares at sea.
+    """Set missing heights to 0 m in the one-degree squares that are sea.
 
     sea_degrees: south-west corners of these squares.
     """

@@ -32,12 +32,12 @@ class Threats:
             object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
-        """Return the number of units."""
+        """Return the number of threats."""
         return len(self.names)
 
 
 def threat_label(name: str, index: int) -> str:
-    """Return the label of a threat: its own name, or its number from 1 if the name is "".
+    """Return the label of a threat: its name, or its number (from 1) if it has no name.
 
     >>> threat_label("east valley", 0), threat_label("", 2)
     ('east valley', 'threat 3')

@@ -18,7 +18,10 @@ W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
 
 @compiled_inline
 def mean_wind_speed(speed: float, gradient: float, reference_amsl: float, amsl: float) -> float:
-    """Return the mean wind speed (m/s) at an altitude (m AMSL), linear in altitude and never below 0."""
+    """Return the mean wind speed (m/s) at an altitude (m AMSL).
+
+    The speed is linear in altitude, but never below 0.
+    """
     return max(0.0, speed + gradient * (amsl - reference_amsl))
 
 
@@ -80,7 +83,7 @@ class Wind:
         return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
 
     def max_speed_at(self, amsl: Floats) -> float:
-        """Return the highest mean wind speed (m/s) at any of these altitudes (m AMSL)."""
+        """Return the highest mean wind speed (m/s) at any of some altitudes (m AMSL)."""
         return max(math.hypot(*self.velocity_at(float(altitude))) for altitude in amsl)
 
     def components_on_course(self, course: float, amsl: float) -> tuple[float, float]:

@@ -13,7 +13,7 @@ def count_text(count: int, noun: str) -> str:
 
 
 def count_range_text(counts: Sequence[int], noun: str) -> str:
-    """Return several counts of the same things as text.
+    """Return the range of several counts of a noun, as text.
 
     >>> count_range_text([12, 6, 10], "flight"), count_range_text([1, 1], "flight")
     ('6 to 12 flights', '1 flight')
@@ -23,7 +23,9 @@ def count_range_text(counts: Sequence[int], noun: str) -> str:
 
 
 def is_one_edit(first: str, second: str) -> bool:
-    """Return True if two words differ by one letter, missing, added or other, or by two swapped neighbours.
+    """Return True if two words differ by one edit.
+
+    An edit adds, removes or replaces a letter, or swaps two neighbouring letters.
 
     >>> [is_one_edit("WP_RADUIS", word) for word in ("WP_RADIUS", "WP_RADUI", "WP_RADUIX", "RTL_RADIUS", "WP_RADUIS2")]
     [True, True, True, False, False]

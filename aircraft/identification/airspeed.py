@@ -30,7 +30,7 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Scale the airspeed to fit the wind triangle; return the signals with the scale and its deviation."""
+    """Scale the airspeed to fit the wind triangle; return the signals, the scale and its standard deviation."""
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
@@ -66,7 +66,7 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     decay = float(np.exp(-1.0 / (_GUST_TIME_S * thinned.hertz)))
 
     def innovations(values: Floats) -> Floats:
-        """Whiten values (n,) with the correlation time `_GUST_TIME_S`, each record separately."""
+        """Whiten values (n,) for the correlation time `_GUST_TIME_S`, each record separately."""
         filtered = np.empty_like(values)
         for first, last in row_ranges:
             record_values = values[first:last]

@@ -31,7 +31,7 @@ class Clocks:
 
     @property
     def total_lag(self) -> float:
-        """Total lag of the accelerometers behind the gyros, s."""
+        """Total lag of the accelerometers relative to the gyros, s."""
         return self.lag + self.delay
 
 
@@ -72,7 +72,7 @@ class Signals:
     extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def smooth(self, values: Floats, cutoff: float) -> Floats:
-        """Return low-passed values; each record is filtered separately.
+        """Return low-passed values; each record is filtered on its own.
 
         values: (n,) or (n, k).
         cutoff: Hz.
@@ -114,7 +114,7 @@ class Signals:
         )
 
     def delay(self, values: Floats, delay: float) -> Floats:
-        """Return values delayed by ``delay`` (s); each record is delayed separately."""
+        """Return values delayed by ``delay`` (s); each record is delayed on its own."""
         delayed_values = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
             delayed_values[first:last] = apply_delay(values[first:last], delay)
@@ -144,7 +144,7 @@ _AIRSPEED_CUTOFF_HZ = 2.0
 
 
 def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: float) -> Signals:
-    """Concatenate flight records, and delay their signals like the accelerometers.
+    """Concatenate flight records, with all signals delayed like the accelerometers.
 
     clocks: lags and delays of each record.
     motor_lag: time constant of the motor, s.
@@ -154,7 +154,7 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
     for record, clock in zip(records, clocks, strict=True):
 
         def delay_signal(values: Floats, clock: Clocks = clock) -> Floats:
-            """Apply the lag and the delay of the accelerometers to a signal of the gyros' time."""
+            """Apply the lag and the delay of the accelerometers to a signal that has the time of the gyros."""
             return apply_delay(apply_lag(values, clock.lag), clock.delay)
 
         rates = delay_signal(record.rates)
@@ -192,7 +192,7 @@ def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
     lag: time constant, s.
     hertz: samples per second.
 
-    The input is the output plus the lag times the output's rate of change.
+    The input is the output plus the lag times the rate of change of the output.
 
     >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])

@@ -92,26 +92,26 @@ class Band:
 
     @property
     def inside(self) -> float:
-        """Fraction of the known values that are inside the band; NaN without known values."""
+        """Fraction of the known values that lie inside the band; NaN without known values."""
         known = self._known
         is_inside = (self.flown >= self.low) & (self.flown <= self.high)
         return float(is_inside[known].mean()) if known.any() else float("nan")
 
     @property
     def half_width(self) -> float:
-        """Median of half the width of the band."""
+        """Half of the width of the band, median over all values."""
         known = self._known
         return float(np.median(0.5 * (self.high - self.low)[known])) if known.any() else float("nan")
 
     @property
     def known_fraction(self) -> float:
-        """Fraction of the flight's known values at which the band is known; NaN without known values."""
+        """Fraction of the flight's known values at which the band is known, too; NaN without known values."""
         flown = np.isfinite(self.flown)
         return float(self._known[flown].mean()) if flown.any() else float("nan")
 
     @property
     def is_informative(self) -> bool:
-        """True if the band is narrower than for a quantity that keeps its value at the start of each window."""
+        """True if the band is narrower than that of a quantity that keeps its value at the start of each window."""
         return not self.half_width >= self.unchanged
 
     @property
@@ -121,19 +121,19 @@ class Band:
 
 
 def uninformative_note(bands: Sequence[Band]) -> str:
-    """Return a sentence that names the quantities whose bands are not informative; "" if there are none."""
+    """Return a sentence about the quantities whose bands are not informative; "" if there are none."""
     names = ", ".join(band.name for band in bands if not band.is_informative)
     return f"the model does not predict {names}: the band is at least as wide as without a model" if names else ""
 
 
 def band_limits(values: Floats) -> tuple[Floats, Floats]:
-    """Return the ends of the band that contains a further draw with the probability `COVERAGE`.
+    """Return the ends of the band that contains another draw with the probability `COVERAGE`.
 
     values: draws, (d, n).
 
-    The lower and the upper end are arrays (n,), at the plotting positions k / (d + 1) (Weibull 1939); percentiles of
-    the draws would be too narrow. The band is unknown (NaN) where fewer than `_MIN_KNOWN_FRACTION` of the draws have a
-    value.
+    The lower and the upper end are arrays (n,), at the plotting positions k / (d + 1) (Weibull 1939). Percentiles of
+    the draws would give too narrow a band. The band is unknown (NaN) where fewer than `_MIN_KNOWN_FRACTION` of the
+    draws have a value.
 
     >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
     >>> low.round(9).tolist(), high.round(9).tolist()
@@ -187,11 +187,11 @@ class BlindPrediction:
 
     @property
     def windows(self) -> tuple[int, int]:
-        """Numbers of windows in the earlier part and in the judged part."""
+        """Number of windows in the earlier part, and in the judged part."""
         return len(self._errors), len(self._starts)
 
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
-        """Return the band of each of `QUANTITIES` over the judged windows.
+        """Return the band of each of `QUANTITIES` in the judged windows.
 
         draws: draws of the aircraft with which the windows are predicted.
         """
@@ -215,7 +215,7 @@ class BlindPrediction:
         return tuple(bands)
 
     def _simulate_windows(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
-        """Simulate one window from each start row (w,), with the trims of the earlier part; return (w, k, q).
+        """Simulate a window from each start row (w,), with the trims of the earlier part; return (w, k, q).
 
         The result holds the q `QUANTITIES` at the k kept samples of each window.
         """
@@ -246,7 +246,9 @@ def _scale_airspeed(signals: Signals, factor: float) -> Signals:
 
 
 def _kept_rows(count: int) -> Ints:
-    """Return the indices of the kept samples of a window; the measured start is not kept.
+    """Return the indices of the samples of a window that are kept.
+
+    The measured start is not kept.
 
     count: number of samples in the window.
     """
@@ -254,7 +256,7 @@ def _kept_rows(count: int) -> Ints:
 
 
 def _window_starts(signals: Signals, count: int, step: int) -> Ints:
-    """Return the rows at which windows start, in all records, (w,).
+    """Return the rows at which the windows of all records start, (w,).
 
     count: number of samples in a window.
     step: rows between the starts of two windows.
@@ -269,7 +271,7 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
 
 
 def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
-    """Return the measured `QUANTITIES` over windows, (w, k, q); power is NaN for a log without current."""
+    """Return the measured `QUANTITIES` in windows, (w, k, q); power is NaN for a log without current."""
     rows = starts[:, np.newaxis] + np.arange(count + 1)
     return _stack_quantities(
         signals.attitude[rows, :2],
@@ -281,7 +283,7 @@ def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
 
 
 def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
-    """Return the `QUANTITIES` of windows at their kept samples, (w, k, q).
+    """Return the `QUANTITIES` of windows at the samples that are kept, (w, k, q).
 
     angles: bank and pitch, rad, (w, n, 2).
     airspeed: m/s, (w, n).
@@ -298,7 +300,7 @@ def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power:
 
 
 def _headings(states: Floats, start: Floats, step: float) -> Floats:
-    """Integrate the turn rate over windows; return the headings, rad, (w, n).
+    """Return the headings in windows, rad, (w, n), by integrating the turn rate.
 
     start: heading at the start of each window, rad, (w,).
     step: time between samples, s.

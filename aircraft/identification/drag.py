@@ -114,9 +114,9 @@ class ForwardForces:
         return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives of forward acceleration and current with respect to the unknowns.
+        """Return the derivatives of forward acceleration and current with respect to the unknowns, two arrays (n, p).
 
-        The p unknowns are those of `predict`; the result is two arrays (n, p).
+        The p unknowns are those of `predict`.
         """
         steps = _DIFFERENCE_STEP * np.eye(len(unknown))
         # All columns are filtered in one call: a call costs far more than a column.
@@ -132,14 +132,14 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit the five drag and motor parameters; return the fit, their values (5,) and covariance (5, 5).
+    """Fit the five parameters of drag and motor; return the fit, their values (5,) and covariance (5, 5).
 
     values: (n,) values of all parameters, of which the parameters of lift are used.
     uncertainty: uncertainty of the lift curve; None for a default.
 
-    The fit also has nuisance parameters. Those of the aircraft (resistance, idle current, voltage, drag of the
-    elevator) are folded into the five values: with the base model's nuisance parameters, these give nearly the same
-    forces and currents as the fit.
+    The fit also has nuisance parameters. The nuisance parameters of the aircraft are resistance, idle current, voltage
+    and drag of the elevator. They are folded into the five values: together with the nuisance parameters of the base
+    model, the five values give nearly the same forces and currents as the fit.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
     thinned = forces.signals
@@ -161,7 +161,7 @@ def fit_drag(
 
 
 def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
-    """Return the prior means and standard deviations of the p unknowns of `fit_drag`, two arrays (p,).
+    """Return the prior means and standard deviations of the unknowns of `fit_drag`, two arrays (p,).
 
     with_current: True for a log with the battery's current, which also has its voltage.
 
@@ -178,8 +178,8 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
 
     unknown: (p,) fitted values of the unknowns.
 
-    The squares are those of the differences of force and current over the signals. Returns the values of the parameters
-    (5,), and their derivatives with respect to the unknowns, (5, p).
+    The differences of force and current over the signals are minimised. Returns the values of the parameters (5,), and
+    their derivatives with respect to the unknowns, (5, p).
     """
     own_count = int(_IS_DRAG_PARAMETER.sum())
     folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
@@ -243,7 +243,7 @@ def _fit_unknowns(
 def forward_forces(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty
 ) -> ForwardForces:
-    """Return the contribution of each unknown to the forward force, over the thinned signals.
+    """Return how much each unknown contributes to the forward force, over the thinned signals.
 
     values, uncertainty: see `fit_drag`.
     """

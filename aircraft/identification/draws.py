@@ -18,7 +18,7 @@ _DRAWS_PER_AIRCRAFT = 20
 
 
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw joint samples of all parameters within their bounds, (count, n).
+    """Draw joint samples of all parameters, within the bounds of the parameters, (count, n).
 
     The n columns are `aircraft.identification.parameters.PARAMETERS`.
     """
@@ -34,7 +34,7 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
 
 
 def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw factors on the battery's power, (count,); all are 1 if the battery's current was logged.
+    """Draw factors on the battery power, (count,); all are 1 if the battery current was logged.
 
     No other signal shows the propulsive efficiency, which varies by `EFFICIENCY_LOG_SD` among real aircraft.
     """

@@ -93,7 +93,7 @@ class ElectricMotor:
         return thrust, self.power_ratio * throttle * current + self.avionics / volts
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
+        """Return the propeller torque, N m, (n,). A positive torque rolls the aircraft to the left by its reaction."""
         speed = self.speed(airspeed, throttle, density, self.voltage)
         q2, q1, q0 = self._torque_coefficients(airspeed, density)
         return np.asarray(q2 * speed * speed + q1 * speed + q0)
@@ -110,5 +110,5 @@ def _scale_coefficients(factor: float, coefficients: tuple[float, float, float])
 
 
 def _larger_roots(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Return the larger root of a x^2 + b x + c, or the position of the minimum without a root, (n,)."""
+    """Return the larger root of a x^2 + b x + c, (n,); without a real root, the position of the minimum."""
     return np.asarray((np.sqrt(np.maximum(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a))

@@ -103,8 +103,8 @@ class Estimate:
     def uninformed_lines(self) -> tuple[str, ...]:
         """Return a line for each parameter that the logs hardly determine.
 
-        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`. A line names a maneuver that would
-        determine the parameter.
+        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`. Each line names a maneuver that
+        would determine the parameter.
         """
         fractions = self.log_fractions().tolist()
         return tuple(
@@ -115,7 +115,7 @@ class Estimate:
         )
 
     def log_fractions(self) -> Floats:
-        """Return for each parameter the fraction of the prior's variance that the logs remove, (n,)."""
+        """Return the fraction of the prior's variance that the logs remove, for each parameter, (n,)."""
         return np.clip(1.0 - np.square(self.sds / prior_sds()), 0.0, 1.0)
 
 
@@ -172,8 +172,8 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
     values: values of all parameters, (n,); the parameters of lift and drag are returned unchanged.
     covariance: covariance of the values, (n, n).
 
-    Returns values (n,) and covariance (n, n). The refinement itself uses a prior that is wider by `PRIOR_SPREAD`,
-    because its weights do not include the shifts.
+    Returns values (n,) and covariance (n, n). The refinement of the moments uses a prior that is wider by
+    `PRIOR_SPREAD`, because its weights do not include the shifts.
     """
     prior = np.square(prior_sds())
     weight = np.where(IS_MOMENT, prior / (prior + np.diag(covariance)), 1.0)
@@ -182,7 +182,7 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
-    """Return the aligned signals of all records, without sensor biases and with the airspeed scaled."""
+    """Return the aligned signals of all records, without sensor biases and with a scaled airspeed."""
     signals = remove_sensor_biases(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, flow_from_forces(signals, base, prior_means()))
 
@@ -202,9 +202,9 @@ def score_predictions(
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """Add the covariance from the shifts (n,) to the covariance of the fits (n, n).
+    """Add the covariance of the fits (n, n) and the covariance from the shifts (n,).
 
-    For lift and drag no variance exceeds the prior's variance.
+    For lift and drag, a variance is limited to the variance of the prior.
 
     >>> side = np.zeros(len(PARAMETERS))
     >>> side[0] = 0.04
@@ -221,7 +221,7 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
 def estimate_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
     """Estimate the lags and delays of each record, from the longest record of its log.
 
-    Of this record, the central `ALIGNED_SECONDS` are used. All records of a log have the same lags and delays.
+    The central `ALIGNED_SECONDS` of this record are used. All records of a log have the same lags and delays.
     """
     clocks_by_source: dict[str, Clocks] = {}
     for source in {record.source: None for record in records}:
@@ -241,10 +241,10 @@ def estimate_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[C
 
 
 def _log_unexplained(fit: Fit, lag: float) -> float:
-    """Return the logarithm of the fraction of the moments' variance that a fit leaves unexplained.
+    """Return the logarithm of the fraction of the moments' variance that a fit does not explain.
 
-    The residual and the moments are taken as they were before a first-order lag (s): the lag smooths them and removes
-    fast, badly explained motion, so that the longest lag would always seem best.
+    The residual and the moments are taken as they were before a first-order lag (s). The lag smooths them, and removes
+    fast motion that is badly explained. With the lag, the longest lag would always seem best.
     """
     hertz = GRID_HZ / MOMENT_THINNING
     residual, total = (
@@ -262,10 +262,10 @@ def fit_parameters(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, without the shifts from fixed quantities.
+    """Estimate all parameters from aligned signals, without the shifts from quantities that are held fixed.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
-    level: error of the autopilot's level, rad.
+    level: error of the level of the autopilot, rad.
     dynamics: True to estimate the moments as well.
     nominal: refinement whose values are changed to first order; None to refine the moments.
     """
@@ -325,9 +325,8 @@ def _make_equation(group: Group, fit: Fit) -> Equation:
 def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[str, Floats]:
     """Return the changes of all parameters if the lift curve is shifted along its principal axes.
 
-    There is one shift of one standard deviation along each axis of the lift curve's covariance. Its own part is
-    subtracted from `nominal.covariance`, which already contains the uncertainty of the lift curve; the array is changed
-    in place.
+    There is one shift along each axis of the lift curve's covariance, by one standard deviation. `nominal.covariance`
+    already contains the uncertainty of the lift curve itself, so this part is subtracted from it, in place.
     """
     eigenvalues, axes = np.linalg.eigh(nominal.covariance[:2, :2])
     shifts = {}

@@ -33,18 +33,18 @@ class FixedParameter:
     needs_current: bool = False
 
     def tilt(self, signals: Signals) -> float:
-        """Return the change of the angle between the airflow and the autopilot's level, rad."""
+        """Return the change of the angle between the airflow and the level of the autopilot, rad."""
         return self.level + (self.vertical_air / float(signals.airspeed.mean()) if self.vertical_air else 0.0)
 
     def applies(self, *, with_current: bool) -> bool:
-        """Return True if the quantity matters for a log with, or without, the battery's current."""
+        """Return True if the quantity matters for a log, depending on whether the log has the battery current."""
         return with_current or not self.needs_current
 
 
 def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
-    """Return `value` moved away from 0 by one standard deviation.
+    """Return a value moved away from 0 by one standard deviation.
 
-    relative_sd, min_sd: standard deviation as a ratio to the value, and its smallest value.
+    relative_sd, min_sd: standard deviation as a ratio to the value, and smallest standard deviation.
 
     >>> _move_one_sd(-2.0, 0.5, 0.1), _move_one_sd(0.0, 0.5, 0.1)
     (-3.0, 0.1)
@@ -97,8 +97,8 @@ def _acceleration_bias(axis: int, bias: float) -> Callable[[Signals, BaseModel],
 def _noise_doubling(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
     """Return a function that doubles the noise power of the accelerometers.
 
-    It shows the bias of the slopes: the noise that is present has the same effect again (Cook and Stefanski 1994,
-    SIMEX). The noise is the signal above the vane's cutoff, taken as white.
+    This shows the bias of the slopes, because the noise that is already present has the same effect as the added noise
+    (Cook and Stefanski 1994, SIMEX). The noise is the signal above the cutoff of the vane, and is assumed to be white.
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
@@ -130,7 +130,7 @@ def _surface_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
 
 
 def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that increases the lag of the servos and reduces their delay by the same time."""
+    """Return a function that increases the lag of the servos, and shortens their delay by the same time."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         surfaces = np.empty_like(signals.surfaces)

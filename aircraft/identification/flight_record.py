@@ -56,7 +56,7 @@ class FlightRecord:
         return self.rows(slice(begin, begin + rows))
 
     def between(self, start: float, end: float) -> "FlightRecord":
-        """Return the part of the record from time ``start`` until before time ``end``, s."""
+        """Return the part of the record from a start time up to an end time (excluded), s."""
         begin_row, end_row = np.searchsorted(self.time, [start, end]).tolist()
         return self.rows(slice(begin_row, end_row))
 
@@ -82,7 +82,7 @@ def _filter_sections(cutoff: float, hertz: float) -> Floats:
 
 
 def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
-    """Low-pass values forwards and backwards, without delay.
+    """Low-pass values forwards and backwards, so that there is no delay.
 
     values: (n,) or (n, k).
     cutoff: cutoff of the second-order Butterworth filter, Hz.
@@ -121,7 +121,7 @@ def apply_lag(values: Floats, time_constant: float) -> Floats:
 
     values: input, (n,) or (n, k).
 
-    The output is exact for an input that, between two samples, is constant at their mean.
+    Between two samples the input is assumed to be constant at their mean.
 
     >>> apply_lag(np.array([0.0, 1.0, 1.0]), 0.0)
     array([0., 1., 1.])
@@ -140,8 +140,8 @@ def apply_lag(values: Floats, time_constant: float) -> Floats:
 
 
 def derivative(values: Floats) -> Floats:
-    """Return the time derivative, per second, of samples taken at `GRID_HZ`, by central differences.
+    """Return the time derivative of samples, per second, by central differences.
 
-    values: (n,) or (n, k).
+    values: samples at `GRID_HZ`, (n,) or (n, k).
     """
     return np.asarray(np.gradient(values, 1.0 / GRID_HZ, axis=0))

@@ -46,7 +46,7 @@ def make_motor(base: BaseModel, values: Floats) -> Motor:
 
 
 def battery_voltage(signals: Signals, base: BaseModel) -> Floats | float:
-    """Return the battery's voltage, V: the logged voltage (n,), or the base model's if a row has none."""
+    """Return the battery voltage, V: as logged (n,), or that of the base model if the log lacks it in a row."""
     return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
 
 
@@ -56,7 +56,7 @@ def dynamic_force(signals: Signals, base: BaseModel) -> Floats:
 
 
 def rate_and_elevator_lift(signals: Signals, base: BaseModel) -> Floats:
-    """Return the lift coefficient due to pitch rate and elevator, with the base's derivatives, (n,)."""
+    """Return the lift coefficient due to pitch rate and elevator, with the derivatives of the base model, (n,)."""
     c = base.coefficients
     pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
@@ -66,7 +66,7 @@ def flow_from_forces(signals: Signals, base: BaseModel, values: Floats, *, smoot
     """Estimate the flow angles from the accelerometers, which measure lift and side force.
 
     values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
-    smooth: True to low-pass the angles forwards and backwards; False for angles that depend on no later sample.
+    smooth: True to low-pass the angles forwards and backwards; False for angles that do not depend on later samples.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
     pressure, other_coefficient = dynamic_force(signals, base), rate_and_elevator_lift(signals, base)

@@ -27,10 +27,10 @@ _MAX_STRAIGHT_BANK_RAD = 0.1
 
 
 def forward_excess(signals: Signals) -> list[float]:
-    """Return the mean forward acceleration minus the gain in ground speed for each record, m/s^2.
+    """Return the mean forward acceleration minus the rate of the ground speed for each record, m/s^2.
 
-    The mean is over straight flight, and 0 if there is none. The excess is a level error or a bias of the
-    accelerometer; both would be mistaken for drag.
+    The mean is over straight flight; without straight flight it is 0. The excess is a level error or a bias of the
+    accelerometer. Both would be mistaken for drag.
     """
     excesses = []
     for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
@@ -73,7 +73,9 @@ def gyro_and_lateral_biases(signals: Signals) -> Floats:
 
 
 def remove_sensor_biases(signals: Signals, reference: Signals | None = None) -> Signals:
-    """Return signals without sensor biases; the forward excess is divided between level and accelerometer.
+    """Return the signals without sensor biases.
+
+    The forward excess is divided between level error and accelerometer bias.
 
     reference: signals of the same sensors, whose mean biases are used; None to use the biases of each record.
     """

@@ -18,7 +18,7 @@ LIFT_CUTOFF_HZ = 0.15
 
 
 def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
-    """Fit the lift curve; return the fit, slope and offset (2,), and their covariance (2, 2).
+    """Fit the lift curve; return the fit, the slope and offset (2,), and their covariance (2, 2).
 
     lift: (n,) lift coefficient.
     level: angle of the autopilot's level above the model's level, rad.

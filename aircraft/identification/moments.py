@@ -39,8 +39,8 @@ def fit_moments(
     motor: motor whose torque rolls the aircraft; None for the base's motor.
     prior_factor: factor on the priors' standard deviations.
 
-    For each axis the fit also has a trim offset for each record, after the parameters: the trim of the surfaces and the
-    biases of the sensors may differ between records.
+    For each axis the fit has the parameters, and then a trim offset for each record, because the trim of the surfaces
+    and the biases of the sensors may differ between records.
     """
     thinned = signals.thin(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
     pressure = dynamic_force(thinned, base)
@@ -67,7 +67,7 @@ def fit_moments(
 
 
 def _record_indicators(signals: Signals) -> list[Floats]:
-    """Return for each record a column (n,) that is 1 in the record and 0 elsewhere."""
+    """Return for each record a column (n,) that is 1 in this record and 0 elsewhere."""
     rows = np.arange(len(signals.airspeed))
     return [
         ((rows >= first) & (rows < last)).astype(float)
@@ -76,9 +76,9 @@ def _record_indicators(signals: Signals) -> list[Floats]:
 
 
 def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
-    """Return the aerodynamic moments (n,), N m, that the motion requires, by axis.
+    """Return the aerodynamic moments that the motion requires, N m, (n,), by axis.
 
-    The roll moment also balances the reaction to the propeller's torque, which rolls the aircraft to the left.
+    The roll moment also balances the reaction to the torque of the propeller, which rolls the aircraft to the left.
     """
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T
@@ -94,19 +94,17 @@ def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Gr
 
 
 def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
-    """Return the terms of the moment coefficient of each axis, arrays (n,), by axis.
+    """Return the terms of the moment coefficient of each axis, arrays (n,).
 
-    The first term is the known part; the others belong to one parameter each.
+    The first term of an axis is the known part. Each of the others belongs to one parameter.
     """
     c = base.coefficients
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]
     elevator, aileron, rudder = signals.surfaces.T
     span_factor, chord_factor = base.span / (2.0 * signals.airspeed), base.chord / (2.0 * signals.airspeed)
-    roll, pitch, yaw = (
-        signals.rates[:, 0] * span_factor,
-        signals.rates[:, 1] * chord_factor,
-        signals.rates[:, 2] * span_factor,
-    )
+    roll = signals.rates[:, 0] * span_factor
+    pitch = signals.rates[:, 1] * chord_factor
+    yaw = signals.rates[:, 2] * span_factor
     ones = np.ones(len(alpha))
     return {
         "pitch": [

@@ -33,4 +33,7 @@ class Motor(Protocol):
         """Return the thrust, N, and the current from the battery, A, two arrays (n,)."""
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
+        """Return the propeller torque, N m, (n,).
+
+        A positive torque rolls the aircraft to the left by its reaction.
+        """

@@ -45,9 +45,9 @@ class MotorTable:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "MotorTable":
-        """Return a copy with scaled thrust, speed and torque; the factor on torque also scales the power.
+        """Return a copy with scaled thrust, speed and torque; the factor of the torque also scales the power.
 
-        resistance, idle: have no effect, because a table does not separate the losses of the motor.
+        resistance, idle: no effect, because a table does not separate the losses of the motor.
         """
         del resistance, idle
         return replace(
@@ -78,12 +78,12 @@ class MotorTable:
         return np.asarray(self.thrust_factor * ratio * speed**2 * thrust), np.asarray(np.maximum(0.0, current))
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
+        """Return the propeller torque, N m, (n,). A positive torque rolls the aircraft to the left by its reaction."""
         torque = self._interpolate(self.torques, airspeed / self.speed, throttle)
         return np.asarray(self.load * density / self.density * self.speed**2 * torque)
 
     def _interpolate(self, table: Floats, airspeed: Floats, throttle: Floats) -> Floats:
-        """Interpolate a table (m, k) linearly; beyond an edge of the table return the value at the edge."""
+        """Interpolate a table (m, k) linearly; outside the table, the value at its edge applies."""
         row, row_fraction = _find_cells(self.airspeeds, airspeed)
         column, column_fraction = _find_cells(self.throttles, throttle)
         slow_values = table[row, column] * (1.0 - column_fraction) + table[row, column + 1] * column_fraction
@@ -92,7 +92,7 @@ class MotorTable:
 
 
 def _find_cells(grid: Floats, values: Floats) -> tuple[Ints, Floats]:
-    """Return the index of the grid point below each value, and the value's fraction of the next step.
+    """Return for each value the index of the grid point below it, and its fraction of the step to the next.
 
     A value beyond an end of the grid is clipped to the end.
     """

@@ -77,7 +77,7 @@ def max_level_speeds(base: BaseModel, values: Floats, density: float) -> Floats:
     full_throttle, level = np.ones(count), np.zeros(count)
 
     def excess_thrust(speed: Floats) -> Floats:
-        """Return the thrust minus the drag at full throttle and at a speed (m,), N, (m,)."""
+        """Return thrust minus drag at full throttle and at a speed (m,), N, (m,)."""
         thrust, _ = _thrusts_and_currents(base, values, speed, full_throttle, density)
         alpha, drag = _alpha_and_drag(base, values, speed, density, thrust, level)
         return np.asarray(thrust * np.cos(alpha) - drag)
@@ -94,10 +94,8 @@ def max_level_speeds(base: BaseModel, values: Floats, density: float) -> Floats:
     for _ in range(40):
         middle_speed = 0.5 * (low_speed + high_speed)
         is_short = excess_thrust(middle_speed) < 0.0
-        low_speed, high_speed = (
-            np.where(is_short, low_speed, middle_speed),
-            np.where(is_short, middle_speed, high_speed),
-        )
+        low_speed = np.where(is_short, low_speed, middle_speed)
+        high_speed = np.where(is_short, middle_speed, high_speed)
     return np.asarray(0.5 * (low_speed + high_speed))
 
 
@@ -112,7 +110,7 @@ def level_controls(base: BaseModel, values: Floats, airspeed: float, density: fl
 
 
 def _trimmed_elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
-    """Return the trimmed elevator at zero angle of attack (rad), and its change per angle of attack.
+    """Return the elevator (rad) that trims at zero angle of attack, and its change per angle of attack.
 
     The result is two arrays (m,).
     """

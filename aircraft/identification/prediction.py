@@ -88,7 +88,7 @@ class GustFilter:
     gain: float
 
     def estimate(self, residual: Floats, signals: Signals) -> Floats:
-        """Estimate the process at each sample from the earlier samples of a residual (n,), (n,)."""
+        """Estimate the process at each sample, (n,), from the earlier samples of a residual (n,)."""
         from scipy.signal import lfilter
 
         estimate = np.zeros_like(residual)
@@ -145,10 +145,10 @@ class Predictor:
         return tuple(whiteness(self._innovations[:, axis], count) for axis in range(3))
 
     def predict(self, starts: Ints, horizons: Sequence[float] = HORIZONS_S) -> dict[float, Floats]:
-        """Predict `QUANTITIES` at some times ahead, arrays (n, 6) in rad, rad/s and m/s.
+        """Predict `QUANTITIES` at some later times, arrays (n, 6) in rad, rad/s and m/s.
 
         starts: (n,) rows at which the predictions start.
-        horizons: times ahead, s, which are the keys of the result.
+        horizons: predicted times, s, which are the keys of the result.
         """
         horizon_by_sample = {round(horizon * self._signals.hertz): horizon for horizon in horizons}
         predictions = {}
@@ -188,7 +188,7 @@ class Predictor:
         return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])
 
     def _required_accelerations(self) -> Floats:
-        """Return the required aerodynamic moments over the moments of inertia, rad/s^2, (n, 3).
+        """Return the required aerodynamic moments divided by the moments of inertia, rad/s^2, (n, 3).
 
         These are the moments about roll, pitch and yaw that the measured motion requires.
         """
@@ -197,7 +197,7 @@ class Predictor:
         return np.column_stack([required["roll"] / ixx, required["pitch"] / iyy, required["yaw"] / izz])
 
     def _modelled_accelerations(self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints) -> Floats:
-        """Return the model's aerodynamic moments over the moments of inertia, rad/s^2, (n, 3).
+        """Return the aerodynamic moments of the model divided by the moments of inertia, rad/s^2, (n, 3).
 
         rates: angular rates, rad/s, (n, 3).
         rows: (n,) rows of the control surfaces and the density.
@@ -306,9 +306,9 @@ class Predictor:
 
 
 def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
-    """Return the filter of an axis with the smallest innovations.
+    """Return the filter of an axis that leaves the smallest innovations.
 
-    residual: unexplained angular accelerations about the axis, (n,).
+    residual: angular accelerations about the axis that are not explained, (n,).
     """
     filters = [
         GustFilter(float(np.exp(-1.0 / (signals.hertz * gust_time))), gain)
@@ -319,10 +319,11 @@ def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
 
 
 def whiteness(innovations: Floats, lags: int) -> float:
-    """Return the fraction of a series' autocorrelations within +-1.96 / sqrt(n), as for white noise.
+    """Return the fraction of a series' autocorrelations that are within +-1.96 / sqrt(n).
 
     innovations: series, (n,).
-    lags: the autocorrelations are those at lags of 1 to this number of samples.
+    lags: largest lag of the autocorrelations, in samples.
+    For white noise the fraction is 0.95.
 
     >>> whiteness(np.random.default_rng(1).normal(size=5000), 100) > 0.9
     True
@@ -338,7 +339,7 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
     """Return the rows from which predictions start, (n,), evenly distributed over all records.
 
     count: maximum number of rows.
-    horizon: longest time ahead, s.
+    horizon: longest time that is predicted, s.
     """
     longest = round(horizon * signals.hertz)
     settling = round(_SETTLING_TIME_S * signals.hertz)
@@ -352,9 +353,10 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
 
 
 def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]) -> PredictedLog:
-    """Compare the predictions of a log by constant rates and by several models with the measured values.
+    """Compare the predictions of a log with the measured values.
 
-    models: base model and parameter values by name; the predictions of the last model are returned to be shown.
+    models: base model and parameter values by name. The result includes the predictions of the last model.
+    The log is predicted by constant rates and by each model.
     """
     starts = prediction_starts(signals)
     measured = {
@@ -398,6 +400,6 @@ def _in_units(quantities: Floats) -> Floats:
 
 
 def _rms_errors(predicted: Mapping[float, Floats], measured: Mapping[float, Floats]) -> dict[float, Floats]:
-    """Return the root mean square errors (6,) in `UNITS`, by the time ahead."""
+    """Return the root mean square errors (6,) in `UNITS`, by the predicted time."""
     errors = {horizon: _in_units(predicted[horizon] - measured[horizon]) for horizon in HORIZONS_S}
     return {horizon: np.sqrt(np.square(error).mean(axis=0)) for horizon, error in errors.items()}

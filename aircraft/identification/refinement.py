@@ -67,7 +67,7 @@ class Refinement:
     gains: Floats
 
     def values_for(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
-        """Return the refined values (m,) for other signals, another base, or other lift and drag parameters.
+        """Return the refined values (m,) for other signals, another base, or other parameters of lift and drag.
 
         values: (n,) all parameters, of which the parameters of the moments are ignored.
 
@@ -82,10 +82,10 @@ class Refinement:
 def refine_moments(
     signals: Signals, base: BaseModel, values: Floats, horizons: Sequence[float] = HORIZONS_S, steps: int = MAX_STEPS
 ) -> Refinement:
-    """Refine the parameters of the moments such that the angular rates are predicted best.
+    """Refine the parameters of the moments so that the angular rates are predicted best.
 
     values: values of all parameters, (n,), from which the refinement starts.
-    horizons: times ahead of the compared predictions, s.
+    horizons: times after which predictions are compared, s.
     steps: number of Gauss-Newton steps, each limited to one standard deviation of the prior.
     """
     starts = prediction_starts(signals, _COUNT, max(horizons))
@@ -145,7 +145,7 @@ def prediction_errors(
 ) -> Floats:
     """Return the measured minus the predicted angular rates, rad/s, (3, n, h).
 
-    The axes of the result are roll, pitch and yaw; the n starts; the h times ahead.
+    The axes of the result are the rates of roll, pitch and yaw, the n starts, and the h predicted times.
     """
     predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
     measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]

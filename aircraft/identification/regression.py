@@ -28,8 +28,8 @@ class Fit:
 def correlation_samples(residual: Floats, max_lag: int = 500) -> float:
     """Return the correlation length of a series (n,), in samples.
 
-    It is the two-sided sum of the autocorrelation up to its first zero: this number of samples contains as much
-    information as one independent sample.
+    It is the two-sided sum of the autocorrelation up to its first zero. So many samples contain as much information as
+    one independent sample.
 
     >>> round(correlation_samples(np.random.default_rng(1).normal(size=4000)))
     1
@@ -57,7 +57,8 @@ def fit_with_prior(
     mean, sd: means and standard deviations of the independent priors, (p,); an infinite standard deviation means no
         prior.
     blocks: (n,) block number of each row.
-    floor: lower bound on residual variance times correlation length in samples, for errors of the model itself.
+    floor: lower bound on the residual variance times the correlation length in samples; it allows for errors of the
+        model itself.
 
     The weight of the data is divided by the correlation length of the residuals, because autocorrelated samples contain
     less information. The covariance is the robust covariance over blocks (White 1980, Liang and Zeger 1986), plus the

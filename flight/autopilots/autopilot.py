@@ -64,9 +64,9 @@ _SOURCE_NAMES: dict[Origin, str] = {
 
 
 def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return a text for each pair of values in the wrong order, if at least one of the two is from the user's file.
+    """Return a text for each pair of values in the wrong order, if the user's file states at least one of them.
 
-    orders: groups of parameter names; within a group the values must not decrease from one name to the next.
+    orders: groups of parameter names; within a group no value may be below the value of the name before it.
 
     >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
     >>> find_contradictions(made, [("THR_MIN", "TRIM_THROTTLE")])
@@ -104,7 +104,7 @@ class Parameters(Protocol):
 
     @property
     def values(self) -> tuple[ParameterValue, ...]:
-        """Every parameter that the control law uses, with its value and source."""
+        """Value and source of every parameter that the control law uses."""
 
     @property
     def unused(self) -> tuple[str, ...]:
@@ -116,14 +116,17 @@ class Parameters(Protocol):
 
     @property
     def outside_documented_ranges(self) -> tuple[str, ...]:
-        """Texts on values of the user's file that are outside their documented ranges."""
+        """Texts on the values of the user's file that are outside their documented ranges."""
 
     @property
     def contradictions(self) -> tuple[str, ...]:
         """Texts on values of the user's file that contradict another parameter."""
 
     def changed(self, origin: Origin = "file", /, **values: float) -> Self:
-        """Return a copy with the given parameters changed.  origin: source of the values."""
+        """Return a copy of the parameters in which some have other values.
+
+        origin: source of the new values.
+        """
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """Return the values that come from one source, by name and in the autopilot's units."""
@@ -211,21 +214,21 @@ class Autopilot(ABC):
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """Make the autopilot again from the settings that a log stores; the base class has none.
+        """Return the autopilot with the settings that a log stores; the base class has no settings.
 
         Raises ParameterError if a value is not allowed.
         """
         return cls()
 
     def store(self) -> StoredAutopilot:
-        """Return the settings of the autopilot as a log stores them, for `restore`."""
+        """Return the settings of the autopilot for a log, from which `restore` makes the autopilot again."""
         return StoredAutopilot()
 
     @classmethod
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return the autopilot that wrote a flight log, and notes on logged parameters that could not be used.
+        """Return the autopilot that wrote a flight log, and notes on logged parameters that cannot be used.
 
         Returns None for the log of another autopilot.
 
@@ -244,7 +247,7 @@ class Autopilot(ABC):
         return []
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Autopilot":
-        """Return a copy with the given parameters changed, by the autopilot's names and in its units.
+        """Return a copy in which some parameters have other values, by the autopilot's names and in its units.
 
         origin: source of the values.
         Raises ValueError for an autopilot without parameters.
@@ -252,19 +255,19 @@ class Autopilot(ABC):
         raise ValueError(f"{self.title} has no parameters")
 
     def stated_value(self, name: str) -> float | None:
-        """Return a parameter's value in the user's file, in the autopilot's unit, or None if not stated."""
+        """Return the value of a parameter in the user's file, in the autopilot's unit; None if it is not stated."""
         return None if self.parameters is None else self.parameters.by_origin("file").get(name)
 
     # Identity.
 
     @property
     def model(self) -> "Autopilot":
-        """The autopilot itself; for a program, the simulated autopilot that models it."""
+        """Simulated autopilot that models an external program; a simulated autopilot returns itself."""
         return self
 
     @property
     def version(self) -> str:
-        """Release of the program or of the simulated autopilot; "" for planfly's own guidance."""
+        """Release of the program or of the simulated autopilot; "" for planfly's guidance."""
         return ""
 
     def describe(self, aircraft: str) -> str:
@@ -300,7 +303,7 @@ class Autopilot(ABC):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Rules by which the autopilot reads and checks missions, and the settings on which they depend."""
+        """Rules by which the autopilot reads and checks missions, and the settings that these rules depend on."""
         return MissionChecks()
 
     @property
@@ -310,7 +313,7 @@ class Autopilot(ABC):
 
     @property
     def route_rules(self) -> RouteRules:
-        """Rules by which a mission is converted to the route that this autopilot flies."""
+        """Rules that convert a mission to the route that this autopilot flies."""
         turns = self.turns
         return RouteRules(
             self.returns.rules,
@@ -322,7 +325,7 @@ class Autopilot(ABC):
 
 
 def describe_program(program: AutopilotProgram, aircraft: str, max_named: int = 8) -> str:
-    """Return a description of a program with its version, checksum and changed parameters.
+    """Return a description of an autopilot program: its version, checksum and changed parameters.
 
     max_named: maximum number of changed parameters that the description names; the number of others is appended.
     """

@@ -46,7 +46,7 @@ PROGRAMS = (
 
 
 def autopilot_names() -> tuple[str, ...]:
-    """Return the names of the simulated autopilots and of their releases, as `--autopilot` accepts them.
+    """Return the names that `--autopilot` accepts: simulated autopilots, also with their releases.
 
     >>> autopilot_names()
     ('ardupilot', 'ardupilot-4.6', 'ardupilot-4.7', 'px4', 'px4-1.16', 'px4-1.17', 'planfly')
@@ -104,7 +104,7 @@ def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
 
 
 def _field_depth_below_home(scenario: "Scenario") -> float:
-    """Return the height of home above the ground at the landing point, m; 0 if either altitude is unknown."""
+    """Return the height of home above the landing point's ground, m; 0 if either altitude is unknown."""
     landing, home = scenario.landing, scenario.home
     if landing is None or home is None or scenario.terrain is None:
         return 0.0
@@ -113,7 +113,7 @@ def _field_depth_below_home(scenario: "Scenario") -> float:
 
 
 def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_parameters: Mapping[str, float]) -> None:
-    """Raise ScenarioError if a scenario and the user's parameter file state different values for one parameter.
+    """Raise ScenarioError if a scenario and the user's parameter file state different values of a parameter.
 
     rtl_parameters: parameters that the scenario's RTL settings set.
     """
@@ -137,7 +137,7 @@ def program_class_for(program: Path) -> "type[ProgramAutopilot]":
 def autopilot_of_log(
     program: str, parameters: Mapping[str, float], source: str
 ) -> "tuple[Autopilot, tuple[str, ...]] | None":
-    """Return the autopilot that wrote a flight log, and notes on its parameters; None if planfly does not know it.
+    """Return the autopilot that wrote a flight log, and notes on its parameters; None for an unknown program.
 
     The notes name the parameters that could not be used.
 
@@ -162,7 +162,7 @@ def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot
 
 
 def stored_name(autopilot: "Autopilot") -> str | None:
-    """Return the name that a log must state for an autopilot, or None if its settings imply the name.
+    """Return the autopilot name that a log must store; None if the stored settings imply the name.
 
     >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
     >>> stored_name(PlanflyGuidance("l1")) is None
@@ -172,5 +172,8 @@ def stored_name(autopilot: "Autopilot") -> str | None:
 
 
 def _implied_name(stored: "StoredAutopilot") -> str:
-    """Return the autopilot's name for a log without a name: ArduPlane with parameters or a program, else planfly."""
+    """Return the autopilot's name for a log that stores no name.
+
+    Stored parameters or a stored program imply ArduPlane, other settings planfly's guidance.
+    """
     return "planfly" if stored.parameters is None and stored.program is None else "ardupilot"

@@ -22,7 +22,7 @@ _QGC_COMMENT = re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.I
 
 
 def commented_release(text: str, program: str) -> FileRelease | None:
-    r"""Return the release in the comments of a parameter file, or None.
+    r"""Return the release that the comments of a parameter file state, or None.
 
     program: name of the program, after which a comment may state the release.
 
@@ -41,7 +41,9 @@ def commented_release(text: str, program: str) -> FileRelease | None:
 
 
 def nearest_release(versions: Sequence[_Version], release: tuple[int, int]) -> _Version:
-    """Return the newest simulated release that is not newer than a release, or the oldest simulated release.
+    """Return the newest simulated release that is not newer than a release.
+
+    Without such a release, return the oldest simulated release.
 
     versions: the simulated releases, oldest first.
 
@@ -60,7 +62,7 @@ def choose_release_for_file(
 
     versions: the simulated releases, oldest first; the newest is simulated if nothing states a release.
     stated: release that the user names, or None.
-    found: release of the file.
+    found: release that wrote the file.
     params: path of the file.
     title: name of the autopilot.
     """

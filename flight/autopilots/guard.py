@@ -67,15 +67,21 @@ class Guard:
             )
 
     def register_folder(self, folder: Path) -> None:
-        """Have a folder removed if planfly is killed; its name must have no line break."""
+        """Register a folder to be removed if planfly is killed.
+
+        Its name must not contain a line break.
+        """
         self._write_line(f"folder {folder}")
 
     def register_file(self, file: Path) -> None:
-        """Have a file removed if planfly is killed; it may not exist yet, and its name must have no line break."""
+        """Register a file to be removed if planfly is killed.
+
+        The file need not exist yet. Its name must not contain a line break.
+        """
         self._write_line(f"file {file}")
 
     def register_group(self, group: int) -> None:
-        """Have a process group killed if planfly is killed."""
+        """Register a process group to be killed if planfly is killed."""
         self._write_line(f"group {group}")
 
     def _write_line(self, line: str) -> None:
@@ -89,7 +95,7 @@ class Guard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the guard process, so that it neither kills processes nor removes files."""
+        """End the guard process, which then neither kills processes nor removes files."""
         self._write_line("done")
         self._pipe.close()
         self._process.wait()

@@ -18,7 +18,7 @@ _LOW_RATE_DURATION_S = 60.0
 
 
 def gust_deviation(turbulence: Turbulence) -> float:
-    """Return the standard deviation of the vertical gusts near the ground, m/s (MIL-F-8785C).
+    """Return the standard deviation of vertical gusts near the ground, m/s (MIL-F-8785C).
 
     >>> round(gust_deviation("moderate"), 2)
     1.54
@@ -27,7 +27,9 @@ def gust_deviation(turbulence: Turbulence) -> float:
 
 
 def height_in_gusts(opposing_rate: float, turbulence: Turbulence) -> float:
-    """Return the vertical displacement of an aircraft in a gust with an exceedance probability of 1 %, m.
+    """Return the height by which a gust displaces an aircraft, m.
+
+    The gust's displacement is exceeded with a probability of 1 %.
 
     opposing_rate: climb or sink rate with which the aircraft opposes the gust, m/s.
 
@@ -38,9 +40,9 @@ def height_in_gusts(opposing_rate: float, turbulence: Turbulence) -> float:
 
 
 def height_in_updrafts(sink_reserve: float, turbulence: Turbulence) -> float:
-    """Return the altitude that an autopilot which holds its airspeed gains in updrafts, m.
+    """Return the altitude that an autopilot gains in updrafts if it holds its airspeed, m.
 
-    sink_reserve: unused sink rate, m/s.
+    sink_reserve: sink rate that the aircraft does not use, m/s.
 
     >>> round(height_in_updrafts(2.0, "moderate"), 1), round(height_in_updrafts(0.5, "moderate"), 1)
     (19.1, 92.4)

@@ -14,12 +14,13 @@ _REAL_TYPE = 9
 
 
 def with_parameter(text: str, source: str, values: Mapping[str, float]) -> str:
-    r"""Return the text of a parameter file with another value for one parameter, which is appended if it is missing.
+    r"""Return the text of a parameter file with another value of one parameter.
 
-    The value changes under each name that the file uses for the parameter, and the file keeps these names.
+    The value is changed under each name that the file uses for the parameter. A missing parameter is appended.
 
     source: name of the file in messages.
-    values: value by each name of the parameter, in the unit of that name; the present name, which is appended, first.
+    values: value under each name of the parameter, in the unit of that name. The present name comes first; a missing
+        parameter is appended under this name.
 
     Raises ParameterError for a text that is not a parameter file.
 
@@ -41,7 +42,7 @@ def with_parameter(text: str, source: str, values: Mapping[str, float]) -> str:
 
 
 def _with_value(line: str, value: float) -> str:
-    """Return a line of a parameter file with another value."""
+    """Return a line of a parameter file with its value replaced."""
     columns = line.split("\t")
     if len(columns) == _QGC_COLUMN_COUNT:
         return "\t".join([*columns[:3], f"{value:.10g}", columns[4]])
@@ -49,7 +50,7 @@ def _with_value(line: str, value: float) -> str:
 
 
 def _format_parameter_line(model_line: str, name: str, value: float) -> str:
-    """Return a parameter's line in the format of another line."""
+    """Return a line for a parameter in the format of a given line."""
     columns = model_line.split("\t")
     if len(columns) == _QGC_COLUMN_COUNT:
         return "\t".join([columns[0], str(AUTOPILOT), name, f"{value:.10g}", str(_REAL_TYPE)])

@@ -46,7 +46,7 @@ class Entry:
 
 
 def read_parameter_file(path: Path) -> dict[str, Entry]:
-    """Read a parameter file, and return its entries by name in the order of the file.
+    """Read a parameter file; return its entries by name, in the order of the file.
 
     Raises ParameterError, in one line, if the file cannot be read, and as `parse_parameters` does.
     """
@@ -55,7 +55,7 @@ def read_parameter_file(path: Path) -> dict[str, Entry]:
 
 
 def parameters_text(values: Mapping[str, float], title: str) -> str:
-    r"""Return parameters as text in a format that every ground station reads.
+    r"""Return the text of a parameter file in a format that every ground station reads.
 
     The text has a comment, then a name and a value on each line.
 
@@ -66,7 +66,9 @@ def parameters_text(values: Mapping[str, float], title: str) -> str:
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Entry]:
-    r"""Read the text of a parameter file, in any of the formats; ``source`` names it in messages.
+    r"""Parse the text of a parameter file in any known format.
+
+    source: name of the file in messages.
 
     Raises ParameterError with file, line, field, value and allowed values if a line has no known format, a value is not
     a finite number, a name occurs twice, or the file has no parameter.  If several components of a vehicle have the
@@ -106,7 +108,12 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
 
 def _parse_entry(line: str, where: TextLine) -> Entry:
-    """Return the parameter in a line without comment.  Raises ParameterError.  where: position of the line."""
+    """Return the parameter in a line without a comment.
+
+    where: position of the line.
+
+    Raises ParameterError.
+    """
     fields, component = line.split("\t"), AUTOPILOT
     if len(fields) == _QGC_COLUMN_COUNT and _INTEGER_PATTERN.fullmatch(fields[0].strip()):
         name, text = fields[2].strip(), fields[3].strip()

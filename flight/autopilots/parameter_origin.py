@@ -33,7 +33,10 @@ _PROGRAM = re.compile(r"^\s*#.*\b(ArduPlane|ArduCopter|ArduRover|APMrover2|ArduS
 
 
 def _compile_names(names: str) -> re.Pattern[str]:
-    """Compile a pattern from names between blanks; a name that ends with an underscore matches as a prefix."""
+    """Compile a pattern that matches any of some names, which are separated by blanks.
+
+    A name that ends with an underscore also matches names that begin with it.
+    """
     return re.compile("|".join(f"{name}.*" if name.endswith("_") else name for name in names.split()))
 
 
@@ -135,9 +138,10 @@ class ParameterOrigin(NamedTuple):
 
 
 def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin:
-    r"""Return the autopilot and the vehicle that the text of a parameter file was written for.
+    r"""Return the autopilot and the vehicle for which a parameter file was written.
 
-    entries: its parameters.
+    text: text of the file.
+    entries: parameters of the file.
 
     >>> text = "FW_AIRSPD_TRIM 15\nNAV_ACC_RAD 30\n"
     >>> parameter_origin(text, parse_parameters(text, "a.params"))
@@ -179,7 +183,7 @@ def _is_ardupilot_name(name: str) -> bool:
 
 
 def _header_vehicle(text: str) -> str | None:
-    """Return the vehicle that a file's header states, "" for an aeroplane, or None if the header states no vehicle."""
+    """Return the vehicle that a file's header states; "" for an aeroplane, None without a statement."""
     match = _VEHICLE.search(text)
     if match is not None:
         return next((kind for pattern, kind in _VEHICLE_WORDS if re.search(pattern, match[1], re.I)), None)
@@ -190,9 +194,9 @@ def _header_vehicle(text: str) -> str | None:
 def _vehicle_by_majority(
     text: str, entries: Mapping[str, Entry], plane_names: re.Pattern[str], other_vehicles: Mapping[str, re.Pattern[str]]
 ) -> str:
-    """Return the vehicle with the most parameter names in a file; "" for an aeroplane, which also wins a tie.
+    """Return the vehicle to which most parameter names of a file belong; "" for an aeroplane.
 
-    A header that names the vehicle counts as `_HEADER_WEIGHT` names.
+    In a tie the vehicle is an aeroplane. A header that states the vehicle counts as much as `_HEADER_WEIGHT` names.
     """
     header_kind = _header_vehicle(text)
     votes = {"": len(_select_names(entries, plane_names.fullmatch))}
@@ -203,9 +207,9 @@ def _vehicle_by_majority(
 
 
 def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
-    """Return the vehicle of a PX4 file, from its type parameters, its header or its names; "" for an aeroplane.
+    """Return the vehicle of a PX4 file, from its type parameters, header or names; "" for an aeroplane.
 
-    A header that states another vehicle than an aeroplane decides: QGroundControl writes the vehicle that PX4 reports.
+    A header that states another vehicle has priority, because QGroundControl writes the vehicle that PX4 reports.
     """
     for name, kinds in _PX4_TYPES.items():
         if name in entries and (kind := kinds.get(round(entries[name].value))):
@@ -227,7 +231,7 @@ def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
 
 
 def read_origin(path: Path) -> ParameterOrigin:
-    """Return the autopilot and the vehicle that the parameter file at a path was written for.
+    """Return the autopilot and the vehicle for which the parameter file at a path was written.
 
     Raises ParameterError if the file cannot be read.
     """
@@ -255,7 +259,7 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 def refuse_unknown_parameters(
     path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]
 ) -> None:
-    """Raise ParameterError if an autopilot uses no name in a file and the names do not look like its parameters.
+    """Raise ParameterError if an autopilot uses none of a file's parameters, and none looks like its own.
 
     known: values of the file that the autopilot uses.
     """
@@ -268,7 +272,7 @@ def refuse_unknown_parameters(
 
 
 def other_autopilot_error(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
-    """Return the error for a parameter file that was written for a different autopilot.
+    """Return the error for a parameter file that was written for another autopilot.
 
     where: the file, for the message.
     written_for, flying: names of the autopilot of the file and of the autopilot that is to fly.

@@ -84,9 +84,10 @@ class ParameterTable:
         }
 
     def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return the values of a file by present name and in present units, and the names that the table lacks.
+        """Return the values of a file by present name and in present units, and the names that are unknown.
 
-        Raises ParameterError if a value is not accepted, or if one parameter has two values.
+        A name is unknown if the table lacks it. Raises ParameterError if a value is not accepted, or if a parameter has
+        two values.
         """
         values: dict[str, float] = {}
         entry_by_present_name: dict[str, Entry] = {}
@@ -109,7 +110,7 @@ class ParameterTable:
         return values, tuple(unused)
 
     def read_log(self, logged: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
-        """Return the accepted values of a log by present name, and a sentence on each rejected value.
+        """Return the accepted values of a log by present name, and a sentence for each rejected value.
 
         logged: values by present or older name.
         """
@@ -159,7 +160,7 @@ class ParameterSet:
 
     @classmethod
     def defaults(cls, *fields: Any) -> Self:
-        """Return the autopilot's default values.
+        """Return the parameters at the autopilot's default values.
 
         fields: additional fields of the subclass, such as PX4's version.
         """
@@ -188,7 +189,7 @@ class ParameterSet:
 
     @classmethod
     def of_text(cls, text: str, source: str, *fields: Any) -> Self:
-        """Return the parameters in a file's text, completed with defaults.
+        """Return the parameters in a file's text; missing parameters have their defaults.
 
         Raises ParameterError if the text is invalid or contains a value that is not allowed.
         """
@@ -197,9 +198,9 @@ class ParameterSet:
 
     @classmethod
     def restore(cls, stored: StoredParameters, *fields: Any) -> Self:
-        """Return the parameters that a recording contains, under present or older names.
+        """Return the parameters that a recording stores, under present or older names.
 
-        A parameter that the recording lacks has its default.
+        Missing parameters have their defaults.
 
         Raises ParameterError if a value is not allowed.
         """
@@ -218,7 +219,7 @@ class ParameterSet:
     def of_log(cls, logged: Mapping[str, float], source: str, *fields: Any) -> tuple[Self, tuple[str, ...]]:
         """Return the parameters of a flight log, and a sentence for each value that could not be used.
 
-        For a log without parameters, return the autopilot's defaults, and a sentence that says so.
+        For a log without parameters, return the autopilot's defaults and a sentence about this.
 
         logged: values by the names of any release.
         source: file of the log.
@@ -236,20 +237,23 @@ class ParameterSet:
 
     @classmethod
     def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
-        """Return True if a value of a file was set on purpose; a subclass may exclude values that equal the default."""
+        """Return True if a value of a file was set on purpose.
+
+        A subclass may return False for a value that equals the default.
+        """
         return True
 
     @classmethod
     def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without the parameters that the release lacks, and the names removed from the file.
+        """Return the sources without parameters that the release lacks, and the names that were removed.
 
-        An autopilot without such parameters, as here, returns all sources and no names.
+        In this base class the release lacks no parameter, so all sources and no names are returned.
         """
         return sources, ()
 
     @classmethod
     def _build(cls, sources: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
-        """Return a parameter set that takes each value from the first source that states it, else from the defaults.
+        """Return a parameter set; each value is from the first source that states it, or is the default.
 
         Raises ParameterError if a minimum is not below its maximum.
         """
@@ -285,7 +289,10 @@ class ParameterSet:
         return parameter_set
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter's value in SI and radians, by the autopilot's name; its default if the set lacks it."""
+        """Return the value of a parameter in SI units and radians, by the autopilot's name for it.
+
+        A parameter that the set lacks has its default.
+        """
         definition = self.table.by_name[name]
         return definition.to_si * self._value_by_name.get(name, definition.default)
 
@@ -295,9 +302,9 @@ class ParameterSet:
         return {name: value for name, value, _ in self.values}
 
     def changed(self, origin: Origin = "file", /, **values: float) -> Self:
-        """Return a copy with other values for some parameters, by the autopilot's names and in its units.
+        """Return a copy in which some parameters have other values, by the autopilot's names and in its units.
 
-        origin: source of the values.
+        origin: source of the new values.
         Raises ValueError if the table has no parameter of a name.
         """
         if unknown := sorted(set(values) - self.table.by_name.keys()):
@@ -312,7 +319,7 @@ class ParameterSet:
 
     @property
     def outside_documented_ranges(self) -> tuple[str, ...]:
-        """Texts on values of the file outside their documented ranges; the autopilot flies with these values."""
+        """Texts on the values of the file that are outside their documented ranges, but are flown with."""
         texts = []
         for name, value in self.by_origin("file").items():
             minimum, maximum = self.table.by_name[name].documented or (-math.inf, math.inf)
@@ -322,7 +329,7 @@ class ParameterSet:
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """Texts on values of the file that contradict another parameter; the autopilot flies with these values."""
+        """Texts on the values of the file that contradict another parameter, but are flown with."""
         return find_contradictions(self.values, self.table.orders)
 
 

@@ -109,7 +109,7 @@ class TurnRules:
 
     @property
     def follows_path(self) -> bool:
-        """True if the autopilot follows the fly-by path, and does not turn by an acceptance radius."""
+        """True if the autopilot follows the fly-by path instead of turning at an acceptance radius."""
         return self.acceptance_radius is None
 
 
@@ -135,7 +135,7 @@ class RateLimit(NamedTuple):
 
     @classmethod
     def of_parameters(cls, **values: float) -> "RateLimit":
-        """Return the limit of the smallest of several parameters, m/s; a value of 0 limits nothing.
+        """Return the rate limit that the smallest of several parameters sets, m/s; 0 means no limit.
 
         >>> RateLimit.of_parameters(FW_T_CLMB_R_SP=3.0, FW_T_CLMB_MAX=5.0)
         RateLimit(rate=3.0, name='FW_T_CLMB_R_SP 3 m/s')
@@ -176,13 +176,13 @@ class SpeedRules:
     max_pitch_name: str = ""
 
     def true_airspeed_factor(self, amsl: float) -> float:
-        """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""
+        """Return the ratio of true to commanded airspeed at an altitude (m AMSL)."""
         return float(eas_to_tas_ratio(amsl)) if self.equivalent else 1.0
 
     def flown_airspeeds(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the airspeed that the autopilot flies on each leg, m/s, (l,): true or equivalent like the commands.
+        """Return the airspeed that the autopilot flies on each leg, m/s, (l,).
 
-        commanded: airspeed commanded for each leg, m/s, (l,).
+        commanded: airspeed commanded for each leg, true or equivalent like the result, m/s, (l,).
         cruise: airspeed until the autopilot accepts the first command, m/s.
 
         >>> ignoring = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX"))
@@ -401,10 +401,10 @@ class LandingGlide(NamedTuple):
 
 
 def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-    """Return a straight glide without a flare, from the last waypoint before the landing point.
+    """Return a straight glide without a flare to the landing point.
 
-    height: height of the waypoint above the landing point, m.
-    run: horizontal distance of the waypoint from the landing point, m.
+    height: height of the last waypoint above the landing point, m.
+    run: horizontal distance of the last waypoint from the landing point, m.
     tail_wind, amsl: unused; see `GroundRules.glide`.
 
     >>> straight_glide(50.0, 1000.0, 0.0, 0.0)

@@ -72,7 +72,7 @@ class PointMass(NamedTuple):
 
     @property
     def tables(self) -> tuple[Record, Floats, Floats, Floats]:
-        """Record, tables and field as compiled functions take them."""
+        """Record, tables and wind field, in the form that compiled functions take."""
         return self.record, self.excess, self.power, self.field
 
 
@@ -116,7 +116,7 @@ _CACHE_VERSION = 2
 
 @functools.lru_cache(maxsize=8)
 def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float, bool]:
-    """Return airspeeds, excess power, two coefficients of the angle of attack, and True if the aircraft can glide.
+    """Return airspeeds, excess power, two coefficients of the angle of attack, and whether the aircraft can glide.
 
     The airspeeds (v,) and the specific excess power (t, v, h) are in m/s.  The angle of attack is the first coefficient
     (rad) plus the second one (rad m^2/s^2) divided by the square of airspeed.  The aircraft can glide if there is a
@@ -140,10 +140,10 @@ def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float,
 
 
 def _compute_trim_tables(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
-    """Trim the aircraft at each point of the grid; return its specific excess power and its angle of attack.
+    """Trim the aircraft at each point of a grid of throttle, airspeed and altitude.
 
-    "excess" is the specific excess power, m/s, (t, v, h); "alpha" is the angle of attack at the lowest altitude, rad,
-    (v,).  Both are NaN where no trim exists.
+    The result is the specific excess power "excess", m/s, (t, v, h), and the angle of attack at the lowest altitude
+    "alpha", rad, (v,). Values are NaN where no trim exists.
 
     speeds: airspeeds of the grid, m/s, (v,).
     """
@@ -167,10 +167,11 @@ def _compute_trim_tables(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats
 
 
 def fill_excess_power(trims: Floats) -> Floats:
-    """Return a table of specific excess power with the gaps (NaN) at grid points without a trim filled, m/s, (t, v, h).
+    """Return a table of specific excess power with its gaps (NaN) filled, m/s, (t, v, h).
 
-    A gap is filled from other throttles, then from other airspeeds, then from other altitudes.  With closed throttle it
-    is filled only from trims with closed throttle, if there are any: with more throttle the aircraft does not glide.
+    A gap is a grid point without a trim. It is filled from other throttles, or else from other airspeeds, or else from
+    other altitudes. A gap at closed throttle is filled only from other trims at closed throttle, if there are any,
+    because an aircraft with more throttle does not glide.
 
     >>> trims = np.array([[[-2.0], [np.nan]], [[1.0], [0.5]]])
     >>> fill_excess_power(trims)[0].tolist(), fill_excess_power(trims)[1].tolist()
@@ -194,7 +195,7 @@ def _fill_gaps_along(table: Floats, axis: int) -> None:
 
 
 def _fill_gaps(values: Floats) -> None:
-    """Fill gaps (NaN) in place: interpolate between known values, and beyond them repeat the nearest known value.
+    """Fill gaps (NaN) in place by interpolation; beyond the known values, repeat the nearest of them.
 
     Values without any known value are left unchanged.
     """
@@ -204,7 +205,7 @@ def _fill_gaps(values: Floats) -> None:
 
 
 def _resample_power(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
-    """Interpolate a table of the envelope to the airspeeds (v,) and altitudes (h,) of the grid; return it as (v, h).
+    """Interpolate a table of the envelope to the grid's airspeeds (v,) and altitudes (h,), (v, h).
 
     Beyond an edge of the table, the value at the edge applies.
     """
@@ -216,10 +217,10 @@ def _resample_power(envelope: Envelope, table: Floats, speeds: Floats) -> Floats
 
 
 def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
-    """Return the induced drag per weight times the square of airspeed (m^2/s^2), fitted to glides with closed throttle.
+    """Return the induced drag per weight times the square of airspeed (m^2/s^2), fitted to glides.
 
-    Drag per weight is a V^2 + b / V^2 in straight flight; the result is b, at least 0.  In a bank b grows as the square
-    of the load factor.
+    In straight flight the drag per weight is a V^2 + b / V^2. The result is b, at least 0. In a bank, b grows as the
+    square of the load factor.
 
     speeds: airspeeds of the glides, m/s, (v,).
     excess: specific excess power of the glides, m/s, (v,).
@@ -237,9 +238,10 @@ def angle_of_attack(state: Record, aircraft: Record) -> float:
 
 @inner
 def wind_at(position: Record, seconds: float, aircraft: Record, field: Floats) -> tuple[float, float]:
-    """Return the wind at a position and a time (s after take-off), m/s, east and north.
+    """Return the wind at a position and a time, m/s, east and north.
 
     position: a record with `east`, `north` and `up`, m.
+    seconds: time after take-off, s.
     aircraft: a record of `POINT_MASS`.
     field: as in `PointMass`.
     """
@@ -264,14 +266,14 @@ def advance_point_mass(
     field: Floats,
     dt: float,
 ) -> float:
-    """Move a point mass by ``dt`` s, and return the electric power used, W.
+    """Move a point mass by ``dt`` s, and return the electric power that it uses, W.
 
     path_angle: climb angle relative to the air, rad.
     aircraft: a record of `POINT_MASS`.
     excess_table, power: tables of a `PointMass`.
     field: as in `PointMass`.
 
-    The state's wind is the wind at its time and position, before and after the movement.
+    The wind in the state is updated to the new time and position.
     """
     thrust_power = excess_power(excess_table, throttle, state.airspeed, estimated.up, aircraft)
     tan_bank = math.tan(min(1.2, abs(state.roll)))
@@ -297,19 +299,17 @@ def advance_point_mass(
 def _electric_power(
     thrust_power: float, excess_table: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
 ) -> float:
-    """Return the electric power (W) at a specific excess power (m/s), by the parabola of `Envelope.power`.
+    """Return the electric power (W) for a specific excess power (m/s), by the parabola of `Envelope.power`.
 
-    Beyond the excess power at idle or at full throttle, the power at idle or at full throttle applies.
+    The power is constant below the excess power at idle, and above the excess power at full throttle.
     """
     if not aircraft.has_power:
         return 0.0
     idle_power = _interpolate(power[0], airspeed, amsl, aircraft)
     level_power = _interpolate(power[1], airspeed, amsl, aircraft)
     full_power = _interpolate(power[2], airspeed, amsl, aircraft)
-    full_excess, idle_excess = (
-        _interpolate(excess_table[excess_table.shape[0] - 1], airspeed, amsl, aircraft),
-        _interpolate(excess_table[0], airspeed, amsl, aircraft),
-    )
+    full_excess = _interpolate(excess_table[excess_table.shape[0] - 1], airspeed, amsl, aircraft)
+    idle_excess = _interpolate(excess_table[0], airspeed, amsl, aircraft)
     if thrust_power >= full_excess or not idle_excess < 0.0 < full_excess:
         return full_power
     if thrust_power <= idle_excess:
@@ -323,19 +323,20 @@ def _electric_power(
 
 @inner
 def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record) -> float:
-    """Return specific excess power in straight flight at a throttle, an airspeed and an altitude, m/s."""
+    """Return the specific excess power in straight flight at a throttle, airspeed and altitude, m/s."""
     grid_position = min(1.0, max(0.0, throttle)) * (excess_table.shape[0] - 1)
     row = min(excess_table.shape[0] - 2, int(grid_position))
-    lower_power, upper_power = (
-        _interpolate(excess_table[row], airspeed, amsl, aircraft),
-        _interpolate(excess_table[row + 1], airspeed, amsl, aircraft),
-    )
+    lower_power = _interpolate(excess_table[row], airspeed, amsl, aircraft)
+    upper_power = _interpolate(excess_table[row + 1], airspeed, amsl, aircraft)
     return lower_power + (grid_position - row) * (upper_power - lower_power)
 
 
 @inner
 def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:
-    """Interpolate a table (v, h) bilinearly at an airspeed and an altitude; beyond an edge, use the edge's value."""
+    """Interpolate a table (v, h) bilinearly at an airspeed and an altitude.
+
+    Outside the table the value at its nearest edge applies.
+    """
     x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.first_airspeed) / aircraft.airspeed_step))
     y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))
     i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))

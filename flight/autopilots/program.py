@@ -26,7 +26,7 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
 
     @abstractmethod
     def keep_log(self, target: Path) -> bool:
-        """End the program cleanly, move its own log to a file, and return True if there was a log."""
+        """End the program cleanly and move its log to a file; return True if there was a log."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class ProgramAutopilot(Autopilot):
     @classmethod
     @abstractmethod
     def accepts_program(cls, program: Path) -> bool:
-        """Return True if the program that --sitl names is this autopilot."""
+        """Return True if a program file that --sitl names is this autopilot."""
 
     @classmethod
     @abstractmethod
     def with_model(cls, model: Any, binary: Path) -> Self:
-        """Return the external program as an autopilot, with the settings of its simulated model.
+        """Return the autopilot that runs an external program, with the settings of its simulated model.
 
         model: simulated autopilot that models the program.
         binary: the program's file.
@@ -58,7 +58,7 @@ class ProgramAutopilot(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Checks of the simulated autopilot, with the settings that have no effect in the program's flight.
+        """Checks of the simulated autopilot, with the list of settings that have no effect in the program's flight.
 
         Heights above terrain are sent to a program as altitudes above sea level.
         """
@@ -73,7 +73,10 @@ class ProgramAutopilot(Autopilot):
         """Describe the settings that would change the flight path, but have no effect in the program's flight."""
 
     def describe(self, aircraft: str) -> str:
-        """Describe the program and the parameters that the user changed; before the flight, the simulated autopilot."""
+        """Describe the program and the parameters that the user changed.
+
+        Before the flight, describe the simulated autopilot instead.
+        """
         return super().describe(aircraft) if self.program is None else describe_program(self.program, aircraft)
 
     @property
@@ -83,7 +86,7 @@ class ProgramAutopilot(Autopilot):
 
     @property
     def file(self) -> Path:
-        """The program's file.
+        """File of the program.
 
         Raises ValueError if the autopilot belongs to a recorded flight.
         """

@@ -38,9 +38,9 @@ class RateGains(NamedTuple):
 
 
 def rate_gains_fault(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
-    """Return "too low" or "too high" for gains with which the attitude is not held; "" for usable gains.
+    """Return "too low" or "too high" for gains that cannot control the attitude; "" for usable gains.
 
-    feed_forward_range: lowest and highest feed-forward that suits the aircraft; both are positive.
+    feed_forward_range: lowest and highest feed-forward gain that suits the aircraft; both are positive.
     time_constant: time constant of the attitude, s.
 
     >>> rate_gains_fault(RateGains(0.345, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)

@@ -54,25 +54,23 @@ def simulate_each(
 
 @inner
 def initialise_outcome(start: Record, estimated: Record, has_terrain: bool, result: Record) -> None:  # pragma: no cover
-    """Set ``estimated`` to the start of the flight, and ``result`` to the values before the flight."""
+    """Set ``estimated`` and ``result`` to their values at the start of an RTL."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
     result.clearance = result.clearance_before_arrival = math.inf if has_terrain else math.nan
     result.threat = -1
     result.sphere_distance, result.distance_before_arrival = math.inf, math.inf
-    result.arrival_time, result.arrival_altitude, result.energy, result.outcome, result.position_count = (
-        math.nan,
-        math.nan,
-        0.0,
-        RETURN_TIMEOUT,
-        0,
-    )
+    result.arrival_time = math.nan
+    result.arrival_altitude = math.nan
+    result.energy = 0.0
+    result.outcome = RETURN_TIMEOUT
+    result.position_count = 0
 
 
 @inner
 def initialise_state(start: Record, aircraft: Record, field: Floats, state: Record) -> None:
-    """Set time, wind, airspeed and attitude of the point mass from the motion over the ground at the start.
+    """Set the point mass's time, wind, airspeed and attitude from the ground velocity at the start.
 
     field: as in `flight.autopilots.point_mass.PointMass`.
     """
@@ -88,7 +86,7 @@ def initialise_state(start: Record, aircraft: Record, field: Floats, state: Reco
 
 @inner
 def steady_throttle(start: Record, state: Record, aircraft: Record, excess_table: Floats) -> float:
-    """Return the throttle with which the aircraft holds the climb rate of the start, in steps of 0.01."""
+    """Return the throttle at which the aircraft holds the climb rate of the start, to the nearest 0.01."""
     throttle = 1.0
     while (
         throttle > 0.0 and excess_power(excess_table, throttle, state.airspeed, start.up, aircraft) > start.velocity_up
@@ -108,9 +106,9 @@ def store_position(estimated: Record, positions: Floats, result: Record) -> None
 
 @inner
 def advance_loiter(estimated: Record, target: Record, loiter: Record, arrival_radius: float, dt: float) -> bool:
-    """Update the progress around the last loiter, and return True once the loiter is complete.
+    """Update the progress around the last loiter of an RTL; return True once the loiter is complete.
 
-    The loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
+    It is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
 
     target: waypoint of the loiter.
     loiter: progress around the loiter, a record of `LOITER_PROGRESS`.
@@ -141,20 +139,19 @@ def update_clearances(
     has_terrain: bool,
     result: Record,
 ) -> None:
-    """Update the end time, the minimum height above ground and the minimum distance outside the kill spheres.
+    """Update the duration, the minimum height above ground and the minimum distance from kill spheres.
 
-    End the RTL outside the elevation data, or once the aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
+    Distances are measured from the surface of a sphere. The RTL ends where there are no elevation data, or once the
+    aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
     """
     result.end_time = time
     for m in range(spheres.shape[0]):
         radius = radii[m]
         if radius <= 0.0:
             continue
-        offset_e, offset_n, offset_up = (
-            estimated.east - spheres[m, 0],
-            estimated.north - spheres[m, 1],
-            estimated.up - spheres[m, 2],
-        )
+        offset_e = estimated.east - spheres[m, 0]
+        offset_n = estimated.north - spheres[m, 1]
+        offset_up = estimated.up - spheres[m, 2]
         sphere_distance = math.sqrt(offset_e * offset_e + offset_n * offset_n + offset_up * offset_up) - radius
         if sphere_distance < result.sphere_distance:
             result.sphere_distance, result.threat, result.threat_time = sphere_distance, m, time
@@ -171,11 +168,9 @@ def update_clearances(
             if math.isnan(result.arrival_time):
                 result.clearance_before_arrival = clearance
             result.clearance_time = time
-            result.clearance_east, result.clearance_north, result.clearance_up = (
-                estimated.east,
-                estimated.north,
-                estimated.up,
-            )
+            result.clearance_east = estimated.east
+            result.clearance_north = estimated.north
+            result.clearance_up = estimated.up
         result.clearance = clearance
     if clearance <= -MAX_IMPACT_DEPTH_M:
         result.outcome, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time

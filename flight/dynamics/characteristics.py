@@ -87,7 +87,9 @@ class StepResponse:
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Return level flights at evenly spaced airspeeds of the guidance, without airspeeds at which no trim exists.
+    """Return level flights at evenly spaced airspeeds in the range of the guidance.
+
+    An airspeed at which no trim exists is left out.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -109,7 +111,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
 
 
 def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
-    """Return the named modes of level flight at an airspeed (m/s) and an altitude (m); () if there is no such flight.
+    """Return the named modes of level flight at an airspeed (m/s) and an altitude (m); () if there is none.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for mode in level_flight_modes(load_aircraft("aerosonde"), 25.0):
@@ -151,12 +153,12 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 
 
 def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
-    """Return the response to each single control, without guidance, from level flight at cruise.
+    """Return the response to each single control, from level flight at cruise and without guidance.
 
-    Each control moves by a tenth of its travel, because a smaller movement would be lost in the play of some models'
-    actuators. Elevator (up) and throttle (down if it cannot open that much further) stay deflected; aileron and rudder
-    return after a second, because no aircraft stays upright while they are deflected. A control without effect, such
-    as a flying wing's rudder, is omitted.
+    Each control moves by a tenth of its travel, because some models have actuators with play, in which a smaller
+    movement would be lost. The elevator (up) and the throttle (down if it cannot be opened that much further) stay
+    deflected. Aileron and rudder return after a second, because no aircraft stays upright while they are deflected. A
+    control without effect, such as the rudder of a flying wing, is left out.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for step in step_responses(load_aircraft("aerosonde")):
@@ -172,10 +174,8 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     )
     level = steady_flight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
-    longitudinal_quantities, lateral_quantities = (
-        ("pitch", "alpha", "airspeed", "amsl"),
-        ("roll", "roll_rate", "beta", "yaw"),
-    )
+    longitudinal_quantities = ("pitch", "alpha", "airspeed", "amsl")
+    lateral_quantities = ("roll", "roll_rate", "beta", "yaw")
     responses = (
         _step_response(aircraft, "elevator", -elevator, math.inf, 20.0, longitudinal_quantities),
         _step_response(aircraft, "throttle", throttle, math.inf, 20.0, longitudinal_quantities),
@@ -188,7 +188,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 def _step_response(
     aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
-    """Simulate ``duration`` s of the response to a control that moves by ``size`` for ``hold_time`` s."""
+    """Simulate the response to a control that moves by ``size`` for ``hold_time`` s, over ``duration`` s."""
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
     commands = fdm.start(*_POSITION_DEG, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
     moved_commands = commands._replace(**{control: getattr(commands, control) + size})
@@ -204,6 +204,6 @@ def _step_response(
 
 
 def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:
-    """Return one quantity of the states, (t,); jumps of the yaw by 2 pi are removed."""
+    """Return one quantity of the states, (t,), without the jumps of the yaw by 2 pi."""
     values: Floats = states[name]
     return np.unwrap(values) if name == "yaw" else values

@@ -179,7 +179,7 @@ _MIN_SYMMETRIC_AIRSPEED_2 = 1e-6
 
 @inner
 def step(frame: Record, numbers: Floats, code: Code, contacts: Records, frictions: Records) -> None:
-    """Advance the model by one time step.
+    """Advance the compiled model by one time step.
 
     frame: record of `FRAME`, which shares the memory of the first registers.
     numbers: registers of the model.
@@ -230,7 +230,7 @@ def _integrate(frame: Record) -> None:
 
 @inner
 def _update_position(frame: Record) -> None:
-    """Compute latitude, longitude, altitude and the local axes from the inertial position."""
+    """Compute latitude, longitude, altitude and local axes from the inertial position."""
     cos, sin = math.cos(frame.earth_angle), math.sin(frame.earth_angle)
     frame.earth_cos, frame.earth_sin = cos, sin
     earth_position = transform(rotation(cos, sin), vector_of(frame.position))
@@ -252,7 +252,10 @@ def _update_position(frame: Record) -> None:
 
 @inlined
 def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) -> Matrix:
-    """Return the matrix that transforms vectors from axes fixed to the earth to north, east and down."""
+    """Return the matrix that transforms vectors from axes fixed to the earth to local axes.
+
+    Local axes point north, east and down.
+    """
     return (
         (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),
         (-sin_lon, cos_lon, 0.0),
@@ -322,7 +325,7 @@ def _update_atmosphere(frame: Record) -> None:
 
 @inner
 def _update_air_data(frame: Record) -> None:
-    """Compute airspeed, alpha, beta and pressures, and the load factor of the previous step."""
+    """Compute airspeed, alpha, beta and pressures; and the load factor of the previous step."""
     wind = add(vector_of(frame.wind), vector_of(frame.gust))
     u, v, w = subtract(vector_of(frame.body_velocity), transform(matrix_of(frame.local_to_body), wind))
     symmetric_2 = u * u + w * w
@@ -346,7 +349,7 @@ def _update_air_data(frame: Record) -> None:
 
 @inlined
 def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
-    """Return the aerodynamic force (lbf) and its moment about the center of gravity (lbf ft), in body axes."""
+    """Return the aerodynamic force (lbf) and moment about the center of gravity (lbf ft), in body axes."""
     cos, sin = math.cos(frame.alpha), math.sin(frame.alpha)
     drag, side, lift = vector_of(frame.aero_force)
     force = transform(((cos, 0.0, -sin), (0.0, 1.0, 0.0), (sin, 0.0, cos)), (-drag, side, -lift))
@@ -355,7 +358,7 @@ def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
 
 @inlined
 def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
-    """Return the sum of the external forces (lbf) and the sum of the external moments (lbf ft), in body axes."""
+    """Return the sums of the external forces (lbf) and of the external moments (lbf ft), in body axes."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
         magnitude, first_axis = numbers[code[k]], int(code[k + 1])
@@ -394,7 +397,7 @@ def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
 
 @inner
 def _add_friction(frame: Record, contacts: Records, frictions: Records, count: int) -> None:
-    """Add the accelerations that the friction of the contacts causes.
+    """Add the accelerations that are caused by friction at the contacts.
 
     count: number of friction records.
     """
@@ -437,10 +440,10 @@ def step_repeatedly(
 
 @compiled
 def initialise_attitude(frames: Records, angles: Floats) -> None:
-    """Set the attitude of the frame to the attitude that JSBSim's initial conditions produce, to the last bit.
+    """Set the attitude of the frame to that of JSBSim's initial conditions, to the last bit.
 
-    FGInitialCondition stores a quaternion that cannot be read.  Each angle that is set changes one Euler angle of this
-    quaternion, so its last bits depend on all angles that were ever set.
+    JSBSim's FGInitialCondition stores a quaternion that cannot be read. Setting an angle changes one Euler angle of
+    this quaternion, so its last bits depend on all angles that have ever been set.
 
     frames: one record of `FRAME`, (1,), with the position, the rates and the angle of the earth.
     angles: roll, pitch and yaw of all evaluations of a JSBSim instance in order, rad, (n, 3).

@@ -82,11 +82,11 @@ class CompiledModel:
     """
 
     def __init__(self, fdm: Fdm, reads: Sequence[str], steps: int, *, gusts: bool, terrain: bool) -> None:
-        """Copy the state of an aircraft at the start of its flight, before the first step.
+        """Copy the state of an aircraft at the start of a flight, before the first step.
 
-        reads: fields of `flight.dynamics.state.STATE` that are read each tick.
+        reads: fields of `flight.dynamics.state.STATE` that are read in each tick.
         steps: steps in a tick.
-        gusts, terrain: True if gusts, or the altitude of the ground, are set each tick.
+        gusts, terrain: True if gusts, or the altitude of the ground, are set in each tick.
 
         Raises UnsupportedModel for a model that is not covered.
         """
@@ -116,10 +116,10 @@ class CompiledModel:
         self._copy_state()
 
     def find_differences(self) -> list[str]:
-        """Step both engines until a property differs in any bit, and return the differing properties.
+        """Step JSBSim and the compiled model together; return the properties that then differ in any bit.
 
-        The list is empty if no property differs in `PROOF_STEPS`.  Only the state of the compiled model is restored: a
-        flight with JSBSim must start again.
+        The steps end at the first difference. The list is empty if there is no difference in `PROOF_STEPS` steps. Only
+        the state of the compiled model is restored, so a flight with JSBSim must start again.
         """
         initial_numbers, initial_contacts = self.numbers.copy(), self.contacts.copy()
         differing = self.differing_properties()
@@ -147,7 +147,10 @@ class CompiledModel:
         return self.properties[name]
 
     def _state_register(self, field: str, zero_register: int) -> int:
-        """Return the register of a field of the state; ``zero_register`` for a quantity that the aircraft lacks."""
+        """Return the register of a field of the state.
+
+        For a quantity that the aircraft lacks it is ``zero_register``.
+        """
         if field in STATE_PROPERTIES:
             return self._register(STATE_PROPERTIES[field][0])
         name = self._fdm.aircraft.model.readings[MODEL_FIELDS.index(field)].name
@@ -206,7 +209,7 @@ class CompiledModel:
         frame.contact_reach = float(np.max(arms, initial=0.0)) + _REACH_MARGIN_FT
 
     def _move_inputs(self, initial_numbers: Floats, round_number: int) -> None:
-        """Set commands and gusts in both engines, in a different combination in each round."""
+        """Set commands and gusts in both engines, in a new combination in each round."""
         moves = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
         scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
         names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
@@ -256,9 +259,9 @@ def _frame_properties() -> dict[str, int]:
 
 
 def _pack_code(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], steps: int) -> Code:
-    """Return the code of a program: the header, followed by the sections in order.
+    """Return the code of a program: the header, then the sections in order.
 
-    reads, writes: registers that are read and written each tick.
+    reads, writes: registers that are read and written in each tick.
     steps: time steps in a tick.
     """
     forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
@@ -278,7 +281,7 @@ def _arm_about_center(position: Sequence[float], centre: Sequence[float]) -> lis
 def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:
     """Return the inertia matrix and the inverse of this matrix, from JSBSim's inertia properties.
 
-    The sign convention of xz differs from the other products of inertia, as in FGMassBalance.
+    As in FGMassBalance, the sign convention of xz differs from that of the other products of inertia.
     """
     ixz = -xz
     k1, k2, k3 = yy * zz - yz * yz, yz * ixz + xy * zz, xy * yz + yy * ixz
@@ -290,7 +293,7 @@ def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz:
 
 
 def _actuator_numbers(source: float, lag: float, rate: float, dt: float) -> list[float]:
-    """Return the registers of an actuator up to `LOWER_LIMIT`, with its output equal to its input, as at the start.
+    """Return the registers of an actuator up to `LOWER_LIMIT`, with its output equal to its input.
 
     source: input of the actuator.
     lag: rate of the lag, 1/s; NaN without a lag.

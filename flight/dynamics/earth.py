@@ -21,9 +21,10 @@ _FOCUS = SEMI_MAJOR * ECCENTRICITY_2
 
 @inner
 def geodetic(position: Vector) -> tuple[float, float, float, float]:
-    """Return geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude of a position.
+    """Return geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude, of a position.
 
-    Computed by one iteration of Fukushima's method (Journal of Geodesy 79, 2006), with the paper's variable names.
+    The method is one iteration of Fukushima's method (Journal of Geodesy 79, 2006), with the variable names of the
+    paper.
 
     position: position in axes fixed to the earth, ft.
     """

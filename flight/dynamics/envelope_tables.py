@@ -40,11 +40,11 @@ _TABLE_NAMES = (*TABLES, *POWERS)
 
 
 def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelope:
-    """Return the aircraft's envelope, from the cache if possible, otherwise computed and cached.
+    """Return the aircraft's envelope from the cache; if it is not there, compute it and store it in the cache.
 
-    The cached and the computed envelope are identical. A cache file that is unreadable, damaged or for another model,
-    JSBSim or schema is replaced, unless its folder is not writable. Raises FlightError for a model that JSBSim cannot
-    load.
+    The cached and the computed envelope are identical. A cache file is replaced if it is unreadable or damaged, or if
+    it is for another model, JSBSim or schema. It is not replaced if its folder is not writable. Raises FlightError for
+    a model that JSBSim cannot load.
 
     >>> from aircraft.catalog import load_aircraft
     >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)
@@ -79,10 +79,11 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
 
 
 def _stated_min_speeds(tables: Mapping[str, Floats], stall_speed: float) -> Floats:
-    """Return the lowest airspeeds of level flight by altitude, m/s, at sea level at least the stated stall speed (m/s).
+    """Return the lowest airspeeds of level flight by altitude, m/s.
 
-    The model of a data sheet flies a few per cent slower: it reaches the stated stall speed with the elevator short of
-    its stop, and without the lift of the propeller.
+    At sea level the lowest airspeed is at least the stated stall speed (m/s). The model of a data sheet would fly a few
+    per cent slower than this, because it reaches the stated stall speed before the elevator reaches its stop, and
+    without the lift of the propeller.
     """
     model_speeds = tables["level_speed_min"]
     factor = max(1.0, stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0
@@ -139,7 +140,7 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
 
 
 def _check_commands(fdm: Fdm) -> None:
-    """Raise FlightError if the elevator or the throttle of a model changes none of its accelerations."""
+    """Raise FlightError if the elevator or the throttle of a model does not change any acceleration."""
     fdm.move_to(0.0)
     values = fdm.first_guess()
     for name, limit in (("elevator", fdm.surface_limits()[0]), ("throttle", 1.0)):
@@ -159,9 +160,9 @@ def _check_commands(fdm: Fdm) -> None:
 
 
 def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tuple[float, float]:
-    """Return the lowest and the highest airspeed of level flight at an altitude, m/s; NaN if no level flight is found.
+    """Return the lowest and the highest airspeed of level flight at an altitude, m/s; NaN if not found.
 
-    level_trims: level flights at airspeeds of the grid, the fastest first.
+    level_trims: level flights at the airspeeds of the grid, fastest first.
 
     A search that fails, or that ends at an airspeed below the fastest level flight of the grid, is repeated from the
     nearest level flight of the grid. If the wing stalls before the elevator reaches its stop, no search finds the
@@ -184,7 +185,10 @@ def _power(fdm: Fdm, trim: Trim) -> float:
 
 
 def _grid_airspeeds(aircraft: Aircraft) -> Floats:
-    """Return the airspeeds of the grid, m/s, (v,): from the stall to 5 m/s above the maximum of the guidance."""
+    """Return the airspeeds of the grid, m/s, (v,).
+
+    They extend from the stall to 5 m/s above the maximum airspeed of the guidance.
+    """
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
 
 
@@ -200,7 +204,7 @@ def _cache_key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
 
 
 def _read_cache_file(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
-    """Return the tables of a cache file, or None if it is incomplete, damaged or for another key."""
+    """Return the tables in a cache file; None if the file is incomplete, damaged or for another key."""
     grid = (airspeeds.size, _GRID_AMSL_M.size)
     shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
     tables = read_tables(file, key, {name: shapes.get(name, _GRID_AMSL_M.shape) for name in _TABLE_NAMES})
@@ -218,7 +222,7 @@ def _read_cache_file(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict
 def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats] | None:
     """Return the tables that `write_tables` wrote, or None if the file is damaged or for another key.
 
-    key: values that JSON reproduces exactly.
+    key: values that identify the tables, and that JSON reproduces exactly.
     shapes: shape of each table by its name.
     """
     try:
@@ -233,7 +237,7 @@ def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int,
 
 
 def write_tables(file: Path, key: dict[str, Any], tables: Mapping[str, Floats]) -> None:
-    """Write a cache file completely or not at all; do nothing without disk space or permission."""
+    """Write a cache file completely or not at all; do nothing if disk space or permission is missing."""
     values: dict[str, object] = {}
     for name, table in tables.items():
         entries = table.astype(object)

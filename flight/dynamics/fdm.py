@@ -96,7 +96,7 @@ def load_model(
     instance: a JSBSim instance without a model, created for the folder ``copy``.
     copy: the empty folder.
     dt: time step, s.
-    printed: function that returns JSBSim's output so far.
+    printed: function that returns what JSBSim has printed so far.
     flat_earth, is_tested, gear: see `Fdm`.
 
     Raises FlightError for a model that is missing, refused or not loadable.
@@ -140,7 +140,7 @@ def load_model(
 
 
 def _check_mass(instance: Any, aircraft: Aircraft) -> None:
-    """Raise FlightError if the stated mass differs from the model's mass, fuel included."""
+    """Raise FlightError if the stated mass differs from the mass of the model, fuel included."""
     has_property = instance.get_property_manager().hasNode
     tank_properties = itertools.takewhile(
         has_property, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count())
@@ -283,7 +283,7 @@ class Fdm:
         wind_ned: Sequence[float] = (0.0, 0.0, 0.0),
         terrain_amsl: float = 0.0,
     ) -> Trim:
-        """Start a flight in steady flight along a straight path over the ground, and return its trim.
+        """Start a steady flight along a straight path over the ground, and return its trim.
 
         lat_deg: geodetic.
         amsl, terrain_amsl: m.
@@ -291,7 +291,7 @@ class Fdm:
         airspeed: m/s, true.
         wind_ned: velocity of the air, north, east, down, m/s, (3,); it stays as the steady wind.
 
-        Surfaces and motor start at their trimmed values, so that holding the trim's commands causes no transient. Raise
+        Surfaces and motor start at their trimmed values, so that the trim's commands cause no transient. Raises
         FlightError for values out of range, for a wind stronger than the airspeed along the path, and for a flight that
         the aircraft cannot hold.
         """
@@ -329,7 +329,7 @@ class Fdm:
         amsl: float,
         commands: Sequence[float],
     ) -> None:
-        """Start a flight in any state, trimmed or not, with surfaces and motor at these commands (4,).
+        """Start a flight in any state, trimmed or not, with surfaces and motor at four commands (4,).
 
         attitude: roll, pitch, yaw, rad.
         velocity: north, east, down over the ground, m/s.
@@ -375,7 +375,7 @@ class Fdm:
         )
 
     def _release_motion(self) -> None:
-        """Start the motion at time 0 from the initial conditions that are set."""
+        """Start the motion at time 0 from the initial conditions that have been set."""
         if self._engine:
             self._engine.release()
         self._exec.set_trim_status(False)
@@ -445,7 +445,7 @@ class Fdm:
         return x() * factor, y() * factor, z() * factor
 
     def height(self) -> float:
-        """Return the height above the ground altitude that was set last, m; negative below ground."""
+        """Return the height above the ground altitude that was set last, m; negative below the ground."""
         return self._read_height() * FOOT
 
     # Functions for trims and linearization.
@@ -455,11 +455,11 @@ class Fdm:
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
-        """Return the initial guess of a trim vector, (8,): level flight at cruise."""
+        """Return a trim vector from which an iteration can start, (8,): level flight at cruise."""
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:
-        """Move the point of evaluation of `apply_trim` and `derivatives` to an altitude, m; this ends any flight."""
+        """Move the aircraft to an altitude (m) for `apply_trim` and `derivatives`; this ends any flight."""
         lat_deg, lon_deg, terrain = self._start_position
         for setter, value in zip(self._ic_position, (lat_deg, lon_deg, terrain / FOOT, amsl / FOOT), strict=True):
             setter(value)
@@ -469,9 +469,10 @@ class Fdm:
             self._engine.hold()
 
     def apply_trim(self, values: Floats) -> Floats:
-        """Set the state that a trim vector (8,) describes; return its body accelerations (6,), m/s^2 and rad/s^2.
+        """Set the state that a trim vector (8,) describes, and return its body accelerations (6,).
 
-        The state is the one in which a flight starts, or from which `derivatives` takes the engine speed.
+        The accelerations are m/s^2 and rad/s^2. A flight starts in this state, and `derivatives` takes the engine speed
+        from it.
         """
         airspeed, climb, alpha, bank, *commands = values.tolist()
         axes = body_axes(self._heading, climb, bank, alpha)
@@ -482,7 +483,7 @@ class Fdm:
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
         """Return the state derivatives (8,) of (u, v, w, p, q, r, roll, pitch) with these commands (4,).
 
-        Surfaces and motor are at their commanded values. An engine keeps the speed of the last `apply_trim`.
+        Surfaces and motor have their commanded values. An engine keeps its speed from the last `apply_trim`.
         """
         roll, pitch = states[6], states[7]
         axes = body_axes(self._heading, pitch, roll, 0.0)
@@ -497,12 +498,12 @@ class Fdm:
         commands: Iterable[float],
         settle: bool = False,
     ) -> Floats:
-        """Set JSBSim's initial conditions, and return the eight rates of `RATES` at this state, SI and radians.
+        """Set JSBSim's initial conditions, and return the eight rates of `RATES` there, in SI units and rad.
 
         angles: roll, pitch, yaw, rad.
         velocity: (3,) north, east, down over the ground, m/s.
         rotation_rates: p, q, r, rad/s.
-        commands: the four commands; actuators take these values without lag.
+        commands: the four commands, which actuators follow without lag.
         settle: True to let an engine's speed settle, False to keep it.
         """
         self._attitudes.extend(angles)
@@ -518,7 +519,7 @@ class Fdm:
 
 
 def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:
-    """Set the properties of a model according to a variation. Raises FlightError for an undefined property."""
+    """Set the properties of a model that a variation states. Raises FlightError for an undefined property."""
     if variation.mass != 1.0:
         extra_mass = (variation.mass - 1.0) * aircraft.mass
         point_mass = properties.getter("inertia/pointmass-weight-lbs")()

@@ -77,10 +77,10 @@ _DEGREES = 180.0 / math.pi
 
 @inner
 def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tuple[Vector, Vector, int]:
-    """Return the total force (lbf) and moment (lbf ft) of all contacts, and the number of friction records to solve.
+    """Return the total force (lbf) and moment (lbf ft) of all contacts, and the number of friction records.
 
-    Force and moment are in body axes and exclude friction, for which `friction_accelerations` solves.  The friction
-    records of contacts below the ground are filled.
+    Force and moment are in body axes. They exclude friction, which `friction_accelerations` computes from the friction
+    records. These records are filled here for the contacts below the ground.
     """
     force, moment, count = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0
     if frame.geodetic_altitude - frame.terrain > frame.contact_reach:
@@ -124,11 +124,11 @@ def _contact_force(
     contact_index: int,
     friction_count: int,
 ) -> tuple[Vector, Vector, int]:
-    """Return the force (lbf) and moment (lbf ft) of a contact below the ground, and the new number of friction records.
+    """Return the force (lbf) and moment (lbf ft) of a contact below the ground, and the number of friction records.
 
-    Force and moment are in body axes and exclude friction.  Also store the compression and its rate in `contact`.
+    Force and moment are in body axes, and exclude friction. The compression and its rate are stored in `contact`.
 
-    height_above_ground: height of the uncompressed contact, ft, negative.
+    height_above_ground: height of the uncompressed contact, ft; negative.
     normal: normal of the ground, in axes fixed to the earth.
     """
     upward = transform(matrix_of(frame.earth_to_body), normal)
@@ -176,7 +176,7 @@ def _contact_force(
 def _moment_arm(frame: Record, contact: Record, displacement: Vector) -> Vector:
     """Return the moment arm of a contact about the center of gravity, ft, in body axes.
 
-    It is computed in JSBSim's structural frame (inches), to reproduce JSBSim's rounding.
+    The arm is computed in JSBSim's structural frame (inches), to reproduce JSBSim's rounding.
 
     displacement: displacement of the contact by its compression, ft, in body axes.
     """
@@ -197,9 +197,9 @@ def _add_frictions(
     contact_index: int,
     friction_count: int,
 ) -> int:
-    """Append the friction records of a contact, and return the new number of friction records.
+    """Append the friction records of a contact; return the new number of friction records.
 
-    A sliding contact that is not a wheel has friction against its motion; any other contact has friction in the
+    A sliding contact that is not a wheel has friction against its motion. Any other contact has friction in the
     longitudinal and in the lateral direction.
 
     axes: longitudinal, lateral and upward axis of the ground, as columns in body axes.
@@ -249,8 +249,11 @@ def _set_friction(
     min_force: float,
     max_force: float,
 ) -> None:
-    """Fill a friction record, and limit the contact's last friction force to the record's range."""
-    friction.contact, friction.kind, friction.min_force, friction.max_force = contact_index, kind, min_force, max_force
+    """Fill a friction record; limit the contact's last friction force to the range of the record."""
+    friction.contact = contact_index
+    friction.kind = kind
+    friction.min_force = min_force
+    friction.max_force = max_force
     set_vector(friction.direction, direction)
     set_vector(friction.arm, arm)
     contact.friction[kind] = _limit(min_force, contact.friction[kind], max_force)
@@ -310,7 +313,10 @@ def friction_accelerations(
 
 @inner
 def _solve_frictions(contacts: Records, frictions: Records, count: int) -> None:
-    """Solve for the friction forces in the contacts' memory by the Gauss-Seidel method, each within its limits."""
+    """Solve for the friction force of each contact by the Gauss-Seidel method, within the limits of the force.
+
+    The forces are stored in the memory of the contacts.
+    """
     for _ in range(_MAX_ITERATIONS):
         total_change = 0.0
         for i in range(count):

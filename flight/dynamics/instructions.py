@@ -129,9 +129,9 @@ def _clip(value: float, lower: float, upper: float) -> float:
 
 @inlined
 def _interpolate_table(numbers: Floats, first: int, row_count: int, key: float) -> float:
-    """Interpolate a table linearly at a key; beyond the ends of the table return the value of the first or last row.
+    """Interpolate a table linearly at a key; beyond an end of the table return the value at this end.
 
-    first: first register of the table, whose rows are pairs of key and value.
+    first: first register of the table; a row of the table is a key and a value.
     """
     last_row = first + 2 * (row_count - 1)
     if key <= numbers[first]:
@@ -152,9 +152,10 @@ def _interpolate_table(numbers: Floats, first: int, row_count: int, key: float) 
 
 @inlined
 def _step_actuator(numbers: Floats, first: int, value: float) -> float:
-    """Advance an actuator by a time step, and return the output after lag, rate limit and position limits.
+    """Advance an actuator by a time step, and return its output.
 
-    The position limits do not change the stored state.
+    The output follows the input with a lag, a rate limit and position limits. The position limits do not change the
+    stored state.
 
     first: first register of the actuator.
     value: input.

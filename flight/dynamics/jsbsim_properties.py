@@ -115,7 +115,7 @@ class PropertyAccess:
         return node
 
     def getter(self, name: str) -> Getter:
-        """Return a function that reads a property; "" reads as zero. Raises FlightError if it is undefined."""
+        """Return a function that reads a property; for "" it returns zero. Raises FlightError if it is undefined."""
         if not name:
             return _read_zero
         return self._node(name).get_double_value
@@ -125,7 +125,7 @@ class PropertyAccess:
         return self._node(name).set_double_value
 
     def command_setter(self, command: CommandProperty) -> Setter:
-        """Return a function that sets a command in rad, or a throttle, scaled to the property's units."""
+        """Return a function that sets a command (rad, or throttle), scaled to the units of the property."""
         set_value, above, below = self.setter(command.name), command.above, command.below
         if above == below == 1.0:
             return set_value
@@ -140,7 +140,7 @@ class PropertyAccess:
         self.setter(name)(value)
 
     def set_optional(self, name: str, value: float, default: float) -> None:
-        """Set a property; do nothing if the model lacks it and the value is the default."""
+        """Set a property; do nothing if the model lacks it and the value is its default."""
         if value != default or self._manager.hasNode(name):
             self.set(name, value)
 

@@ -84,18 +84,18 @@ class _Reader:
         return bytes(data)
 
     def _refuse_model(self, reason: str) -> None:
-        """Raise FlightError with the current line of the file and a reason."""
+        """Raise FlightError with a reason and the current line of the file."""
         location = f"{self.file}:{self._parser.CurrentLineNumber}"
         raise FlightError(f"{location}: {reason}; the model is refused", file=self.file)
 
     def _check_doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
-        """Refuse a document type with internal declarations, unless the model is JSBSim's own."""
+        """Refuse a document type with internal declarations, unless JSBSim ships the model."""
         # A declaration that only names a document type is never read; JSBSim's own files hold a few harmless entities.
         if internal and not self._remove_channels:
             self._refuse_model("a document type declaration may expand without end")
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
-        """Note the files and the properties that an element names; refuse a forbidden element."""
+        """Record the files and properties that an element names; refuse a forbidden element."""
         depth = len(self._path)
         self._path.append(name)
         self._text = []
@@ -121,7 +121,7 @@ class _Reader:
         self._declares = name == "property" and depth == (2 if self._main else 1)
 
     def _end_element(self, name: str) -> None:
-        """Note the property that the element's text names, or the end of a channel that is being removed."""
+        """Record the property that the text of an element names, or the end of a removed channel."""
         self._path.pop()
         match = _PROPERTY_NAME.fullmatch("".join(self._text).strip())
         self._text = []
@@ -147,15 +147,15 @@ class _Reader:
 def check_model(
     file: Path, provided: Callable[[str], bool], folders: Sequence[Path] = (), *, shipped: bool = False
 ) -> dict[str, bytes]:
-    """Refuse a model that is unsafe for JSBSim, and return its files by name, as JSBSim may read them.
+    """Refuse a model that is unsafe for JSBSim; return the files that JSBSim may read, by name.
 
     provided: function that returns True if JSBSim itself has a property of this name before a model is loaded.
     folders: folders of the files that the model includes.
-    shipped: True for JSBSim's own model, whose channels are removed and whose names are known to be valid.
+    shipped: True for a model that JSBSim ships; its channels are removed, and its names are known to be valid.
 
-    Raises FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
-    declaration, for an ``<input>`` or ``<output>`` channel, for an included file that is not in the folders, and for a
-    property that is read and that neither JSBSim nor the model creates.
+    Raises FlightError, naming file and line, for each of these: a file that cannot be read or is not well formed; a
+    document type declaration; an ``<input>`` or ``<output>`` channel; an included file that is not in the folders; and
+    a property that the model reads but that neither JSBSim nor the model creates.
     """
     readers = {file.name: _read_model(file, main=True, remove_channels=shipped)}
     pending = [readers[file.name]]
@@ -175,16 +175,16 @@ def check_model(
 
 
 def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
-    """Return the files, by name, of a model that ships with JSBSim, such that `check_model` accepts a copy.
+    """Return the files of a model that JSBSim ships, by name, in a form that `check_model` accepts.
 
-    Channels are removed, and entities of a document type are written out.
+    Channels are removed, and entities of a document type are replaced by their text.
     """
     files = check_model(aircraft.model_file, lambda _: True, aircraft.model_folders, shipped=True)
     return {name: ElementTree.tostring(ElementTree.fromstring(data)) for name, data in files.items()}
 
 
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file, after it has read the file; a file that has not changed is read only once."""
+    """Return the reader of a file after it has read the file; an unchanged file is read only once."""
     status = file.stat() if file.is_file() else None
     stamp = None if status is None else (status.st_mtime_ns, status.st_size, status.st_ino)
     return _read_stamped_model(file, stamp, main, remove_channels)
@@ -249,8 +249,8 @@ except FlightError:
 def try_model(aircraft: Aircraft) -> None:
     """Load and step a user's model in another process, once for each version of the model.
 
-    Raises FlightError if that process dies. If it only refuses the model, nothing is raised, because loading the model
-    in this process will refuse it again, with the reason.
+    Raises FlightError if that process dies. If the process only refuses the model, nothing is raised here. Loading the
+    model in this process then raises an error with the reason.
     """
     code, reason = _run_trial(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:
@@ -263,9 +263,9 @@ def try_model(aircraft: Aircraft) -> None:
 
 @cache
 def _run_trial(folder: str, _version: str) -> tuple[int | None, str]:
-    """Load and step a model in another process; return the exit code, or None on timeout, and what JSBSim printed.
+    """Load and step a model in another process; return its exit code, None on timeout, and its output.
 
-    _version: hash of the model, which is not used here but part of the cache's key.
+    _version: hash of the model; it is only used as a part of the cache's key.
     """
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
@@ -299,7 +299,7 @@ _MAX_REASON_LINES = 4
 
 
 def jsbsim_reason(printed: str) -> str:
-    r"""Return, in one line, the reason that JSBSim printed for not loading a model; "" if it printed none.
+    r"""Return in one line why JSBSim did not load a model; "" if it printed no reason.
 
     >>> jsbsim_reason("JSBSim startup beginning ...\n\nIn file /tmp/a/m.xml: line 91\n Unknown engine type\n")
     'In file m.xml: line 91 Unknown engine type'

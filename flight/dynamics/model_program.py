@@ -157,7 +157,7 @@ def frame_register(name: str, element: int = 0) -> int:
 def translate(model: bytes) -> ModelProgram:
     """Translate the XML of a JSBSim model to a program.
 
-    The model must be one that JSBSim accepts.  Raises UnsupportedModel with the reason if the model is not supported.
+    JSBSim must accept the model. Raises UnsupportedModel with the reason if the model is not supported.
     """
     try:
         root = ElementTree.fromstring(model)
@@ -223,7 +223,7 @@ class _Translator:
     # Registers and instructions.
 
     def _declare_properties(self) -> None:
-        """Assign a register to each property that the model creates, because it may be read before it is computed."""
+        """Assign a register to each property that the model creates, which may be read before it is computed."""
         for section in self.sections:
             for element in section.iter():
                 if element.tag == "property" and "value" in element.attrib:
@@ -234,13 +234,13 @@ class _Translator:
                     self._property(_own_property(element.attrib["name"]))
 
     def _property(self, name: str) -> int:
-        """Return the register of a property; for a new property, assign a new register."""
+        """Return the register of a property; assign a new register to a new property."""
         if name not in self.properties:
             self.properties[name] = self._new_register(0.0)
         return self.properties[name]
 
     def _new_register(self, *values: float) -> int:
-        """Append registers with these values, and return the index of the first new register."""
+        """Append registers with some values; return the index of the first new register."""
         self.numbers += values
         return len(self.numbers) - len(values)
 
@@ -252,7 +252,7 @@ class _Translator:
         return self._constants[key]
 
     def _emit(self, operation: Operation, operands: Sequence[int], target: int | None = None) -> int:
-        """Append an instruction, and return its target register; with ``target`` None, use a new register."""
+        """Append an instruction, and return its target register; None for ``target`` means a new register."""
         target = self._new_register(0.0) if target is None else target
         self._code += [operation, target, len(operands), *operands]
         return target
@@ -260,7 +260,7 @@ class _Translator:
     # Functions.
 
     def _translate_value(self, element: Element, target: int | None = None) -> int:
-        """Translate an operand or operation, and return the register that holds the value.
+        """Translate an operand or operation; return the register that holds its value.
 
         target: register to use; None for the register of the operand itself, or for a new register.
         """
@@ -293,7 +293,7 @@ class _Translator:
         return self.properties[name]
 
     def _translate_table(self, element: Element, target: int | None) -> int:
-        """Translate a table of one variable, and return the register of its value."""
+        """Translate a table of one variable; return the register of its value."""
         _check_element(element, children={"independentVar", "tableData"})
         variables, data = element.findall("independentVar"), element.findall("tableData")
         if len(variables) != 1 or len(data) != 1:
@@ -310,9 +310,9 @@ class _Translator:
         )
 
     def _translate_function(self, element: Element, *, may_have_name: bool = True, target: int | None = None) -> int:
-        """Translate a function, and return the register of its value.
+        """Translate a function; return the register of its value.
 
-        may_have_name: True if the function may name a property, which then is the target.
+        may_have_name: True if the function may name a property, which is then its target.
         """
         _check_element(element, attributes={"name"} if may_have_name else (), children=_VALUES)
         if name := element.get("name"):
@@ -336,7 +336,7 @@ class _Translator:
                     self._translate_fcs_function(component)
 
     def _translate_actuator(self, element: Element) -> None:
-        """Translate an actuator with one input, and optionally a lag, a rate limit and position limits."""
+        """Translate an actuator with one input, which may have a lag, a rate limit and position limits."""
         _check_element(element, attributes={"name"}, children={"input", "lag", "rate_limit", "clipto", "description"})
         inputs = [self._read_property(_element_text(child)) for child in element.findall("input")]
         if len(inputs) != 1:
@@ -356,7 +356,7 @@ class _Translator:
         self._emit(Operation.ACTUATOR, [inputs[0], first_register], self._property(_component_property(element)))
 
     def _translate_fcs_function(self, element: Element) -> None:
-        """Translate a function of the flight controls, and optionally its limits."""
+        """Translate a function of the flight controls, which may have limits."""
         _check_element(element, attributes={"name"}, children={"function", "clipto", "description"})
         functions, limits = element.findall("function"), _clip_limits(element)
         if len(functions) != 1:
@@ -371,7 +371,7 @@ class _Translator:
     # Forces.
 
     def _translate_aerodynamics(self, section: Element) -> None:
-        """Translate the functions, and for each axis the sum of its functions."""
+        """Translate the aerodynamic functions, and the sum of the functions of each axis."""
         _check_element(section, children={"function", "axis", *_DECLARATIONS})
         for function in section.findall("function"):
             self._translate_function(function)
@@ -394,7 +394,7 @@ class _Translator:
             self._emit(Operation.SUM, values or [self._constant(0.0)], frame_register(vector, element))
 
     def _translate_external_reactions(self, section: Element) -> None:
-        """Translate the functions, and the magnitudes of the external forces and moments."""
+        """Translate the functions of the external reactions, and the magnitudes of the forces and moments."""
         _check_element(section, children={"function", "force", "moment", *_DECLARATIONS})
         for element in section.findall("function"):
             self._translate_function(element)
@@ -427,7 +427,7 @@ _REQUIRED_CONTACT_VALUES = {"max_steer": "0", "brake_group": "NONE", "retractabl
 
 
 def _parse_contact(element: Element, contact_index: int) -> ContactData:
-    """Return the properties of a contact, except for its position, which is read from JSBSim."""
+    """Return the properties of a contact except its position, which is read from JSBSim."""
     kind = element.get("type", "")
     if element.tag != "contact" or kind not in ("BOGEY", "STRUCTURE"):
         raise UnsupportedModel(f"<{element.tag} type={kind!r}> in <ground_reactions>")
@@ -502,10 +502,10 @@ def _component_property(element: Element) -> str:
 
 
 def _own_property(name: str) -> str:
-    """Return the name of a property that a model computes.
+    """Return the name of a property that the model computes.
 
     Raises UnsupportedModel for a property that JSBSim itself computes or reads, such as a mass, a switch of a failure
-    or the direction of a force: JSBSim would use the model's value, and the program would not.
+    or the direction of a force. JSBSim would use the model's value for it, but the program would not.
     """
     root, _, rest = name.partition("/")
     if root in _JSBSIM_ROOTS or (root == "aero" and rest in _JSBSIM_AERO_PROPERTIES) or "/malfunction/" in name:

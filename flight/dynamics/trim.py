@@ -45,6 +45,7 @@ class Engine:
     """
 
     def __init__(self, fdm: Any, dt: float, getter: Callable[[str], Any], setter: Callable[[str], Any]) -> None:
+        """Store the means of settling an engine in a JSBSim instance."""
         self._exec, self._dt = fdm, dt
         kinds = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
         names = [f"simulation/integrator/{kind}" for kind in kinds]
@@ -56,7 +57,7 @@ class Engine:
         self._running = False
 
     def hold(self) -> None:
-        """Stop the aircraft's motion and its fuel flow; start the engine if it is not running."""
+        """Stop the aircraft's motion and its fuel flow, and start the engine if it is not running."""
         for integrator in self._integrators:
             integrator(0.0)
         self._freeze(1.0)
@@ -66,13 +67,13 @@ class Engine:
             self._running = True
 
     def settle(self, *, spin: bool) -> None:
-        """Let the engine speed settle for the present airspeed and throttle.
+        """Let the engine speed settle at the present airspeed and throttle.
 
-        Without ``spin`` the engine keeps its speed, and only quantities that depend on their own derivative (the lift
-        of a changing angle of attack) settle.
+        Without ``spin`` the engine keeps its speed. Then only quantities that depend on their own derivative settle,
+        such as the lift of a changing angle of attack.
 
-        A light propeller settles within milliseconds, and would oscillate in longer steps; a heavy one takes a minute.
-        A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
+        A light propeller settles within milliseconds, and would oscillate with longer steps. A heavy propeller takes a
+        minute. A step of the engine's time constant leads directly to the steady speed, as in Newton's method.
         """
         steps = [_SETTLE_STEP_S, _SETTLE_STEP_S] if spin else [0.0, 0.0]
         self._exec.set_dt(steps[1])
@@ -91,20 +92,20 @@ class Engine:
         self._exec.set_dt(self._dt)
 
     def release(self) -> None:
-        """Release the aircraft's motion and the fuel flow."""
+        """Allow the aircraft's motion and the fuel flow again."""
         for integrator, saved_value in zip(self._integrators, self._saved_integrators, strict=True):
             integrator(saved_value)
         self._freeze(0.0)
 
 
 def settle_step(steps: Sequence[float], previous_change: Sequence[float], change: Sequence[float]) -> float:
-    """Return the next time step, s: the estimated time constant of the settling rates, within limits.
+    """Return the next time step for settling rates, s: their estimated time constant, within limits.
 
     steps: the last two time steps, s.
-    previous_change, change: changes of the rates in the last step but one and in the last step.
+    previous_change, change: changes of the rates in the step before the last one, and in the last step.
 
-    A change that falls to 0.9 in equal steps of 0.2 s has a time constant of 2 s, which is limited to 4 times 0.2 s; an
-    oscillation, with -3 times the previous change, has a time constant of 0.05 s.
+    If the change falls to 0.9 of the previous change in equal steps of 0.2 s, the time constant is 2 s, which is
+    limited to 4 times 0.2 s. In an oscillation with -3 times the previous change, the time constant is 0.05 s.
 
     >>> settle_step((0.2, 0.2), (1.0,), (0.9,)), round(settle_step((0.2, 0.2), (1.0,), (-3.0,)), 9)
     (0.8, 0.05)
@@ -167,7 +168,7 @@ class Trim:
     throttle: float
 
     def commands(self) -> Commands:
-        """Return elevator, aileron, rudder and throttle of this flight."""
+        """Return elevator, aileron, rudder and throttle of the trim."""
         return Commands(self.elevator, self.aileron, self.rudder, self.throttle)
 
     def vector(self) -> Floats:
@@ -200,15 +201,15 @@ def solve_trim(
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
-    """Find a trim vector with two quantities fixed, (8,); return None if the iteration does not converge.
+    """Find a trim vector (8,) in which two quantities have fixed values; None if the iteration fails.
 
-    apply_trim: function from a trim vector (8,) to the body accelerations (6,) in that state.
+    apply_trim: function that returns the body accelerations (6,) for a trim vector (8,).
     fixed_values: values of the two fixed quantities.
     limits: elevator, aileron and rudder limits, rad.
     start: first guess, (8,); None for level flight at 25 m/s.
 
-    Use Newton's method with one-sided differences. Limit each step to `_MAX_NEWTON_STEP`, and halve it while it does
-    not reduce the residual.
+    The method is Newton's method with one-sided differences. Each step is limited to `_MAX_NEWTON_STEP`, and halved
+    while it does not reduce the residual.
     """
     values = (first_guess(25.0) if start is None else start).copy()
     for quantity, value in fixed_values.items():
@@ -265,7 +266,7 @@ def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
 def trim(
     simulator: Simulator, amsl: float, fixed_values: Mapping[TrimQuantity, float], near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at an altitude with two quantities fixed, or None if no trim is found.
+    """Return the steady flight at an altitude with two fixed quantities, or None if no trim is found.
 
     near: trim from which the iteration starts; None to start from the simulator's initial guess.
     """
@@ -284,9 +285,12 @@ def trim_from_vector(values: Floats, amsl: float) -> Trim:
 def steady_flight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at an airspeed (m/s), altitude (m) and climb angle (rad), or None if no trim is found.
+    """Return the steady flight at an airspeed, altitude and climb angle, or None if no trim is found.
 
-    The climb angle is relative to the air mass.
+    airspeed: m/s.
+
+    amsl: m.
+    climb: climb angle relative to the air, rad.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.fdm import Fdm
@@ -306,12 +310,12 @@ def steady_flight(
 
 
 def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steady climb at full throttle at an airspeed (m/s) and altitude (m), or None if none is found."""
+    """Return the steady climb at full throttle at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
 def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m), or None if not found."""
+    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
@@ -329,7 +333,7 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     """Return the matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
 
     The states are u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air). The commands are in
-    the order of `flight.dynamics.state.Commands`, without actuator and motor lags. Altitude and course are held.
+    the order of `flight.dynamics.state.Commands`. Actuators and motor have no lag. Altitude and course are constant.
     """
     simulator.move_to(trim_point.amsl)
     roll, pitch = attitude(trim_point)
@@ -375,8 +379,14 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
     alpha: angle of attack, rad.
     """
     # Without NumPy, whose sines on processors with AVX-512 differ in the last digit from other machines.
-    ch, sh, cc, sc = math.cos(heading), math.sin(heading), math.cos(climb), math.sin(climb)
-    cb, sb, ca, sa = math.cos(bank), math.sin(bank), math.cos(alpha), math.sin(alpha)
+    ch = math.cos(heading)
+    sh = math.sin(heading)
+    cc = math.cos(climb)
+    sc = math.sin(climb)
+    cb = math.cos(bank)
+    sb = math.sin(bank)
+    ca = math.cos(alpha)
+    sa = math.sin(alpha)
     forward = (ch * cc, sh * cc, -sc)
     level_right = (-sh, ch, 0.0)
     level_down = (ch * sc, sh * sc, cc)
@@ -403,11 +413,9 @@ def euler(axes: Floats) -> tuple[float, float, float]:
 
 
 def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> Floats:
-    """Return the velocity relative to the air with which an aircraft follows a path over the ground, m/s, (3,).
+    """Return the velocity relative to the air on a path over the ground, m/s, (3,): north, east, down.
 
-    The components are north, east and down.
-
-    course, climb: course and slope angle of the path, rad.
+    course, climb: course and slope angle of the path over the ground, rad.
     airspeed: m/s.
     wind: velocity of the air, north, east and down, m/s, (3,).
 

@@ -121,7 +121,10 @@ def product_back(a: Matrix, b: Matrix) -> Matrix:
 
 @inlined
 def rotation(cos: float, sin: float) -> Matrix:
-    """Return the matrix that transforms vectors into axes rotated about the third axis, from the cosine and sine."""
+    """Return the matrix that transforms vectors into axes rotated about the third axis.
+
+    cos, sin: cosine and sine of the rotation angle.
+    """
     return (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -134,7 +137,10 @@ _UNIT_TOLERANCE = 1e-10
 
 @inlined
 def unit_quaternion(q: Quaternion) -> Quaternion:
-    """Return a quaternion scaled to length 1, unless its length differs from 1 by less than 1e-10 or is 0."""
+    """Return a quaternion scaled to length 1.
+
+    It is returned unchanged if its length is 0, or differs from 1 by less than 1e-10.
+    """
     w, (x, y, z) = q
     length = math.sqrt(w * w + x * x + y * y + z * z)
     if length == 0.0 or abs(length - 1.0) < _UNIT_TOLERANCE:
@@ -160,7 +166,10 @@ def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @inlined
 def quaternion_rate(q: Quaternion, rates: Vector) -> Quaternion:
-    """Return the time derivative of the attitude quaternion of a body with given rates about its axes, rad/s."""
+    """Return the time derivative of a body's attitude quaternion from the rates about the body's axes.
+
+    rates: rad/s.
+    """
     w, (x, y, z) = q
     roll, pitch, yaw = rates
     return (
@@ -175,9 +184,12 @@ def quaternion_rate(q: Quaternion, rates: Vector) -> Quaternion:
 
 @inlined
 def matrix_of_quaternion(q: Quaternion) -> Matrix:
-    """Return the matrix that transforms vectors into the axes of a body, from the body's attitude quaternion."""
+    """Return the matrix that transforms vectors into a body's axes, from the body's attitude quaternion."""
     w, (x, y, z) = q
-    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    ww = w * w
+    xx = x * x
+    yy = y * y
+    zz = z * z
     wx, wy, wz = w * x, w * y, w * z
     xy, xz, yz = x * y, x * z, y * z
     return (
@@ -210,7 +222,7 @@ def quaternion_of_matrix(m: Matrix) -> Quaternion:
 def euler_angles(m: Matrix) -> Vector:
     """Return roll, pitch and yaw (rad) from the matrix that transforms vectors into the body's axes.
 
-    Yaw is 0 to 2 pi; with the nose straight up or down it is 0.
+    Yaw is 0 to 2 pi. With the nose straight up or down, yaw is 0.
     """
     (xx, xy, xz), (_, yy, yz), (_, zy, zz) = m
     if abs(xz) >= 1.0:

@@ -64,7 +64,9 @@ GUIDANCE_MEMORY = record_dtype(
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, acceleration: float
 ) -> None:
-    """Set the elevator for an upward acceleration: feed-forward of the angle of attack, and damping of the pitch rate.
+    """Set the elevator for a demanded upward acceleration.
+
+    The command is a feed-forward of the angle of attack, plus damping of the pitch rate.
 
     climb_rate: m/s.
     acceleration: demanded acceleration, m/s^2, positive upwards.
@@ -94,9 +96,10 @@ def steer_elevator(
 def step_roll_model(
     bank_demand: float, bank: float, roll_rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the model roll by one tick; return bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
+    """Advance the roll model by one tick; return its bank (rad), roll rate and roll acceleration.
 
-    The model is a critically damped oscillator with limits of roll rate and roll acceleration.
+    The roll rate is rad/s, the roll acceleration rad/s^2. The model is a critically damped oscillator with limits of
+    roll rate and roll acceleration.
     """
     frequency = gains.roll_frequency
     acceleration_max, rate_max = gains.roll_acceleration_max, gains.roll_rate_max
@@ -118,20 +121,19 @@ def follow_roll(
     roll_acceleration: float,
     dt: float,
 ) -> None:
-    """Set aileron and rudder so that the aircraft follows a model roll.
+    """Set aileron and rudder so that the aircraft follows the roll model.
 
-    bank, roll_rate, roll_acceleration: model roll at this tick, rad, rad/s and rad/s^2.
+    bank, roll_rate, roll_acceleration: state of the roll model at this tick, rad, rad/s and rad/s^2.
 
-    The aileron command is the deflection for this roll, plus feedback of the remaining error, plus compensation of
-    gusts and propeller torque, which are estimated from the roll that the ailerons do not explain.
+    The aileron command has three parts: the deflection for the roll of the model, a feedback of the remaining error,
+    and a compensation of gusts and propeller torque. Gusts and torque are estimated from the roll that the ailerons do
+    not explain.
     """
     airspeed = max(8.0, state.airspeed)
     inverse_speed_ratio = gains.reference_airspeed / airspeed
     memory.bank, memory.bank_rate = bank, roll_rate
-    aileron_per_rate, aileron_per_acceleration = (
-        gains.aileron_per_roll_rate * inverse_speed_ratio,
-        gains.aileron_per_roll_acceleration * inverse_speed_ratio * inverse_speed_ratio,
-    )
+    aileron_per_rate = gains.aileron_per_roll_rate * inverse_speed_ratio
+    aileron_per_acceleration = gains.aileron_per_roll_acceleration * inverse_speed_ratio * inverse_speed_ratio
     disturbance = (
         aileron_per_acceleration * (state.roll_rate - memory.last_roll_rate) / dt
         + aileron_per_rate * state.roll_rate

@@ -48,9 +48,9 @@ WAYPOINT = record_dtype(
 
 
 def waypoint_column(count: int) -> Records:
-    """Return ``count`` records of `WAYPOINT`, all 0, with the same memory stride as in the path of a flight.
+    """Return ``count`` records of `WAYPOINT`, all 0, with the memory stride that they have in a flight's path.
 
-    They are not contiguous: for contiguous records Numba would compile every control law a second time.
+    The records are not contiguous, because Numba would compile every control law a second time for contiguous records.
 
     >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
     ((3,), False)
@@ -72,7 +72,7 @@ _PASSED_TIME_S = 3.0
 
 @inner
 def l1_length(speed: float, period: float, damping: float) -> float:
-    """Return the L1 distance (m) at a ground speed (m/s), as `_L1_dist` of AP_L1_Control.
+    """Return the L1 distance (m) at a ground speed (m/s), `_L1_dist` of AP_L1_Control.
 
     period, damping: NAVL1_PERIOD, s, and NAVL1_DAMPING.
     """
@@ -85,9 +85,9 @@ def l1_angles(
 ) -> tuple[float, float]:
     """Return the angles -Nu2 and -Nu1 of AP_L1_Control, rad.
 
-    The first is the angle from the leg, or from the direction to a waypoint, to the ground velocity. The second is the
-    angle between the leg and the direction to the L1 point, without the integrator. It is NaN while L1 aims straight at
-    a waypoint: far before the leg's start, or past the leg's end.
+    -Nu2 is the angle from the leg, or from the direction to a waypoint, to the ground velocity. -Nu1 is the angle
+    between the leg and the direction to the L1 point, without the integrator. -Nu1 is NaN while L1 aims straight at a
+    waypoint, which is the case far before the leg's start and past the leg's end.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     a_east, a_north: start of the leg, m.
@@ -111,7 +111,7 @@ def l1_angles(
 
 @inner
 def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
-    """Return the cross-track integrator (`_L1_xtrack_i` of AP_L1_Control) after a tick, rad.
+    """Return the cross-track integrator (`_L1_xtrack_i` of AP_L1_Control) after one more tick, rad.
 
     aim_angle: angle between the leg and the direction to the L1 point, rad, NaN while L1 aims at a waypoint.  The
         integrator changes only while the magnitude of this angle is below 5 degrees.
@@ -134,9 +134,10 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
 
 @inner
 def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
-    """Return True if the aircraft is within the turn distance of waypoint b, or past the line across the leg at b.
+    """Return True if the aircraft has reached waypoint b, the end of the leg from a to b.
 
-    A fly-over waypoint is reached only past this line.
+    The waypoint is reached within the turn distance, or past the line across the leg at b. A fly-over waypoint is
+    reached only past this line.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: start and end of the leg, records of `WAYPOINT`.
@@ -160,7 +161,7 @@ def field_course(
     cross_track: distance to the right of the path, m.
     curvature: curvature of the path, 1/m, positive to the right; 0 for a line.
     approach: angle of approach to a line from far away, rad.
-    path_gain, orbit_gain: convergence to a line and to an arc.
+    path_gain, orbit_gain: gains of the convergence to a line and to an arc.
     """
     if curvature == 0.0:
         return course - approach * 2.0 / math.pi * math.atan(path_gain * cross_track)

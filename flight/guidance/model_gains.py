@@ -77,7 +77,7 @@ _FIXED_GAINS = {
 def gains_at_airspeed(airspeed: float) -> dict[str, float]:
     """Return `TYPICAL_GAINS` scaled from 25 m/s to another airspeed (m/s).
 
-    The gains of control surfaces stay unchanged, because they are scaled with airspeed elsewhere.
+    The gains of control surfaces are not changed here, because they are scaled with airspeed elsewhere.
     """
     ratio = airspeed / 25.0
     gains: dict[str, float] = {}
@@ -97,7 +97,7 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
 
 
 def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
-    """Return the trim of level flight at cruise. Raises FlightError if there is none."""
+    """Return the trim of level flight at cruise. Raises FlightError if no trim exists."""
     level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is None:
         message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
@@ -106,7 +106,7 @@ def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
 
 
 def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
-    """Return the gains of the airframe from the matrices A and B of `flight.dynamics.trim.linearise`."""
+    """Return the gains of an airframe from the matrices A and B of `flight.dynamics.trim.linearise`."""
     speed = aircraft.airspeed
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
@@ -127,9 +127,10 @@ def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, 
 
 
 def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
-    """Return the throttle (0..1) in level flight below which an electric motor draws no current and gives no thrust.
+    """Return the throttle (0..1) below which an electric motor gives no thrust in level flight.
 
-    The throttle is found in steps of 0.02. The result is 0 for an aircraft without an electric motor.
+    Below this throttle the motor draws no current. The throttle is found in steps of 0.02. The result is 0 for an
+    aircraft without an electric motor.
     """
     fdm.move_to(level.amsl)
     for throttle in np.arange(0.0, level.throttle, _THROTTLE_STEP).tolist():
@@ -223,7 +224,7 @@ _UNIT_SUFFIXES = {
 
 
 def gains_text(gains: Gains) -> str:
-    """Return gains as the text of a ``gains.toml``; gains at their default values are omitted."""
+    """Return gains as the text of a ``gains.toml``; gains with default values are left out."""
     defaults = {gain.name: gain.default for gain in fields(Gains)}
     lines = [
         "# Gains of the guidance and inner loops; flight/guidance/gains.py says what each means.",

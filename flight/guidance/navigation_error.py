@@ -23,7 +23,7 @@ NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float6
 
 
 def start_navigation(noise: Floats, lags: Record) -> None:
-    """Initialise the navigation error, so that its statistics do not change over the flight.
+    """Initialise the navigation error so that its statistics are the same throughout the flight.
 
     noise: random numbers from the standard normal distribution, (6,).
     lags: a record of `NAVIGATION_LAGS`, which is set.
@@ -43,7 +43,7 @@ def estimate_motion(
     time_constant: float,
     dt: float,
 ) -> None:
-    """Set the estimated motion to the true motion plus the navigation error, and advance the error by a tick.
+    """Set the estimated motion to the true motion plus the navigation error; advance the error by a tick.
 
     true_motion, estimated_motion: records of `MOTION`.
     lags: a record of `NAVIGATION_LAGS`.

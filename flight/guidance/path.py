@@ -53,10 +53,11 @@ NODE = record_dtype(
 
 @inner
 def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:
-    """Project a position onto a piece of the path; return distance, cross-track error and course of the path.
+    """Project a position onto a piece of the path; return distance, cross-track error and course.
 
-    The distance along the piece is in m; it may lie before the start (negative) or beyond the end.  The cross-track
-    error is in m, positive to the right.  The course of the path at the projected point is in rad.
+    The distance is measured along the piece, m; it may be negative (before the start) or exceed the length of the
+    piece. The cross-track error is in m, positive to the right. The course is that of the path at the projected point,
+    rad.
     """
     course, curvature = piece.course, piece.curvature
     offset_east, offset_north = east - piece.east, north - piece.north
@@ -107,7 +108,7 @@ def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
 
 @inner
 def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
-    """Advance the position in ``memory`` past sharp corners to the leg that an autopilot already flies.
+    """Advance the position in ``memory`` past sharp corners, to the leg that an autopilot already flies.
 
     An autopilot may turn to a leg before it passes the end of the previous leg.
 
@@ -158,7 +159,7 @@ def max_curvature(pieces: Records, first_piece: int, start: float, end: float) -
 
 @compiled
 def profile_at(nodes: Records, distance: float) -> tuple[float, float, float]:
-    """Return the altitude (m), the slope (m per m) and the change of slope (1/m) of an altitude profile at a distance.
+    """Return altitude (m), slope (m per m) and change of slope (1/m) of an altitude profile at a distance.
 
     nodes: records of `NODE`.
     distance: distance along the path, m.
@@ -222,14 +223,14 @@ def fly_by_path(
 ) -> FlyByPath:
     """Join the legs of a route to a fly-by path.
 
-    The route has at least one leg, and only its first leg may have no length. An arc passes each waypoint; after a
-    fly-over waypoint, arcs lead back to the next leg.
+    The route has at least one leg, and only its first leg may have no length. An arc leads past each fly-by waypoint.
+    After a fly-over waypoint, arcs lead back to the next leg.
 
-    terrain: ground that legs at a height above ground follow; with None these legs are straight.
-    fly_over_turn: "none" keeps the corners at fly-over waypoints sharp, for an autopilot with its own turns; "long"
-        takes the longer turn at `reversals`; "short" takes the shorter turn at all waypoints.
+    terrain: terrain for legs that hold a height above ground; with None these legs are straight.
+    fly_over_turn: "none" keeps the corners at fly-over waypoints sharp, for an autopilot with its own turns. "long"
+        takes the longer turn at `reversals`, and "short" takes the shorter turn at all waypoints.
 
-    A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
+    A right angle at 25 m/s in calm air, with 0.5 rad of bank, is an arc with a radius of 117 m:
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -287,7 +288,9 @@ def fly_by_path(
 
 
 def reversals(route: Route) -> NDArray[np.int64]:
-    """Return the indices of fly-over waypoints at which the course reverses, so that the turn may go to either side.
+    """Return the indices of fly-over waypoints at which the course reverses.
+
+    At such a waypoint the turn may go to either side.
 
     >>> from flight.mission.route import route_points
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
@@ -300,7 +303,7 @@ def reversals(route: Route) -> NDArray[np.int64]:
 
 
 def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
-    """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; see `fly_by_path`."""
+    """Return the turn at each inner waypoint, rad, positive to the right, (w - 2,); see `fly_by_path`."""
     turns = signed_turns(route.positions)
     if fly_over_turn == "long":
         corners = reversals(route) - 1
@@ -311,13 +314,13 @@ def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
 def _ground_following_corners(
     route: Route, terrain: Terrain, leg: int, segment_start: Floats, course: float, start_distance: float, length: float
 ) -> list[tuple[float, float]]:
-    """Return the corners of the altitude profile on a leg that follows the ground, as (distance, altitude) pairs, m.
+    """Return the corners of the altitude profile on a leg that follows the ground.
 
-    The height above ground changes linearly from the height of the leg's start to the height stated for the leg's end.
-    Distances are along the path; no corner is returned where the ground is unknown.
+    A corner is a pair (distance along the path, altitude), m. The height above ground changes linearly, from that at
+    the leg's start to the height that the leg's end states. There is no corner where the ground is unknown.
 
     segment_start: east and north of the start of the leg's straight part, m, (2,).
-    start_distance: distance of this start along the path, m.
+    start_distance: distance of the straight part's start along the path, m.
     length: length of the straight part, m.
     """
     leg_start, end_height = route.positions[leg], float(route.points["above_ground"][leg + 1])
@@ -326,10 +329,8 @@ def _ground_following_corners(
         start_height = end_height
     corners = []
     for distance_along in np.arange(0.5 * GROUND_STEP_M, length - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
-        east, north = (
-            segment_start[0] + distance_along * math.sin(course),
-            segment_start[1] + distance_along * math.cos(course),
-        )
+        east = segment_start[0] + distance_along * math.sin(course)
+        north = segment_start[1] + distance_along * math.cos(course)
         fraction = math.hypot(east - leg_start[0], north - leg_start[1]) / math.dist(
             leg_start[:2], route.positions[leg + 1, :2]
         )
@@ -347,11 +348,10 @@ def _ground_following_corners(
 def _arcs_at_waypoints(
     route: Route, limits: Limits, courses: Floats, leg_lengths: Floats, turns: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the tangent lengths, the radii and the return lengths of the arcs at all waypoints, m, each (w,).
+    """Return the tangent lengths, radii and return lengths of the arcs at all waypoints, m, (w,) each.
 
-    The tangent lengths of fly-by arcs are shortened if a leg is too short for them. The return length of a fly-over
-    waypoint is the length of the next leg up to the point where the path joins that leg; it is 0 if the leg is too
-    short.
+    The tangents of fly-by arcs are shortened if a leg is too short for them. After a fly-over waypoint, the path joins
+    the next leg after the return length; it is 0 if that leg is too short.
     """
     count = len(route.points)
     tangents, radii, return_lengths = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -389,7 +389,7 @@ def _arcs_at_waypoints(
 def _overshoot_angle(turn: float) -> float:
     """Return the angle by which a fly-over turn (rad) overshoots the next course.
 
-    The angle phi follows from cos phi = (1 + cos turn) / 2.
+    The result is the angle phi with cos phi = (1 + cos turn) / 2.
     """
     return math.acos(0.5 * (1.0 + math.cos(turn)))
 
@@ -397,7 +397,7 @@ def _overshoot_angle(turn: float) -> float:
 def _fly_over_arcs(
     corner: Floats, course: float, turn: float, radius: float
 ) -> list[tuple[Floats, float, float, float]]:
-    """Return the three arcs of a fly-over turn, each as (start, course at the start, curvature, length).
+    """Return the three arcs of a fly-over turn: start, course at the start, curvature and length of each.
 
     The start is (2,), m; the course is in rad, the curvature in 1/m, the length in m.  Two arcs turn past the course of
     the next leg, and the third leads back onto that leg.  The first turn is divided because `project` is ambiguous for
@@ -417,7 +417,7 @@ def _fly_over_arcs(
 
 
 def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
-    """Return the altitude profile: corners with the parabolas that blend them, as records of `NODE`.
+    """Return an altitude profile as records of `NODE`: its corners, blended by parabolas.
 
     corners: (distance along the path, altitude) pairs, m.
     """
@@ -443,7 +443,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
 
     The last waypoint has the airspeed of the leg before it.
 
-    mission: mission of the route, which states how its loiters end; with None all loiters end after their turns.
+    mission: mission of the route, which states how the loiters end; with None all loiters end after their turns.
     fly_over: True if the scenario requires fly-over at waypoints without an acceptance radius.
     """
     points = route.points
@@ -485,10 +485,10 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
 
 
 def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem]) -> float:
-    """Return the turn angle that ArduPlane computes at the waypoint before an RTL, rad; a right angle if unknown.
+    """Return the turn angle that ArduPlane computes at the waypoint before an RTL, rad.
 
-    The RTL item has no position, which ArduPlane reads as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`,
-    `Location::get_bearing_to`).
+    The angle is a right angle if it is unknown. The RTL item has no position, which ArduPlane reads as 0 N, 0 E
+    (`AP_Mission::get_next_ground_course_cd`, `Location::get_bearing_to`).
     """
     item = items.get(int(route.items[index]))
     if index == 0 or item is None or not item.has_position:
@@ -502,9 +502,9 @@ def _bearing_to_origin(item: MissionItem) -> float:
 
 
 def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionItem]) -> None:
-    """Set the bearing on which ArduPlane leaves a loiter before an RTL: the bearing of 0 N, 0 E.
+    """Set the bearing at which ArduPlane leaves a loiter before an RTL, if there is such a loiter.
 
-    The RTL item has no position, which ArduPlane reads as 0 N, 0 E.  Without such a loiter nothing is set.
+    It is the bearing of 0 N, 0 E, because the RTL item has no position, and ArduPlane reads this as 0 N, 0 E.
 
     last: index of the last waypoint before the RTL.
     """
@@ -515,7 +515,10 @@ def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionIte
 
 
 def _set_landing(waypoints: Records, mission: Mission | None) -> None:
-    """Mark the waypoint before a landing, and the waypoints of a landing sequence (`MissionBase::isLanding` of PX4)."""
+    """Mark the waypoint before a landing, and the waypoints of a landing sequence.
+
+    Landing sequences are those of `MissionBase::isLanding` of PX4.
+    """
     if mission is None:
         return
     flown = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
@@ -528,7 +531,7 @@ def _set_landing(waypoints: Records, mission: Mission | None) -> None:
 
 
 def _set_circles(corners: Records, route: Route) -> None:
-    """Set radius, center and altitude of the loiter at each corner of a route; the radius is 0 without a loiter."""
+    """Set radius, center and altitude of the loiter at each corner of a route; without a loiter, the radius 0."""
     turns, courses = signed_turns(route.positions), leg_courses(route.positions)
     corners["loiter_radius"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arc_radii[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.
@@ -544,7 +547,7 @@ def _set_circles(corners: Records, route: Route) -> None:
 
 
 def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
-    """Set the end condition of the loiter at each corner, from the mission item of the loiter."""
+    """Set the end condition of the loiter at each corner, from the loiter's mission item."""
     waypoints["loiter_time"] = math.nan
     for k in np.flatnonzero(waypoints["loiter_radius"]).tolist():
         item = items.get(int(waypoints["item"][k]))
@@ -560,12 +563,12 @@ def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
-    """Return the index of the piece at each of n distances (m) along the path, (n,)."""
+    """Return the indices of the pieces at n distances (m) along the path, (n,)."""
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 
 
 def _path_points(path: FlyByPath, distances: Floats) -> Floats:
-    """Return the points of the path at n distances (m) along it, m, (n, 3)."""
+    """Return the points at n distances (m) along the path, (n, 3) m."""
     pieces = path.pieces[_piece_index(path, distances)]
     course, curvature, distances_along = pieces["course"], pieces["curvature"], distances - pieces["start"]
     is_straight = curvature == 0.0
@@ -581,9 +584,9 @@ def _path_points(path: FlyByPath, distances: Floats) -> Floats:
 
 
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the path as a polyline: its n points, m, (n, 3), and the leg of each of its n - 1 segments.
+    """Return the path as a polyline: n points, (n, 3) m, and the leg of each of the n - 1 segments.
 
-    Chords of arcs turn by at most `MAX_CHORD_TURN_RAD`; on a 160 m radius they deviate from the arc by 0.15 m.
+    A chord of an arc turns by at most `MAX_CHORD_TURN_RAD`. With a radius of 160 m it deviates from the arc by 0.15 m.
 
     >>> level = np.array([(0.0, 500.0, 0.0, 0.0), (900.0, 500.0, 0.0, 0.0)], NODE)
     >>> north = np.array([(0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)], PIECE)

@@ -64,12 +64,12 @@ class ArmingState:
 
     @property
     def can_arm(self) -> bool:
-        """True if arming would be accepted now."""
+        """True if the vehicle would accept arming now."""
         return not self.is_judging and not self._arming_refusal(False)
 
     @property
     def should_start(self) -> bool:
-        """True if the flight must start: armed, in AUTO, and judged."""
+        """True if the flight must start, because the vehicle is armed and in AUTO, and its mission is judged."""
         return (
             self.armed
             and self.mode == AUTO
@@ -153,7 +153,7 @@ class ArmingState:
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _change_flight_mode(self, mode: int) -> CommandResult:
-        """Continue the flight in another mode; do nothing for the current mode."""
+        """Continue the flight in another mode; do nothing if this is already the mode."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
@@ -166,7 +166,10 @@ class ArmingState:
         self.is_judging, self.mission_state = True, NOT_STARTED
 
     def on_mission_judged(self, verdict: MissionJudged) -> str:
-        """Store a verdict; disarm if the verdict does not allow a flight, and return the reason for it, or ""."""
+        """Store the verdict on a mission.
+
+        If it does not allow a flight, disarm, and return the reason, otherwise "".
+        """
         self.is_judging = False
         self.last_verdict = verdict
         self.mission_state = NOT_STARTED
@@ -193,7 +196,10 @@ class ArmingState:
         self.mode, self.loiter_center = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
-        """Return the reason why arming is refused, or "" if it is not.  is_forced: True to allow a failed verdict."""
+        """Return the reason why arming is refused, or "" if it is not.
+
+        is_forced: True to allow a failed verdict.
+        """
         if self.last_verdict is None:
             return ""
         if not self.last_verdict.possible:

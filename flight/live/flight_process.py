@@ -193,7 +193,7 @@ class LogSink(Protocol):
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
-        should_abort: function that returns True if the process must end; called during long work.
+        should_abort: function that returns True if the process must end; it is called during long work.
         """
 
     def abandon(self) -> None:
@@ -218,10 +218,10 @@ class FlightFactory(Protocol):
     speed: float
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
-        """Judge a mission; the prepared flight is None if the mission cannot be flown."""
+        """Judge a mission, and prepare its flight; the flight is None if the mission cannot be flown."""
 
     def prepare_diversion(self, request: DivertFlight, position: Floats) -> PreparedFlight:
-        """Prepare the flight of the requested route from a position (3,) on the map.
+        """Prepare a flight of the requested route that starts at a position on the map, (3,).
 
         Raises PlanflyError if there is no such route.
         """
@@ -234,7 +234,7 @@ class FlightFactory(Protocol):
 
 
 def serve_flights(connection: Connection, factory: FlightFactory) -> None:
-    """Serve requests until the other end closes, or requests the end of the process.
+    """Serve requests until the other end of the pipe closes, or until it requests the end of the process.
 
     connection: this end of a `multiprocessing.Pipe`; requests are pickled into the other end, and `read_event` reads
     its output.
@@ -296,7 +296,7 @@ class _RequestQueue:
         return self._queued.popleft() if self._queued else self._connection.recv()
 
     def poll(self) -> object:
-        """Return the next request, or None if none has arrived; return EndFlight(quit=True) if the link is gone."""
+        """Return the next request, or None if there is none; EndFlight(quit=True) if the link has closed."""
         if not self._queued and not self._connection.poll():
             return None
         try:
@@ -305,7 +305,10 @@ class _RequestQueue:
             return EndFlight(quit=True)
 
     def is_ending(self) -> bool:
-        """Return True if the process must end, because of a request or a closed link; all requests stay queued."""
+        """Return True if the process must end, because of a request or a closed link.
+
+        All requests stay in the queue.
+        """
         try:
             while self._connection.poll():
                 self._queued.append(self._connection.recv())
@@ -363,7 +366,7 @@ class _LoggedFlight:
         self._loiter_logs = 0
 
     def run_in_real_time(self) -> tuple[str, bool]:
-        """Step the flight by the clock; return its end reason, and True if the process continues."""
+        """Run the flight in real time; return its end reason, and True if the process has to continue."""
         clock, speed = time.monotonic, self._factory.speed
         time_origin = start_time = clock()
         ticks, last_flush, snapshot_count = 0, time_origin, 0
@@ -400,7 +403,7 @@ class _LoggedFlight:
         return end_reason, should_continue
 
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
-        """Judge each route, and close its log.
+        """Judge each route that was flown, and close its log.
 
         should_abort: see `LogSink.finish`.
         """
@@ -408,7 +411,7 @@ class _LoggedFlight:
         return [log.finish(reason, should_abort) for log, reason in zip(self._logs, end_reasons, strict=True)]
 
     def abandon(self) -> None:
-        """Close the logs in their current state, without a verdict."""
+        """Close the logs as they are, without a verdict."""
         for log in self._logs:
             log.abandon()
 
@@ -430,7 +433,7 @@ class _LoggedFlight:
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
     def _start_route(self, request: DivertFlight, end_reason: str) -> bool:
-        """Start a route at the aircraft's position, with its own log; return False if there is no such route.
+        """Start a route at the aircraft's position, with its own log; return False if no such route exists.
 
         end_reason: text on the end of the current route.
         """

@@ -139,10 +139,11 @@ _MAX_KEY_BYTES = 1024
 
 
 def read_key(path: Path) -> bytes:
-    """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
+    """Read a signing key of 32 bytes from a file.
 
-    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way. Raises FlightError if the file
-    cannot be read, if another user could read it, or if it holds fewer than 8 or more than 1024 bytes.
+    The file contains 64 hexadecimal digits, or a passphrase that is hashed with SHA-256. MAVProxy's "signing setup" and
+    Mission Planner hash a passphrase in the same way. Raises FlightError if the file cannot be read, if another user
+    could read it, or if it holds fewer than 8 or more than 1024 bytes.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile() as file:  # made for its owner alone
@@ -204,9 +205,9 @@ class Signing:
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
     def find_refusal(self, frame: MavlinkFrame, wall: float) -> RefusalReason | None:
-        """Return the reason to distrust a frame, or None if the frame is signed with the key and newer than its stream.
+        """Return the reason to distrust a frame; None if it is signed with the key and newer than its stream.
 
-        A stream is a system, its component and its link id. A frame with a bad signature changes nothing.
+        A stream is identified by system, component and link id. A frame with a bad signature changes nothing.
 
         wall: time since 1970, s.
         """
@@ -241,7 +242,7 @@ class Signing:
     def sign(self, packed: bytes, wall: float) -> bytes:
         """Sign a packed MAVLink 2 frame that is not signed yet.
 
-        After the year 2104 timestamps stay at the maximum of six bytes, and stations drop the frames as replayed.
+        After the year 2104 timestamps stay at the maximum of six bytes, so stations drop the frames as repeated.
         """
         self.clock = max(self.clock, _signing_timestamp(wall))
         self.newest = min(max(self.newest + 1, _signing_timestamp(wall)), _MAX_TIMESTAMP)
@@ -296,7 +297,7 @@ class Peer:
 
     @property
     def station(self) -> Station:
-        """The station for the mission protocol."""
+        """Station that sent the message, for the mission protocol."""
         return Station(self.address, self.system, self.component)
 
 
@@ -336,10 +337,10 @@ class Access:
 
 
 def check_access(access: Access) -> None:
-    """Raise FlightError if access to the vehicle from other machines is not protected.
+    """Raise FlightError if other machines could access the vehicle without protection.
 
-    Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and an address to send to needs
-    a key or must be on that list. The error names the argument to give.
+    Loopback addresses need no protection. Any other address to listen at needs a key or a list of allowed addresses.
+    Any other address to send to needs a key, or must be on that list. The error names the missing argument.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
@@ -417,7 +418,7 @@ class Link:
         return str(host), int(port)
 
     def receive(self) -> list[tuple[Any, Peer]]:
-        """Return the received messages of stations, each with its sender; drop everything else."""
+        """Return the messages received from stations, each with its sender; drop everything else."""
         messages: list[tuple[Any, Peer]] = []
         for _ in range(_MAX_DATAGRAMS_PER_POLL):
             try:
@@ -431,7 +432,7 @@ class Link:
         return messages
 
     def decode_datagram(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
-        """Return the messages of one datagram, and register its sender as a peer if it contains a HEARTBEAT."""
+        """Return the messages of one datagram; register the sender as a peer if it sent a HEARTBEAT."""
         if self.access.allowed and not is_loopback(source[0]) and source[0] not in self.access.allowed:
             self.dropped.address += 1
             return []
@@ -462,13 +463,16 @@ class Link:
         return messages
 
     def _is_local_request(self, message: Any, source: Address) -> bool:
-        """Return True if a message from this machine, which need not send heartbeats, addresses the vehicle."""
+        """Return True if a message from this machine addresses the vehicle.
+
+        Such a message is accepted even if its sender sends no heartbeats.
+        """
         return (
             is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._is_for_vehicle(message)
         )
 
     def _notice_stranger(self, message: Any, host: str) -> None:
-        """Add a notice, once for each address, on the reason why the address gets no answer."""
+        """Add a notice on why an address gets no answer, once for each address."""
         if (
             host in self._named_strangers
             or len(self._named_strangers) >= _MAX_NAMED_STRANGERS
@@ -480,7 +484,7 @@ class Link:
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full_text}: it is not answered")
 
     def _notice_clock_ahead(self, host: str) -> None:
-        """Add a notice, once for each address with the key, that one of the two clocks is wrong."""
+        """Add a notice that one of two clocks is wrong, once for each address that has the key."""
         if host in self._named_ahead or len(self._named_ahead) >= _MAX_NAMED_STRANGERS:
             return
         self._named_ahead.add(host)
@@ -489,7 +493,7 @@ class Link:
         )
 
     def pop_notices(self) -> list[str]:
-        """Return and clear the notices collected about senders that are not answered."""
+        """Return the notices about senders that are not answered, and clear them."""
         notices, self._notices = self._notices, []
         return notices
 
@@ -504,7 +508,7 @@ class Link:
         dropped.streams += reason is RefusalReason.STREAMS
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
-        """Return the station at an address, a new one if necessary; None if the table of stations is full."""
+        """Return the station at an address, which may be new; None if the table of stations is full."""
         now = self.clock()
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < PEER_TIMEOUT_S}
         peer = self.peers.get(source)
@@ -520,7 +524,7 @@ class Link:
         return peer
 
     def _frame_encoder(self, address: Address) -> Any:
-        """Return the encoder for frames to an address, which counts their sequence numbers."""
+        """Return the encoder of frames to an address, which counts the sequence numbers of the frames."""
         return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
@@ -537,7 +541,7 @@ class Link:
             del self.peers[key]
 
     def send(self, message: Any, peer: Peer) -> None:
-        """Send a message to a peer; the message is lost if the network does not accept it, as on any radio."""
+        """Send a message to a peer; it is lost if the network does not accept it, as on a radio."""
         self._send_frame(message.pack(peer.mav), peer.mav, peer.address)
 
     def send_heartbeat(self, message: Any) -> None:
@@ -549,7 +553,7 @@ class Link:
             self.send(message, peer)
 
     def _send_frame(self, packed: bytes, mav: Any, address: Address) -> None:
-        """Sign a frame if there is a key, and send it; ignore network errors."""
+        """Send a frame, signed if there is a key; ignore network errors."""
         mav.seq = (mav.seq + 1) % 256
         if self._signing is not None:
             packed = self._signing.sign(packed, self._wall())

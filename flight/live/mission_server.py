@@ -48,7 +48,7 @@ class MissionType(IntEnum):
 
 
 def item_type(item: MissionItem) -> MissionType:
-    """Return the list to which an item belongs, by its command."""
+    """Return the list to which an item belongs, judged by its command."""
     if item.command in FENCES:
         return MissionType.FENCE
     return MissionType.RALLY if item.command == Command.NAV_RALLY_POINT else MissionType.MISSION
@@ -63,7 +63,7 @@ def to_message(
     seq: int | None = None,
     mission_type: MissionType | None = None,
 ) -> Any:
-    """Return an item as MISSION_ITEM_INT, with x and y rounded to 1e-7 degrees, not truncated.
+    """Return an item as MISSION_ITEM_INT; x and y are rounded to 1e-7 degrees, not truncated.
 
     seq: None keeps the item's own number.
     mission_type: None takes the type of the item's command.
@@ -95,8 +95,8 @@ def from_message(message: Any, source: str) -> MissionItem:
 
     source: name of the sender in messages.
 
-    INT32_MAX in an integer x or y is NaN (MAVLink's "unset"). A float's latitude and longitude are rounded to the
-    nearest 1e-7 degrees. Raises MissionError with one line that names item, field, value, and allowed values.
+    INT32_MAX in an integer x or y means "unset" in MAVLink, and becomes NaN. A latitude or longitude that is a float is
+    rounded to 1e-7 degrees. Raises MissionError with one line that names item, field, value, and allowed values.
     """
     command, frame = int(message.command), int(message.frame)
     has_coordinates = is_located(command, frame)
@@ -125,10 +125,10 @@ def from_message(message: Any, source: str) -> MissionItem:
 
 
 def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
-    """Return the mission of uploaded lists, and the offset between its items' seq and the stations' numbers.
+    """Return the mission in uploaded lists, and the offset between its item numbers and those of stations.
 
-    Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one without parameters: MAVSDK's
-    `mission` plugin sends no home, and its waypoints are relative and have a radius.
+    As in ArduPilot, item 0 is home if it is a waypoint with an altitude above mean sea level or without parameters. The
+    `mission` plugin of MAVSDK sends no home, and its waypoints are relative and have a radius.
 
     own_home: the vehicle's home, for a mission without home.
     """
@@ -159,7 +159,7 @@ def _is_home(item: MissionItem) -> bool:
 
 
 def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
-    """Return the lists of a mission for stations, with home first, seq without gaps, and jumps renumbered.
+    """Return the lists of a mission for stations: home first, numbers without gaps, jumps renumbered.
 
     >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> items, fences, rally = mission_lists(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
@@ -185,9 +185,10 @@ def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
 
 
 def start_problem(mission: Mission, first_seq: int, *, in_flight: bool = False) -> str:
-    """Return the reason why a mission cannot be flown from the item with seq ``first_seq``, or "".
+    """Return why a mission cannot be flown from a given item, or "".
 
-    in_flight: True if the leg from the aircraft to the item will be its first leg.
+    first_seq: number (seq) of the item.
+    in_flight: True if the first leg will be the leg from the aircraft to the item.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
@@ -206,9 +207,11 @@ def start_problem(mission: Mission, first_seq: int, *, in_flight: bool = False) 
 
 
 def mission_from_item(mission: Mission, first_seq: int) -> Mission:
-    """Return the mission from the item with seq ``first_seq``, after the last speed change before that item.
+    """Return a mission that begins with a given item and the speed before it.
 
-    Items keep their numbers.
+    The last speed change before the item is kept. Items keep their numbers.
+
+    first_seq: number (seq) of the item.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
@@ -318,7 +321,7 @@ class _FinishedUpload:
 
 
 def _deny_go_to(_item: MissionItem) -> str:
-    """Return the refusal of a go-to by a vehicle that is not in flight."""
+    """Return the refusal of a command to fly to a position, by a vehicle that is not in flight."""
     return "go-to denied: not in flight"
 
 
@@ -360,7 +363,7 @@ class MissionServer:
         return handler(self, message, station, kind, now) if handler else []
 
     def tick(self, now: float) -> list[MissionReply]:
-        """Return repeated requests for items that did not arrive, and abandon the uploads of silent stations."""
+        """Return repeated requests for items that did not arrive; abandon uploads of silent stations."""
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.last_message_time > UPLOAD_TIMEOUT_S:
@@ -398,7 +401,7 @@ class MissionServer:
         return [self._request_next_item(upload, kind, now)]
 
     def _answer_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
-        """Fly to the position or altitude of an item that is not part of a mission."""
+        """Fly to the position or altitude of an item that a station sends outside a mission."""
         try:
             item = from_message(message, "go-to")
         except MissionError as error:
@@ -410,9 +413,10 @@ class MissionServer:
         return self._ack(station, result, kind, problem)
 
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        """Store an item of an upload, and request the next item, or replace the list after the last item.
+        """Store an item of an upload; request the next item, or replace the list after the last item.
 
-        Without an upload, answer a go-to item, and acknowledge a repeated last item again.
+        Without an upload, an item is a command to fly to its position, or a repeated last item, which is acknowledged
+        again.
         """
         upload = self._uploads.get(kind)
         if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
@@ -480,7 +484,7 @@ class MissionServer:
     def _clear_lists(
         self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
     ) -> list[MissionReply]:
-        """Clear lists, and acknowledge with a MAV_MISSION_TYPE; clear none if one of them must not change."""
+        """Clear lists, and acknowledge with a MAV_MISSION_TYPE; clear no list if one of them must not change."""
         for kind in kinds:
             refusal = self._upload_refusal(station, kind, now)
             if refusal:
@@ -496,7 +500,7 @@ class MissionServer:
     def _cancel_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Discard the upload of a station that cancels it (MISSION_ACK with an error).
 
-        If the station supports only MISSION_REQUEST_INT and did not get those requests, request the item again.
+        A station that accepts only MISSION_REQUEST_INT may have missed these requests; request the item again from it.
         """
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
@@ -509,13 +513,13 @@ class MissionServer:
         return []
 
     def _stop_confirmations(self, station: Station) -> None:
-        """Stop requests to a station for its finished uploads, because it now sends other messages."""
+        """Stop requesting a station's last items again, because the station now sends other messages."""
         for finished in self._finished.values():
             if finished.station == station:
                 finished.remaining_count = 0
 
     def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
-        """Return the reason why a station must not change a list now, or ""."""
+        """Return why a station must not change a list now, or ""."""
         if self.locked and kind == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
@@ -524,7 +528,7 @@ class MissionServer:
         return ""
 
     def _drop_other_uploads(self, station: Station) -> None:
-        """Drop the uploads of other, silent stations when a station takes the lock."""
+        """Drop the uploads of other, silent stations when a station takes the upload lock."""
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
     def _request_next_item(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
@@ -551,7 +555,7 @@ def _item_request(
 
 
 def _placement_problem(item: MissionItem, kind: MissionType) -> str:
-    """Return the reason why an item does not belong in a list, or ""."""
+    """Return why an item does not belong in a list, or ""."""
     is_allowed = (
         item.command in _ALLOWED_COMMANDS[kind]
         if kind in _ALLOWED_COMMANDS

@@ -107,9 +107,9 @@ class Parameters:
         return self._numbers.get(_decode_name(name))
 
     def set(self, name: bytes, value: float, *, in_flight: bool = False) -> tuple[int | None, str]:
-        """Set a parameter for a station.
+        """Set a parameter for a station; return its number and the reason for a refusal.
 
-        Return its number, None if unknown, and the reason for a refusal, "" if it was set.
+        The number is None for an unknown parameter, and the reason is "" if the parameter was set.
         """
         number = self._numbers.get(_decode_name(name))
         if number is None:
@@ -265,7 +265,7 @@ class Requests:
         return handler(self, message, peer, now) if handler else []
 
     def on_verdict(self) -> list[Response]:
-        """Return the responses to the arm commands that waited for the verdict."""
+        """Return the responses to arm commands that have waited for the verdict."""
         waiting_commands, self._waiting_commands = self._waiting_commands, []
         replies: list[Response] = []
         for command in waiting_commands:
@@ -297,7 +297,7 @@ class Requests:
         ]
 
     def _run_flight_command(self, number: int, message: Any) -> CommandResult:
-        """Run a command about modes or the mission; the result is UNSUPPORTED for any other command."""
+        """Run a command about modes or the mission; for any other command the result is UNSUPPORTED."""
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self.arming.set_mode(_to_integer(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:

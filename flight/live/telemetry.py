@@ -67,7 +67,7 @@ class Snapshot:
 
     @staticmethod
     def unpack(data: bytes) -> "Snapshot":
-        """Return the snapshot that `pack` turned into these bytes.
+        """Return the snapshot that is packed in some bytes, as `pack` made them.
 
         Raises struct.error if the number of bytes is wrong.
         """
@@ -75,7 +75,10 @@ class Snapshot:
 
     @property
     def is_finite(self) -> bool:
-        """True if all values are finite and may be sent to stations; a flight may end with other values."""
+        """True if all values are finite, so that they may be sent to stations.
+
+        A flight may end with values that are not finite.
+        """
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 

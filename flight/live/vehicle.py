@@ -98,11 +98,11 @@ class Downlink:
             self._link.send(message, peer)
 
     def request_heartbeat(self) -> None:
-        """Make the next heartbeat due now, because its contents have changed."""
+        """Make the next heartbeat due at once, because its contents have changed."""
         self._next_heartbeat = self._link.clock()
 
     def wait_time(self, now: float, max_wait: float) -> float:
-        """Return the time until the next message is due, s, at most ``max_wait``."""
+        """Return the time until the next message is due, s; at most ``max_wait``."""
         due_time = min(
             (time for peer in self._link.peers.values() for time in peer.due.values()), default=now + max_wait
         )
@@ -223,13 +223,16 @@ class MissionProgress:
             self._downlink.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
 
     def _waypoint_items(self) -> tuple[int, ...]:
-        """Return the seq of the item at each waypoint of the flown mission, -1 without an item."""
+        """Return the item number (seq) at each waypoint of the flown mission; -1 without an item."""
         if self._route_items is not None:
             return self._route_items
         return () if self._arming.last_verdict is None else self._arming.last_verdict.items
 
     def _station_number(self, waypoint: int) -> int:
-        """Return the station's number of the item at a waypoint, or of the next waypoint with an item."""
+        """Return the number of the item at a waypoint, or at the next waypoint that has an item.
+
+        It is the number that stations use.
+        """
         items = self._waypoint_items()
         next_items = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
         return next_items[0] + self.shift if next_items else 0
@@ -308,7 +311,10 @@ class Vehicle:
         self.server.changed.add(MissionType.MISSION)
 
     def load_fence(self, fences: Sequence[MissionItem], rally: Sequence[MissionItem] = ()) -> None:
-        """Load fence and rally points from files, as if a station had uploaded them; they apply to later missions."""
+        """Load fence and rally points from files, as if a station had uploaded them.
+
+        They apply to missions that are loaded later.
+        """
         for kind, items in ((MissionType.FENCE, fences), (MissionType.RALLY, rally)):
             if items:
                 self.server.lists[kind] = tuple(items)
@@ -320,7 +326,7 @@ class Vehicle:
             self.step(_MAX_WAIT_S)
 
     def close(self) -> None:
-        """End the flight and its process, and show the process's last texts at the terminal."""
+        """End the flight and its process; show the process's last texts at the terminal."""
         deadline = self._clock() + CLOSE_TIMEOUT_S
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
@@ -392,7 +398,7 @@ class Vehicle:
             self.downlink.send_text(text, WARNING)
 
     def _apply_state(self) -> None:
-        """Pass on requests from the arming state: end, divert or start the flight."""
+        """Carry out what the arming state requests: end, divert or start the flight."""
         if self.arming.end_requested:
             self.arming.end_requested = False
             self._send_request(EndFlight())
@@ -436,7 +442,7 @@ class Vehicle:
         self._refresh_status()
 
     def _divert(self, center: LoiterCenter) -> None:
-        """Request a diversion according to the mode: to the mission's current item, to home, or to a loiter."""
+        """Request a diversion for the present mode: to the mission's current item, to home, or to a loiter."""
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
@@ -459,9 +465,9 @@ class Vehicle:
         self._refresh_status()
 
     def _set_start_item(self, seq: int) -> CommandResult:
-        """Set the start item of the next flight, or continue the current flight at it.
+        """Set the item from which the next flight starts, or at which the present flight continues.
 
-        seq: the station's number of the item.
+        seq: number that the station uses for the item.
 
         A mission with a new start item is judged from that item.
         """

@@ -32,11 +32,12 @@ class AltitudeReading(NamedTuple):
 def misread_altitudes(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None
 ) -> tuple[tuple[AltitudeReading, ...], tuple[AltitudeReading, ...]]:
-    """Return the items that state AMSL but fit a height above home, and the items that state the opposite.
+    """Return the items whose altitudes fit the terrain only in the other altitude frame.
 
-    The first are below the ground, and above it if read as heights above home.  The second are higher than the others
-    by at least the altitude of home, or belong to a mission whose landing point is in the air, but on the ground if
-    read as AMSL.  Both are empty if the ground or the altitude of home is unknown, and if home is near sea level.
+    The first result has the items that state AMSL, but lie below the ground, and above it if read as heights above
+    home. The second result has items that state a height above home. They are higher than the other items by at least
+    the altitude of home, or their mission has a landing point that is in the air, but on the ground if read as AMSL.
+    Both are empty if the ground or the altitude of home is unknown, and if home is near sea level.
     """
     home = mission.home
     if home is None or terrain is None or not home.alt > LANDING_HEIGHT_TOLERANCE_M:
@@ -55,7 +56,10 @@ def misread_altitudes(
 
 
 def _height_tolerance(item: MissionItem) -> float:
-    """Return how far an item may be below the ground, m: a landing point by the errors of map and home."""
+    """Return the depth below the ground, m, up to which an item may be correct.
+
+    For a landing point the depth allows for the errors of the map and of home.
+    """
     return LANDING_HEIGHT_TOLERANCE_M if item.command in LANDINGS else 0.0
 
 

@@ -364,7 +364,7 @@ _UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot accepts it in a mission")
 
 
 def command_support(command: int) -> Support:
-    """Return the treatment of a command in a mission by each autopilot.
+    """Return how each autopilot treats a command in a mission.
 
     >>> command_support(Command.DO_JUMP).px4, command_support(Command.JUMP_TAG).px4, command_support(50_000).arduplane
     (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)

@@ -88,7 +88,7 @@ def raise_items(mission: Mission, indices: Iterable[int], height_change: float) 
 
 
 def set_altitude(mission: Mission, index: int, amsl: float, current_amsl: float) -> Mission:
-    """Return the mission with the altitude AMSL of an item changed from ``current_amsl`` to ``amsl``, m.
+    """Return the mission with the altitude of an item changed from ``current_amsl`` to ``amsl``, m AMSL.
 
     An item without altitude gets an altitude in the AMSL frame.
     """
@@ -99,7 +99,7 @@ def set_altitude(mission: Mission, index: int, amsl: float, current_amsl: float)
 
 
 def set_loiter_radius(mission: Mission, index: int, radius: float) -> Mission:
-    """Return the mission with another radius (m) of a loiter's item, which keeps its direction.
+    """Return the mission with another radius (m) for a loiter item; the loiter keeps its direction.
 
     >>> items = tuple(MissionItem(k, c, 3, (2.0, -80.0, -80.0, 0.0), 46.0, 8.0, 75.0) for k, c in ((1, 18), (2, 31)))
     >>> [set_loiter_radius(Mission(None, items), k, 94.0).items[k].params for k in (0, 1)]
@@ -116,7 +116,7 @@ def set_loiter_radius(mission: Mission, index: int, radius: float) -> Mission:
 
 
 def insertion_index(mission: Mission, previous_index: int) -> int:
-    """Return the index for a new waypoint after an item, behind all actions at that item.
+    """Return the index at which to insert a waypoint after an item, behind all actions at that item.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> insertion_index(Mission(None, tuple(way)), 0)
@@ -133,7 +133,9 @@ def insertion_index(mission: Mission, previous_index: int) -> int:
 def insert_waypoint(
     mission: Mission, previous_index: int, lat_deg: float, lon_deg: float, height: float | None = None
 ) -> Mission:
-    """Return the mission with a waypoint inserted after an item, at `insertion_index`, in the frame of that item.
+    """Return the mission with a waypoint inserted after an item and after the actions at that item.
+
+    The waypoint is in the altitude frame of that item; see `insertion_index`.
 
     height: altitude of the waypoint in that frame, m; None for the altitude of the item.
 
@@ -165,7 +167,7 @@ def insert_waypoint(
 
 
 def delete_item(mission: Mission, index: int) -> Mission:
-    """Return the mission without an item; a jump to it then goes to the next item.
+    """Return the mission without an item; a jump to this item then leads to the next item.
 
     Raises MissionError if fewer than two waypoints would remain.
     """
@@ -179,10 +181,11 @@ def delete_item(mission: Mission, index: int) -> Mission:
 
 
 def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: float) -> Mission:
-    """Return the mission with another airspeed on the leg to an item, and ``next_airspeed`` after that item.
+    """Return the mission with another airspeed on the leg to an item.
 
-    A speed change directly before the item is edited; otherwise a speed change is inserted. No speed change is inserted
-    after the last item with a position, or before another speed change.
+    A speed change directly before the item is edited. If there is none, a speed change is inserted. A second speed
+    change after the item restores ``next_airspeed``; it is omitted after the last item with a position, and before
+    another speed change.
 
     airspeed, next_airspeed: m/s.
     """
@@ -193,10 +196,8 @@ def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: f
         new_change = replace(change, params=(change.params[0], _round_to_milli(airspeed), *change.params[2:]))
         mission, item_index = _with_replaced_item(mission, index - 1, new_change), index
     else:
-        mission, item_index = (
-            _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed)),
-            index + 1,
-        )
+        mission = _with_inserted_item(mission, index, _speed_item(mission.items[index].seq, airspeed))
+        item_index = index + 1
     later_items = mission.items[item_index + 1 :]
     if not any(is_movable(item) for item in later_items) or later_items[0].command == Command.DO_CHANGE_SPEED:
         return mission
@@ -204,13 +205,13 @@ def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: f
 
 
 def _speed_item(seq: int, airspeed: float) -> MissionItem:
-    """Return an item that changes the airspeed, m/s."""
+    """Return an item that changes the airspeed to a value, m/s."""
     params = (0.0, _round_to_milli(airspeed), -1.0, 0.0)
     return MissionItem(seq, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), params, 0.0, 0.0, 0.0)
 
 
 def _with_replaced_item(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """Return the mission with the item at an index replaced.
+    """Return the mission with another item at an index.
 
     Raises MissionError for an invalid item.
     """
@@ -236,7 +237,7 @@ def _check_item(mission: Mission, item: MissionItem) -> None:
 
 
 def _renumber(item: MissionItem, after_seq: int, shift: int) -> MissionItem:
-    """Return the item with its number and its jump target increased by ``shift`` if they are above ``after_seq``."""
+    """Return an item with ``shift`` added to its number and jump target where they exceed ``after_seq``."""
     params = item.params
     if item.command == Command.DO_JUMP and params[0] > after_seq:
         params = (params[0] + shift, *params[1:])

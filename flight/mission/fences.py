@@ -48,9 +48,9 @@ def fence_item(origin: GeoOrigin, command: Command, param1: float, position: Seq
 def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionItem], list[str]]:
     """Return the fence items of zones, and notes on what a fence cannot represent.
 
-    A cylinder becomes a circle, and an outline a polygon. A hole of an inclusion becomes an exclusion. A hole of an
-    exclusion is closed, and an inclusion of several parts is omitted, because a position must be inside every
-    inclusion. No fence has a floor or a ceiling.
+    A cylinder becomes a circle, and an outline becomes a polygon. A hole in an inclusion becomes an exclusion, and a
+    hole in an exclusion is closed. An inclusion of several parts is omitted, because an aircraft must be inside every
+    inclusion. Fences have no floor and no ceiling.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> items, notes = zone_fences([zone], GeoOrigin(36.5, -84.2))
@@ -102,7 +102,7 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _joined_names(names: list[str]) -> str:
-    """Return up to three names as the subject of a sentence, with the number of the other names and its verb."""
+    """Return up to three names as the subject of a sentence; further names are only counted."""
     remainder = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + remainder + (" is" if len(names) == 1 else " are")
 
@@ -121,7 +121,7 @@ _MAX_NAMES = 12
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
-    """Group fence items into shapes, each the corners of one polygon or a single circle.
+    """Group fence items into shapes: the corners of one polygon, or a single circle.
 
     Raises MissionError if a polygon has fewer corners than stated.
     """
@@ -144,11 +144,14 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 def fence_problem(
     fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float, *, unites_inclusions: bool = False
 ) -> tuple[str, int] | None:
-    """Return the first fence that a position violates: its description and the number of its first item; or None.
+    """Return the first fence that a position violates, or None.
 
-    fences: items 5001..5004, a polygon's corners together.
+    The result is a description of the fence and the number of its first item.
+
+    fences: fence items (5001..5004), in which the corners of a polygon follow each other.
     east, north: m on the map about ``origin``.
-    unites_inclusions: True if a position must be inside any inclusion; False if inside all of them.
+    unites_inclusions: True if a position must be inside at least one inclusion; False if it must be inside every
+        inclusion.
 
     Raises MissionError if a polygon has fewer corners than stated.
 
@@ -187,12 +190,12 @@ PassTest = Callable[[tuple[MissionItem, ...]], bool]
 
 
 def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple[Mission, tuple[str, ...]]:
-    """Return a mission with a scenario's area, threats and zones as fence, and notes for the user.
+    """Return a mission with a scenario's area, threats and zones as its fence, and notes for the user.
 
     The area becomes an inclusion polygon of four corners, and each missile's kill radius an exclusion circle without
-    altitude limits. Radars are omitted: detection is not forbidden. Zones are converted by `zone_fences`. The
-    mission's own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is
-    omitted: an autopilot with such a fence refuses the mission or aborts it.
+    altitude limits. Radars are omitted: detection is not forbidden. Zones are converted by `zone_fences`. The mission's
+    own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is omitted. An
+    autopilot with such a fence would refuse or abort the mission, because a fence has no height limits.
 
     The mission keeps its rally points. The notes list what a fence cannot represent, and what is omitted.
 
@@ -246,7 +249,7 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
 def _omit_crossed_exclusions(
     zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest
 ) -> tuple[list[Zone], list[str]]:
-    """Return the zones without the exclusions that the mission passes through on the map, and the exclusions' names."""
+    """Return the zones without exclusions that the mission crosses on the map, and the omitted names."""
     remaining, crossed_names = [], []
     for zone in zones:
         if zone.kind == "exclusion" and passes(number_items(zone_fences([zone], origin)[0])):
@@ -257,7 +260,7 @@ def _omit_crossed_exclusions(
 
 
 def number_items(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return fence items or rally points with numbers from 0, as in the lists of a vehicle.
+    """Return fence items or rally points numbered from 0, as a vehicle stores them.
 
     >>> item = MissionItem(7, Command.NAV_RALLY_POINT, Frame.GLOBAL, (0.0,) * 4, 36.5, -84.2, 0.0)
     >>> [one.seq for one in number_items([item, item])]
@@ -267,7 +270,10 @@ def number_items(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def _is_in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
-    """Return True if a position lies in a polygon, by counting the crossings of a ray to the east."""
+    """Return True if a position is inside a polygon.
+
+    A ray to the east crosses the polygon's edges an odd number of times if it starts inside.
+    """
     start_east, start_north = corners_east, corners_north
     end_east, end_north = np.roll(start_east, -1), np.roll(start_north, -1)
     is_crossed = (start_north > north) != (end_north > north)
@@ -285,8 +291,8 @@ def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str 
 
     source: name of the mission in messages.
 
-    Each zone is named after its first item. Raises MissionError if a polygon has fewer corners than stated, or if a
-    shape is invalid.
+    Each zone is named after its first fence item. Raises MissionError if a polygon has fewer corners than stated, or if
+    a shape is invalid.
 
     >>> from flight.mission.items import Command, Frame
     >>> radius = (500.0, 0.0, 0.0, 0.0)

@@ -39,14 +39,14 @@ def plan_mission(
     NAV_TAKEOFF at home and ends with DO_LAND_START, two waypoints of the final approach and NAV_LAND, whose first
     parameter is the go-around height above home. The scenario's rally points are included.
 
-    Positions are rounded to the 1e-7 degree grid of MISSION_ITEM_INT and altitudes to whole millimeters, so that every
-    form of the mission has the same numbers; this moves a waypoint by less than 8 mm on the map.
+    Positions are rounded to the 1e-7 degree grid of MISSION_ITEM_INT, and altitudes to whole millimeters. Therefore
+    every file format states the same numbers. The rounding moves a waypoint by less than 8 mm on the map.
 
-    The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
-    bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE_M`, rounded up to a whole
-    meter, so that no arc of the flight misses the waypoint. PX4 has its own radius for fixed-wing aircraft. If the
-    tracking error of an autopilot is known, the radius is the one with the smallest error, because ArduPlane turns to
-    the next leg at that distance before a waypoint.
+    The acceptance radius is the distance at which a turn passes its waypoint, R(1/cos(theta/2) - 1), plus
+    `ACCEPTANCE_TOLERANCE_M`, rounded up to a whole meter. R is the turn radius at this speed and bank with the
+    scenario's wind from behind. With this acceptance radius no arc of the flight misses its waypoint. PX4 has its own
+    radius for fixed-wing aircraft. If the tracking error of an autopilot is known, the radius is the one with the
+    smallest error, because ArduPlane turns to the next leg at that distance before a waypoint.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -101,7 +101,10 @@ class _ItemBuilder:
 
         position: (3,) m; None for a command without a position.
         """
-        frame, lat, lon, up = Frame.MISSION, 0.0, 0.0, 0.0
+        frame = Frame.MISSION
+        lat = 0.0
+        lon = 0.0
+        up = 0.0
         if position is not None:
             frame, up = Frame.GLOBAL, _round_to_thousandths(float(position[2]))
             lat, lon = (round_to_grid(float(value)) for value in to_geo(self._origin, position[0], position[1]))
@@ -146,7 +149,9 @@ def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[Miss
 def acceptance_radii(
     scenario: Scenario, points: Floats, airspeed: float, max_bank: float, tracking: TrackingError | None
 ) -> Floats:
-    """Return the acceptance radius at each position of a planned mission, (w,) whole m; see `plan_mission`.
+    """Return the acceptance radius of each position of a planned mission, (w,) whole m.
+
+    `plan_mission` describes the acceptance radius.
 
     points: (w, 3) m, in flying order.
     """
@@ -168,7 +173,7 @@ def acceptance_radii(
 
 
 def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
-    """Return the distance between the corner and the fly-by arc of each turn (rad), m.
+    """Return the distance between corner and fly-by arc for each turn (rad), m.
 
     radius: radius of the arcs, m.
     """
@@ -178,9 +183,9 @@ def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
 def _acceptance_radii_for_tracking(
     scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError
 ) -> Floats:
-    """Return the acceptance radii for which the autopilot's tracking error is smallest, (w,) whole m.
+    """Return the acceptance radii with the smallest tracking error of the autopilot, (w,) whole m.
 
-    Each radius applies to the highest ground speed in the turn at its waypoint.
+    Each radius is for the highest ground speed in the turn at its waypoint.
     """
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
     speeds = corner_speeds(scenario, points, airspeed)
@@ -192,7 +197,7 @@ def _acceptance_radii_for_tracking(
 def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[float]:
     """Return the highest ground speed in the turn at each of the w - 2 corners of a path, m/s.
 
-    points: (w, 3) m.
+    points: path, (w, 3) m.
 
     airspeed: equivalent, m/s.
 

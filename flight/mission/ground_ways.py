@@ -54,9 +54,10 @@ class TakeOff:
     acceleration: float
 
     def release(self) -> tuple[Floats, Floats]:
-        """Return the position (m) and velocity (m/s) at release from rail or hand: east, north, up, (3,) each.
+        """Return the position (m) and the velocity (m/s) at the release, each (3,): east, north, up.
 
-        On a runway the position is on the ground; the caller adds the height at which the aircraft stands.
+        The release is the end of the rail, the throw of a hand launch, or the start of a runway. On a runway the
+        position is on the ground, and the caller adds the height of the standing aircraft.
         """
         launch, direction = self.launch, np.array([math.sin(self.course), math.cos(self.course)])
         if launch.method == "runway":
@@ -107,15 +108,15 @@ class Approach:
     def distances_from_landing_point(self, position: Floats) -> tuple[Floats, Floats]:
         """Return along-track and cross-track distances of positions (n, 3) from the landing point, m.
 
-        Both have shape (n,), and are positive past the landing point and to the right of the landing course.
+        Both have shape (n,). They are positive past the landing point, and to the right of the landing course.
         """
         return _track_offsets(position, self.point, self.course)
 
     def distances_from_strip_center(self, position: Floats) -> tuple[Floats, Floats]:
         """Return along-track and cross-track distances of positions (n, 3) from the strip's center, m.
 
-        The strip has its stated course, or the landing's course if none is stated. A landing against the stated course
-        uses the same strip.
+        The track is the strip's stated course, or the landing course if no course is stated. A landing against the
+        stated course uses the same strip.
         """
         axis = self.course if self.strip.course is None else self.strip.course
         if math.cos(self.course - axis) < 0.0:
@@ -150,7 +151,7 @@ class GroundPhases:
 
 
 def find_ground_phases(scenario: Scenario, mission: Mission, route: Route, min_airspeed: float) -> GroundPhases:
-    """Find the take-off and the landing of a mission that a flight in the scenario simulates.
+    """Find the take-off and the landing of a mission that a flight in a scenario simulates.
 
     min_airspeed: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
 
@@ -170,7 +171,7 @@ def find_ground_phases(scenario: Scenario, mission: Mission, route: Route, min_a
 def _find_take_off(
     scenario: Scenario, mission: Mission, route: Route, min_airspeed: float
 ) -> tuple[TakeOff | None, str]:
-    """Return the take-off, or the reason why it is not simulated."""
+    """Return the take-off, or the reason why no take-off is simulated."""
     launch, base = scenario.launch, home_point(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     route_items = route.items.tolist()
@@ -195,13 +196,13 @@ def _find_take_off(
 
 
 def climb_pitch(item: MissionItem) -> float:
-    """Return the minimum climb pitch that a take-off item states, rad; `DEFAULT_CLIMB_PITCH` if it states none."""
+    """Return the minimum climb pitch of a take-off item, rad; `DEFAULT_CLIMB_PITCH` if the item states none."""
     pitch = item.params[0]
     return math.radians(pitch) if pitch > 0.0 else DEFAULT_CLIMB_PITCH
 
 
 def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[Approach | None, str]:
-    """Return the landing, or the reason why it is not simulated."""
+    """Return the landing, or the reason why no landing is simulated."""
     strip, last_leg = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
     if strip is None or not items or int(route.items[last_leg]) not in items or last_leg < 2:
@@ -216,10 +217,8 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])
-    wind, home = (
-        scenario.wind.components_on_course(course, ground)[0],
-        home_point(mission, scenario.origin, scenario.terrain),
-    )
+    wind = scenario.wind.components_on_course(course, ground)[0]
+    home = home_point(mission, scenario.origin, scenario.terrain)
     base = ground if home is None else home.up
     return Approach(
         strip, int(route.items[last_leg]), last_leg - 1, point, course, length, float(leg_start[2]), wind, base
@@ -227,7 +226,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 
 
 def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
-    """Return the airborne part of a route, which is judged by the rules for a flight in the air.
+    """Return the part of a route that is flown in the air and judged by the rules for it.
 
     first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
 
@@ -249,7 +248,7 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
 
 
 def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
-    """Return a route's waypoints (w, 3) for pictures and tables, m.
+    """Return a route's waypoints for pictures and tables, (w, 3) m.
 
     The first and last waypoints are on the ground where the take-off or landing is simulated.
     The route itself starts at the altitude at which a take-off ends, and its leg to a landing point is level.
@@ -264,7 +263,7 @@ def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
 
 
 def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
-    """Return a route's notes, without the note on the landing if the landing is simulated."""
+    """Return a route's notes; the note on the landing is omitted if the landing is simulated."""
     if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

@@ -36,7 +36,7 @@ class ImpliedScenario:
 def implied_scenario(
     mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, vertical_legs: bool = False
 ) -> ImpliedScenario:
-    """Build a scenario around a mission that came without one: an area, no threats and default limits.
+    """Build a scenario around a mission that has none: an area, no threats, and default limits.
 
     The scenario's ``external`` is True.
 
@@ -46,9 +46,9 @@ def implied_scenario(
 
     The area is the bounding box of the mission's positions and loiters, home and rally points, with a margin of 2 km. A
     home or rally point more than 100 km from the start of the mission is left out. Start and destination are the first
-    and last positions of the mission. If they are not above ground, they are raised to 1 m above it, as a scenario
-    requires; the route and its verdict keep the mission's altitudes. A part of the mission may lie where the terrain is
-    unknown. Raises MissionError, or TerrainError if the ground is unknown at all positions of the mission.
+    and last positions of the mission. A scenario requires them to be above the ground, so they are raised to 1 m above
+    it if necessary. The route and its verdict keep the mission's altitudes. A part of the mission may lie where the
+    terrain is unknown. Raises MissionError, or TerrainError if the ground is unknown at all positions of the mission.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -87,11 +87,11 @@ def implied_scenario(
 
 
 def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin:
-    """Return the map origin of a mission without a scenario: home, or the first position of the mission.
+    """Return the map origin for a mission without a scenario: home, or the mission's first position.
 
     stops: stops of the mission's itinerary.
 
-    Home is used if it is within 100 km of that position. Raises MissionError beyond 89 degrees of latitude.
+    Home is used if it is within 100 km of the first position. Raises MissionError beyond 89 degrees of latitude.
     """
     first_stop = stops[0]
     positions = [item for item in mission.items if item.has_position and item.seq >= first_stop.item]
@@ -110,7 +110,10 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
 
 
 def _mission_area(mission: Mission, itinerary: Itinerary, origin: GeoOrigin, points: Floats) -> Floats:
-    """Return the area around a mission, (2, 2) [[e0, e1], [n0, n1]] m.  points: positions of its stops, (n, 2) m."""
+    """Return the area around a mission, (2, 2) [[e0, e1], [n0, n1]] m.
+
+    points: positions of the mission's stops, (n, 2) m.
+    """
     stops, home = itinerary.stops, mission.home
     margin = AREA_MARGIN_M + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     # A return flies to home or a rally point from anywhere on the route.
@@ -158,7 +161,7 @@ def _position_text(lats: Floats, lons: Floats) -> str:
 
 
 def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
-    """Return the table of a start or destination, raised to 1 m above the ground if it is lower."""
+    """Return the table of a start or destination; raise the position to 1 m above ground if it is lower."""
     east, north, amsl = position
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)
@@ -166,6 +169,6 @@ def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndT
 
 
 def _scenario_name(source: str) -> str:
-    """Return a scenario's name for the file of a mission: at most 100 printable characters."""
+    """Return a scenario's name made from the file name of a mission: at most 100 printable characters."""
     name = "".join(character if character.isprintable() else "?" for character in re.split(r"[/\\]", source)[-1])
     return name[:100] or "mission"

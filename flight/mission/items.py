@@ -30,7 +30,7 @@ class Notes:
     _items: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, text: str, seq: int | None = None) -> None:
-        """Add a note on an item or on the whole mission; ignore a repeated note."""
+        """Add a note on an item or on the whole mission; a note that exists already is ignored."""
         items = self._items.setdefault(text, [])
         if seq is not None and seq not in items[-1:]:
             items.append(seq)
@@ -46,7 +46,7 @@ class Notes:
 
 
 def _range_text(numbers: list[int]) -> str:
-    """Return sorted numbers as text in which consecutive numbers are joined: "3-5, 9", or "3-5, 9, 12 and 3 more"."""
+    """Return sorted numbers as text; consecutive numbers are joined: "3-5, 9", or "3-5, 9, 12 and 3 more"."""
     ranges: list[list[int]] = []
     for number in numbers:
         if not ranges or number > ranges[-1][1] + 1:
@@ -141,14 +141,14 @@ OVER_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT
 
 
 def is_located(command: int, frame: int) -> bool:
-    """Return True if an item of a command and frame has latitude, longitude and altitude."""
+    """Return True if items of a command and frame have latitude, longitude and altitude."""
     return frame != Frame.MISSION and (
         command <= _LAST_NAV_COMMAND or command in FENCES or command in _LOCATED_COMMANDS
     )
 
 
 def is_navigation(command: int) -> bool:
-    """Return True if a command is a navigation command: commands after it wait until it is done.
+    """Return True for a navigation command; commands after it wait until it is complete.
 
     >>> is_navigation(Command.NAV_WAYPOINT), is_navigation(Command.DO_SET_CAM_TRIGG_DIST)
     (True, False)
@@ -202,15 +202,15 @@ class MissionItem:
 
     @property
     def x(self) -> int:
-        """Latitude as MISSION_ITEM_INT carries it: 1e-7 degrees, rounded; INT32_MAX if unset (MAVLink).
+        """Latitude as in MISSION_ITEM_INT: 1e-7 degrees, rounded; INT32_MAX if unset (MAVLink).
 
-        For a command without a position it is the fifth parameter, unscaled.
+        For a command without a position the value is the fifth parameter, unscaled.
         """
         return self._scaled(self.lat_deg)
 
     @property
     def y(self) -> int:
-        """Longitude (or the sixth parameter) as MISSION_ITEM_INT carries it."""
+        """Longitude as in MISSION_ITEM_INT, or the unscaled sixth parameter of a command without a position."""
         return self._scaled(self.lon_deg)
 
     def _scaled(self, value: float) -> int:
@@ -221,7 +221,7 @@ class MissionItem:
 
     @property
     def has_position(self) -> bool:
-        """True if the item has a position; latitude and longitude of 0, 0 or NaN are no position."""
+        """True if the item has a position; a latitude and longitude of 0, 0 or NaN is not a position."""
         if not (math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)):
             return False
         return is_located(self.command, self.frame) and (self.x, self.y) != (0, 0)
@@ -302,8 +302,8 @@ class Mission:
 def renumber_items(mission: Mission) -> Mission:
     """Return a mission with its items numbered from 1 without gaps, as ground stations number them.
 
-    Number 0 is home in both forms. The targets of jumps are renumbered too; the target of a jump to a missing item
-    stays missing.
+    Number 0 remains home. The targets of jumps are renumbered, too. A jump to a missing item still leads to a missing
+    item.
 
     >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
     >>> [item.seq for item in renumber_items(Mission(None, way)).items]
@@ -352,7 +352,7 @@ class ItemProblem(NamedTuple):
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
     def at(self, file: str, location: object) -> dict[str, Any]:
-        """Return the arguments for a `MissionError` on this problem.
+        """Return the arguments with which a `MissionError` reports this problem.
 
         file: file that holds the item.
         location: beginning of the message.
@@ -361,7 +361,7 @@ class ItemProblem(NamedTuple):
 
 
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
-    """Return the fault of a latitude and longitude, degrees, or None if both are valid."""
+    """Return what is wrong with a latitude and longitude (degrees), or None if both are valid."""
     if abs(lat_deg) > 90.0:
         hint = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
         return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{hint}")
@@ -371,7 +371,7 @@ def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
 
 
 def item_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of an item that no autopilot could interpret, or None for a valid item.
+    """Return what is wrong with an item that no autopilot could interpret, or None for a valid item.
 
     >>> print(item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0)))
     latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)
@@ -398,7 +398,7 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of a parameter that is a count, a size or a jump target, or None if there is no fault."""
+    """Return what is wrong with a parameter that is a count, a size or a jump target, or None."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

@@ -86,18 +86,20 @@ class Loiter:
     exits_on_tangent: bool = False
 
     def min_sweep(self, airspeed: float, radius: float) -> float:
-        """Return the minimum angle of the loiter around its circle, rad.
+        """Return the angle around the circle for the loiter's turns or time, rad; the larger of the two.
 
-        In wind a circle over the ground takes longer than its length divided by the airspeed.
+        The angle for a time is computed without wind. In wind a lap takes longer, so the aircraft covers a smaller
+        angle in this time.
         """
         min_turns = 1.0 if self.endless else self.turns
         return max(2.0 * math.pi * min_turns, self.seconds * airspeed / radius)
 
 
 def arduplane_turns(stated_turns: float) -> float:
-    """Return the number of turns that ArduPlane flies for a stated number: rounded down above 1, and at most 255.
+    """Return the number of turns that ArduPlane flies for a stated number of turns.
 
-    `AP_Mission::mavlink_int_to_mission_cmd` stores the number in a byte.
+    Above 1 the number is rounded down; the maximum is 255, because `AP_Mission::mavlink_int_to_mission_cmd` stores the
+    number in a byte.
 
     >>> [arduplane_turns(turns) for turns in (0.5, 1.0, 2.5, 300.0)]
     [0.5, 1.0, 2.0, 255.0]
@@ -106,7 +108,7 @@ def arduplane_turns(stated_turns: float) -> float:
 
 
 def stated_loiter(item: MissionItem) -> Loiter | None:
-    """Return the loiter that an item states, or None if the item's command is not a loiter."""
+    """Return the loiter that an item states; None if the item is not a loiter."""
     param1, param2, param3, param4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
         return Loiter(param3, seconds=ENDLESS_LOITER_TIME_S, endless=True)
@@ -130,9 +132,10 @@ _ALTITUDE_STEP_M = 0.01
 
 
 def pass_by_distance(item: MissionItem) -> float:
-    """Return the distance that ArduPlane flies past a waypoint before it turns, m; 0 for any other item.
+    """Return the distance that ArduPlane flies past a waypoint before it turns, m.
 
-    The distance is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`).
+    The distance is the third parameter of NAV_WAYPOINT in whole metres (`AP_Mission::mavlink_int_to_mission_cmd`). For
+    any other item it is 0.
 
     >>> place = (0, 36.5, 8.0, 700.0)
     >>> made = [MissionItem(1, 16, place[0], (0.0, 0.0, p3, 0.0), *place[1:]) for p3 in (150.9, 300.0, math.nan, -50.0)]
@@ -223,7 +226,7 @@ class RoutePoint:
     arc_radius: float = 0.0
 
     def at(self, position: Position, arc_radius: float = 0.0) -> "RoutePoint":
-        """Return the point with a position on the map and a turn radius there, m."""
+        """Return the route point of this stop at a position on the map, with a turn radius there, m."""
         return replace(self, position=position, arc_radius=arc_radius)
 
     @property
@@ -267,17 +270,20 @@ class Itinerary:
 
     @property
     def ends_with_rtl(self) -> bool:
-        """True if the mission ends with an RTL; the last stop is then home, at the altitude of the previous stop."""
+        """True if the mission ends with an RTL.
+
+        The last stop is then home, at the altitude of the previous stop.
+        """
         return self.stops[-1].command == Command.NAV_RETURN_TO_LAUNCH
 
 
 def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> Itinerary:
-    """Unroll a mission as an autopilot would.
+    """Return the sequence of stops that an autopilot flies for a mission, with jumps and commands applied.
 
-    resets_jump_counters: True to take a jump again that is passed after its last repeat, as ArduPlane 4.7 does.
+    resets_jump_counters: True to start a jump's count again each time it is complete, as ArduPlane 4.7 does.
 
-    Raises MissionError if no item has a position, if a jump leads to a missing item, or if the mission unrolls to more
-    than `MAX_STOPS` stops.
+    Raises MissionError if no item has a position, if a jump leads to a missing item, or if the result has more than
+    `MAX_STOPS` stops.
     """
     builder, steps = _ItineraryBuilder(mission), _Steps(mission, resets_jump_counters)
     for step in steps:
@@ -327,7 +333,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
 
 
 def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryBuilder") -> None:
-    """Add open items and notes where an autopilot counts or follows fewer jumps and commands than the mission has."""
+    """Add open items and notes where an autopilot runs fewer jumps or commands than the mission has."""
     jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
     if len(jumps) > _MAX_COUNTED_JUMPS:
         text = f"flown, but ArduPlane skips jumps beyond the first {_MAX_COUNTED_JUMPS}"
@@ -415,7 +421,7 @@ class _Steps:
     def _commands_on_leg(self, first_index: int) -> list[int]:
         """Return the indices of the commands that ArduPlane runs on the leg to an item.
 
-        first_index: index of the command that ArduPlane has already run before that leg.
+        first_index: index of the last command that ArduPlane has run before that leg.
         """
         commands: list[int] = []
         index = self._next_item(first_index + 1, counting=False)
@@ -425,9 +431,10 @@ class _Steps:
         return commands
 
     def _next_item(self, index: int, *, counting: bool) -> int | None:
-        """Return the index of the next item that is not a jump, following jumps; None at the end (`get_next_cmd`).
+        """Return the index of the next item that is not a jump; None at the mission's end (`get_next_cmd`).
 
-        counting: True to count jumps, as when a navigation item is reached; False to look ahead.
+        counting: True to count the jumps on the way, as ArduPlane does when it reaches a navigation item; False to look
+            ahead only.
         """
         first_jump, chain_length = -1, 0
         while index < len(self.items):
@@ -459,7 +466,10 @@ class _Steps:
         return None
 
     def _count_item(self, item: MissionItem) -> None:
-        """Add an item to the reached items. Raises MissionError if jumps lead through too many items."""
+        """Add an item to the items reached so far.
+
+        Raises MissionError if jumps lead through too many items.
+        """
         self.reached.add(item.seq)
         self._step_count += 1
         if self._step_count > _MAX_STEPS:
@@ -512,7 +522,7 @@ class _ItineraryBuilder:
         self.first_home = self.home = mission.home or _first_position(mission)
 
     def process_step(self, step: _Step) -> None:
-        """Process the commands before a navigation item, and the item."""
+        """Process a step of the mission: the commands before a navigation item, then the item itself."""
         for item in step.commands:
             self._run_as_px4(item)
         arduplane_commands = () if step.command_before_leg is None else (step.command_before_leg, *step.commands_on_leg)
@@ -536,7 +546,7 @@ class _ItineraryBuilder:
                 self._set_home(item)
 
     def add_open_item(self, text: str, seq: int, *, arduplane: bool = True, px4: bool = True) -> None:
-        """Note an item that changes the path and is not simulated, for one or both autopilots."""
+        """Record an item that changes the path and is not simulated, for one or both autopilots."""
         for applies, notes, open_items in (
             (arduplane, self.notes.arduplane, self.open_items),
             (px4, self.notes.px4, self.px4_open_items),
@@ -548,7 +558,7 @@ class _ItineraryBuilder:
     def _run_as_arduplane(self, item: MissionItem, later_commands: Sequence[MissionItem]) -> None:
         """Run a command as ArduPlane does.
 
-        later_commands: commands that are run after it on the leg to the same item.
+        later_commands: commands that ArduPlane runs after this command on the same leg.
         """
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_speed_as_arduplane(item)
@@ -585,7 +595,10 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:
-        """Record a command that is not simulated: as an open item if it may change the path, otherwise as a note."""
+        """Record a command that is not simulated.
+
+        It is an open item if it may change the path, otherwise a note.
+        """
         name, support = command_name(item.command), command_support(item.command)
         treatment = support.px4 if as_px4 else support.arduplane
         notes = self.notes.px4 if as_px4 else self.notes.arduplane
@@ -600,7 +613,7 @@ class _ItineraryBuilder:
             notes.add(f"{name}: not flown", item.seq)
 
     def _note_wait(self, item: MissionItem) -> None:
-        """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read its flag."""
+        """Add a note for an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not wait."""
         self.notes.arduplane.add("autocontinue is 0: ignored, as ArduPlane does", item.seq)
         if item.seq == self.last_seq:
             self.notes.px4.add("autocontinue is 0: no effect on the last item", item.seq)
@@ -624,8 +637,12 @@ class _ItineraryBuilder:
             self._note_unsimulated_command(item, as_px4=True)
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
-        """Return the stop of an item, with the current speeds, and with the gates since the last stop."""
-        lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, stated_loiter(item), item.alt, item.frame
+        """Return the stop of an item, with the current speeds and the gates since the last stop."""
+        lat = item.lat_deg
+        lon = item.lon_deg
+        loiter = stated_loiter(item)
+        alt = item.alt
+        frame = item.frame
         gates, self.gates = tuple(self.gates), []
         if self.home is not self.first_home and frame in OVER_HOME:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
@@ -637,16 +654,20 @@ class _ItineraryBuilder:
         )
 
     def _add_gate(self, item: MissionItem) -> None:
-        """Add a gate to the next leg; PX4 passes a gate without a position, or before the start, immediately."""
+        """Add a gate to the next leg.
+
+        PX4 passes a gate at once if it has no position or precedes the start.
+        """
         if item.has_position and self.stops:
             self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.px4_airspeed))
         else:
             self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
 
     def _add_take_off(self, item: MissionItem) -> None:
-        """Add the stop of a take-off: above home at the start, and at its position if that differs from home.
+        """Add the stop of a take-off.
 
-        Raises MissionError for a take-off at the start without an altitude.
+        A take-off at the start adds a stop above home, and a stop at its own position if that differs from home. A
+        take-off in the air is flown as a waypoint. Raises MissionError for a take-off at the start without an altitude.
         """
         name = command_name(item.command)
         is_vertical = item.command == Command.NAV_VTOL_TAKEOFF
@@ -681,7 +702,7 @@ class _ItineraryBuilder:
             self.stops.append(over_home)
 
     def _add_stop(self, item: MissionItem) -> None:
-        """Add the stop of a waypoint or loiter, with notes on the parts that are not flown as written."""
+        """Add the stop of a waypoint or loiter, and a note on each part that is not flown as written."""
         name = command_name(item.command)
         is_later_loiter = stated_loiter(item) is not None and bool(self.stops)
         if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:
@@ -731,7 +752,10 @@ class _ItineraryBuilder:
         self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
     def _add_return(self, item: MissionItem) -> None:
-        """Add an RTL, which ends the mission; without a home or a previous stop it is not flown."""
+        """Add an RTL, which ends the mission.
+
+        Without a home or a previous stop the RTL is not flown.
+        """
         if not self.has_home and self.home is self.first_home:
             self.add_open_item("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
         elif not self.stops:
@@ -766,7 +790,7 @@ class _ItineraryBuilder:
             self.add_open_item(f"{name}: not flown straight down", item.seq)
 
     def _set_home(self, item: MissionItem) -> None:
-        """Set the home of all later altitudes and RTLs, as ArduPlane does (`Plane::do_set_home`)."""
+        """Set home for all later altitudes and RTLs, as ArduPlane does (`Plane::do_set_home`)."""
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
@@ -838,7 +862,7 @@ def _first_position(mission: Mission) -> Home:
 
 
 def _error_without_position(mission: Mission) -> MissionError:
-    """Return the error for a mission without a position to fly to; a gate is no such position."""
+    """Return the error for a mission without a position to fly to; a gate is not such a position."""
     has_gates = any(item.command == Command.CONDITION_GATE for item in mission.items)
     reason = f"; {GATES_ARE_NO_WAYPOINTS}" if has_gates else ""
     return MissionError(

@@ -44,12 +44,15 @@ DefaultRadius = Callable[[float, float], float]
 
 
 def item_radius(loiter: Loiter) -> float:
-    """Return the radius that a loiter's item states, m, without a sign for its direction; 0 if it states none."""
+    """Return the radius that a loiter item states, m, without its sign; 0 if it states none."""
     return abs(loiter.radius)
 
 
 def unit_scale(up: float) -> float:
-    """Return 1: the flown radius of a loiter equals the stated radius at every altitude.  up: m AMSL."""
+    """Return 1, for an autopilot that flies a loiter's stated radius at every altitude.
+
+    up: m AMSL.
+    """
     return 1.0
 
 
@@ -92,7 +95,7 @@ class LoiterRules:
     rtl_exit_note: str = ""
 
     def end_note(self) -> str:
-        """Return a note for an autopilot that loiters after the mission's end about the last waypoint.
+        """Return a note for an autopilot that loiters about the last waypoint after the mission's end.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
         'after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once'
@@ -147,14 +150,14 @@ def lay_out_waypoints(
 ) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     """Lay out the waypoints of a route along straight legs and around loiter circles.
 
-    Return the waypoints, and the stops that are not at their stated positions.
+    Return the waypoints, and the stops that are not flown at their stated positions.
 
     source: name of the mission in errors.
     default_radius: function that returns the aircraft's default loiter radius.
     slopes: function that returns the steepest climb and descent of the aircraft in a spiral.
     rules: loiter rules of the autopilot.
 
-    Stops inside the previous or next circle are omitted, with a note, because no straight leg joins them. Raises
+    A stop inside the previous or next circle is omitted with a note, because no tangent leads to it. Raises
     MissionError if a loiter is too wide or too long to lay out.
     """
     unjoined: list[UnjoinedStop] = []
@@ -197,7 +200,7 @@ def _make_nodes(
 ) -> list[Node]:
     """Return the points and loiter circles of a route in flying order, each joined to the next by a tangent.
 
-    Append the stops that no tangent joins to ``unjoined``.
+    Stops that no tangent reaches are appended to ``unjoined``.
 
     If the take-off is inside the first circle, the flight starts on that circle, without the take-off.
     """
@@ -228,10 +231,8 @@ def _make_nodes(
                 unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=False))
                 continue
             # Two loiters with the same stated radius and center may differ by the radius scale at their altitudes.
-            previous_stated_radius, stated_radius = (
-                abs(previous.signed_radius) / rules.radius_scale(previous.up),
-                abs(node.signed_radius) / rules.radius_scale(node.up),
-            )
+            previous_stated_radius = abs(previous.signed_radius) / rules.radius_scale(previous.up)
+            stated_radius = abs(node.signed_radius) / rules.radius_scale(node.up)
             is_same_direction = math.copysign(1.0, previous.signed_radius) == math.copysign(1.0, node.signed_radius)
             if (
                 previous.distance_to(node) >= _SAME_PLACE_M
@@ -263,7 +264,7 @@ def _signed_radius(
     default_radius: DefaultRadius,
     rules: LoiterRules,
 ) -> float:
-    """Return the radius of a loiter, m, negative to the left; add a note if it is not the stated radius.
+    """Return the radius of a loiter, m, negative to the left; add a note if it differs from the stated radius.
 
     Raises MissionError if the stated radius is too large.
     """
@@ -297,7 +298,7 @@ def _signed_radius(
 
 
 def is_joined(a: Node, b: Node) -> bool:
-    """Return True if a tangent leads from one circle or point to the other, or if both are the same circle."""
+    """Return True if a tangent joins two circles or points, or if both are the same circle."""
     distance = a.distance_to(b)
     return distance > abs(b.signed_radius - a.signed_radius) + _MIN_TANGENT_CLEARANCE_M or (
         distance < 1.0 and abs(a.signed_radius - b.signed_radius) < 1.0
@@ -305,7 +306,10 @@ def is_joined(a: Node, b: Node) -> bool:
 
 
 def tangent_course(a: Node, b: Node) -> float:
-    """Return the course of the tangent from a circle or point to the next, rad; 0 for the same circle."""
+    """Return the course of the tangent from a circle or point to the next, rad.
+
+    The result is 0 if both are the same circle.
+    """
     distance = a.distance_to(b)
     if distance < 1.0:
         return 0.0
@@ -315,9 +319,9 @@ def tangent_course(a: Node, b: Node) -> float:
 
 
 def point_on_circle(node: Node, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
-    """Return the point of a circle, east and north in m, at which an aircraft on the circle has a course (rad).
+    """Return the point of a circle at which an aircraft has a course (rad): east and north, m.
 
-    radius_ratio: distance of the point from the center, as a ratio to the radius; 1 for a point on the circle.
+    radius_ratio: distance of the point from the center, in radii; 1 for a point on the circle itself.
     """
     return (
         node.east - node.signed_radius * radius_ratio * math.cos(course),
@@ -326,10 +330,10 @@ def point_on_circle(node: Node, course: float, radius_ratio: float = 1.0) -> tup
 
 
 def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[float, float]]:
-    """Return the corners (east, north, m) of the polygon around a circle.
+    """Return the corners (east, north, m) of the polygon around a part of a circle.
 
-    entry_course: course at which the circle is joined, rad.
-    sweep: angle that is flown around it, rad.
+    entry_course: course at which the aircraft joins the circle, rad.
+    sweep: angle that the aircraft flies around the circle, rad.
 
     >>> point = RoutePoint(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
     >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
@@ -354,14 +358,16 @@ def _corners_around(
     slopes: SpiralSlopes,
     rules: LoiterRules,
 ) -> list[RoutePoint]:
-    """Return the corners around a circle, from its entry course to its exit course.
+    """Return the corners of the polygon around a circle, from its entry course to its exit course.
 
-    entry_course, exit_course: courses at the tangents, rad; ``exit_course`` is None at the mission's end.
+    entry_course, exit_course: courses at which the aircraft joins and leaves the circle, rad; ``exit_course`` is None
+        at the mission's end.
     previous_altitude: altitude at the start of the leg to the circle, m AMSL.
     leg_length: length of that leg, m.
-    min_radius: minimum loiter radius of the aircraft, m, for the duration of a tighter loiter; 0 if unknown.
+    min_radius: minimum loiter radius of the aircraft, m, which determines the duration of a tighter loiter; 0 if
+        unknown.
 
-    For an autopilot that leaves as soon as the loiter's time is over, the circle ends at the last exit tangent before
+    Some autopilots leave a loiter as soon as its time is over. For them the circle ends at the last exit tangent before
     that time.
     """
     radius, turn_sign = abs(node.signed_radius), math.copysign(1.0, node.signed_radius)

@@ -107,12 +107,13 @@ def place_stops(
 
     terrain: None if unknown; heights above terrain are then an error.
     itinerary: the mission's itinerary; None to make it.
-    vertical_legs: True to turn a position straight above or below the previous one into a leg of
-        `VERTICAL_LEG_LENGTH_M`, which then fails the verdict's slope rule; otherwise such a position is an error.
+    vertical_legs: True to accept a position straight above or below the previous one. It is placed
+        `VERTICAL_LEG_LENGTH_M` away, and the leg then fails the verdict's slope rule. False to raise an error for such
+        a position.
     resets_jump_counters: see `flight.mission.itinerary.make_itinerary`.
 
-    Successive stops of the result are at least `SAME_POSITION_DISTANCE_M` apart horizontally, or
-    `VERTICAL_LEG_LENGTH_M` on a vertical leg. Raises MissionError, which names the item, if a stop cannot be placed.
+    In the result successive stops are at least `SAME_POSITION_DISTANCE_M` apart horizontally; on a vertical leg they
+    are `VERTICAL_LEG_LENGTH_M` apart. Raises MissionError, which names the item, if a stop cannot be placed.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
@@ -131,10 +132,8 @@ def place_stops(
     return_mission, return_heights, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
         # An RTL and its landing sequence use the home of the last DO_SET_HOME.
-        return_mission, return_heights = (
-            replace(mission, home=home),
-            _AltitudeConverter(mission.source, home, origin, terrain, notes),
-        )
+        return_mission = replace(mission, home=home)
+        return_heights = _AltitudeConverter(mission.source, home, origin, terrain, notes)
     return_points = (
         _place_return_points(return_mission, home, origin, return_heights) if itinerary.ends_with_rtl else ()
     )
@@ -156,7 +155,7 @@ def place_stops(
 
 
 def return_points(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPoint, ...]:
-    """Return home and the rally points of a mission on the map, home first; return an empty tuple without a home.
+    """Return home and the rally points of a mission on the map, home first; () without a home.
 
     Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
 
@@ -172,7 +171,9 @@ def return_points(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) 
 
 
 def home_point(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> ReturnPoint | None:
-    """Return a mission's home on the map, or None if the mission has no home; rally points are not checked.
+    """Return a mission's home on the map, or None if the mission has no home.
+
+    Unlike `return_points`, this does not check the rally points.
 
     >>> home_point(Mission(Home(36.5, 8.0, 300.0), ()), GeoOrigin(36.5, 8.0), None).up
     300.0
@@ -184,8 +185,8 @@ def home_point(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> 
 def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:
     """Return the starts of a mission's landing sequences: the first position after each DO_LAND_START.
 
-    A mission without a home has none, since it has nowhere to return to. Without a stated altitude a start has the
-    altitude of home.
+    A mission without a home has no landing sequences, because there is nowhere to return to. A start without a stated
+    altitude has the altitude of home.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> start = MissionItem(1, Command.DO_LAND_START, Frame.MISSION, (0.0,) * 4, 0.0, 0.0, 0.0)
@@ -202,9 +203,9 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
 def _landing_starts(
     mission: Mission, origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> Iterator[tuple[int, LandingStart]]:
-    """Yield the start of each landing sequence with the list index of its DO_LAND_START.
+    """Yield the start of each landing sequence, with the list index of its DO_LAND_START.
 
-    A DO_LAND_START with nothing to fly to after it is left out.
+    A DO_LAND_START is left out if no position follows it.
     """
     for index, mark in enumerate(mission.items):
         first_item = next((item for item in mission.items[index + 1 :] if _is_navigation_target(item)), None)
@@ -226,7 +227,10 @@ def _place_landings(
     heights: "_AltitudeConverter",
     numbered_starts: Sequence[tuple[int, LandingStart]],
 ) -> tuple[PlacedLanding, ...]:
-    """Return a mission's landing sequences, without those that start with the landing or cannot be placed."""
+    """Return a mission's landing sequences.
+
+    A sequence is left out if it begins with the landing, or if it cannot be placed on the map.
+    """
     landings = []
     for index, start in numbered_starts:
         if start.is_landing:
@@ -248,9 +252,9 @@ def _place_landings(
 def landing_sequence(
     mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
 ) -> tuple[LandingStart, ...]:
-    """Return the stops of a landing sequence from an item up to the landing, which is not included.
+    """Return the stops of a landing sequence from an item up to the landing, which is excluded.
 
-    first: number of that item.
+    first: number of the item with which the sequence starts.
 
     The result is empty for a mission without a home.
 
@@ -287,14 +291,17 @@ def _is_navigation_target(item: MissionItem) -> bool:
 
 
 def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> tuple[float, float, float]:
-    """Return an item's position on the map, m; an item without an altitude gets the altitude of home."""
+    """Return an item's position on the map, m; without a stated altitude, at the altitude of home."""
     stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = project_stops(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
 
 def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> LandingStart:
-    """Return a landing sequence that starts at an item, measured to the item's position and without next stops."""
+    """Return a landing sequence that starts at an item, without its next stops.
+
+    Distances to the sequence are measured to the item's position.
+    """
     position, loiter = _item_position(item, origin, heights), stated_loiter(item)
     stated = loiter or Loiter(0.0)
     return LandingStart(
@@ -326,7 +333,7 @@ def landing_positions(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, f
 
 
 def rally_stops(mission: Mission) -> tuple[RoutePoint, ...]:
-    """Return a mission's rally points as stops; ignore a point at 0, 0, as ArduPlane does.
+    """Return a mission's rally points as stops; a point at 0, 0 is ignored, as in ArduPlane.
 
     >>> from flight.mission.items import Frame, MissionItem
     >>> point = MissionItem(0, 5100, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 90.0)
@@ -364,7 +371,7 @@ def _place_return_points(
 def _place_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_AltitudeConverter", vertical_legs: bool
 ) -> list[RoutePoint]:
-    """Return the stops on the map; successive stops at the same position are merged."""
+    """Return the stops on the map; successive stops at the same position are merged into one."""
     notes = heights.notes
     map_positions = project_stops(source, itinerary.stops, origin)
     placed_stops: list[RoutePoint] = []
@@ -421,7 +428,9 @@ class _AltitudeConverter:
         self._home_amsl: float | None = None
 
     def amsl(self, stop: RoutePoint, east: float, north: float, previous_altitude: float) -> float:
-        """Return the altitude of a stop (m AMSL); a stop without an altitude keeps the previous one.
+        """Return the altitude of a stop, m AMSL.
+
+        A stop without an altitude keeps the altitude of the previous stop.
 
         previous_altitude: altitude of the previous stop, m AMSL; NaN for the first stop.
         """
@@ -454,7 +463,7 @@ class _AltitudeConverter:
         return ground
 
     def home_amsl(self) -> float:
-        """Return the reference altitude of heights above home, m AMSL."""
+        """Return the altitude from which heights above home are measured, m AMSL."""
         if self._home_amsl is None:
             self._home_amsl = self._find_home_amsl(self.home)
         return self._home_amsl
@@ -462,8 +471,8 @@ class _AltitudeConverter:
     def landing_altitude(self, itinerary: Itinerary) -> float | None:
         """Return the altitude of the landing point, m AMSL; None if unknown.
 
-        For a landing point with a height above home, the result is known only with terrain, with home's altitude, or
-        if the previous stop also has a height above home.
+        If the landing point states a height above home, its altitude is known only if the terrain or the altitude of
+        home is known, or if the previous stop also states a height above home.
         """
         stop = itinerary.landing
         if stop is None or math.isnan(stop.alt):
@@ -485,11 +494,11 @@ class _AltitudeConverter:
         return math.nan
 
     def known_home_altitude(self) -> float:
-        """Return the altitude of home, or of the ground there if home has none, m AMSL; NaN if unknown."""
+        """Return the altitude of home, or of the ground at home, m AMSL; NaN if both are unknown."""
         return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
 
     def _find_home_amsl(self, home: Home) -> float:
-        """Return home's altitude: as stated, otherwise the ground at home, otherwise 0 m AMSL.
+        """Return home's altitude, m AMSL: as stated, otherwise the ground at home, otherwise 0.
 
         Add a note if the altitude is not stated, or if it is far from the ground at home.
         """
@@ -522,10 +531,10 @@ def _is_vertical(previous: RoutePoint, stop: RoutePoint) -> bool:
 
 
 def _vertical_leg_end(stops: list[RoutePoint], up: float) -> Position:
-    """Return the end of a vertical leg after the last stop, at the altitude ``up``, m AMSL.
+    """Return the end of a vertical leg after the last stop, at an altitude ``up``, m AMSL.
 
-    The end is the last stop's position, moved `VERTICAL_LEG_LENGTH_M` along the course of the last leg, or to the east
-    if there is no leg.
+    The end lies `VERTICAL_LEG_LENGTH_M` from the last stop, on the course of the last leg, or to the east if there is
+    no leg.
     """
     course = math.pi / 2.0
     if len(stops) > 1:
@@ -535,9 +544,10 @@ def _vertical_leg_end(stops: list[RoutePoint], up: float) -> Position:
 
 
 def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Notes) -> RoutePoint:
-    """Merge a stop with the previous stop at the same position, add a note, and return the merged stop.
+    """Merge a stop with the previous stop at the same position, and return the merged stop.
 
-    Raises MissionError if the stop is straight above or below the previous stop, except for a take-off.
+    A note is added. Raises MissionError if the stop is straight above or below the previous stop, unless the stop is a
+    take-off.
     """
     climb = stop.map_position[2] - previous.map_position[2]
     if abs(climb) >= SAME_POSITION_DISTANCE_M:

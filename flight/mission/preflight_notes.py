@@ -49,7 +49,7 @@ def preflight_notes(
     """Return notes on a mission's launch, landing, home, cameras, rally points and RTL.
 
     rules: RTL rules of the autopilot.
-    parameters: stated parameters of the autopilot by name.
+    parameters: parameters of the autopilot that are stated, by name.
     assumed_parameters: parameters that are assumed for the mission's landing, by name.
     """
     rally_problems: tuple[str, ...] = ()
@@ -102,7 +102,10 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
 
 
 def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """Yield notes on items whose altitudes fit the ground only as heights above home, or only as AMSL."""
+    """Yield notes on items whose altitudes fit the terrain only in the other altitude frame.
+
+    They state AMSL and fit only as heights above home, or the opposite.
+    """
     below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
     amsl, over_home = "altitudes above mean sea level (frame 0)", "heights above home (frame 3)"
     for readings, stated_as, other in ((below_ground, amsl, over_home), (too_high, over_home, amsl)):
@@ -132,7 +135,7 @@ def _heights_text(heights: list[float]) -> str:
 def _note_rally_points(
     points: tuple[ReturnPoint, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
-    """Yield notes on rally points below ground, and on rally points too distant for any RTL from the route."""
+    """Yield notes on rally points that are below ground, or too far away for an RTL from the route."""
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -160,7 +163,7 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
 
 
 def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Yield a note if an RTL to home ends at or below the ground somewhere within its loiter radius.
+    """Yield a note if an RTL to home would end at or below the ground somewhere on its loiter.
 
     home_points: home; empty if the mission has no home.
     """
@@ -183,9 +186,10 @@ def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, r
 def _note_autoland(
     mission: Mission, scenario: Scenario, parameters: Mapping[str, float], assumed_parameters: Mapping[str, float]
 ) -> Iterator[str]:
-    """Yield a note on a landing sequence if RTL_AUTOLAND is 0: ArduPlane then refuses to arm (AP_Arming.cpp).
+    """Yield a note on a landing sequence if RTL_AUTOLAND is 0, because ArduPlane then refuses to arm.
 
-    A scenario with a landing needs no note on an assumed value, because planfly writes RTL_AUTOLAND for its plan.
+    Arming is checked in AP_Arming.cpp. There is no note on an assumed value if the scenario has a landing, because
+    planfly writes RTL_AUTOLAND for its plan.
     """
     start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
@@ -203,13 +207,13 @@ _LEVEL_TEXT = "is level"
 
 
 def _slope_text(slope: float) -> str:
-    """Describe a slope of the ground (m per m) as the predicate of a sentence."""
+    """Return the end of a sentence that describes a slope of the ground, m per m."""
     percent_text = f"{abs(slope):.1%}"
     return _LEVEL_TEXT if percent_text == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {percent_text}"
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
-    """Return the ground slopes along and across the final landing, m per m; NaN if the ground is unknown.
+    """Return the ground slopes along and across the final landing leg, m per m; NaN if unknown.
 
     Returns None if the mission does not end with a landing, or if the scenario defines a landing strip.
     """
@@ -224,7 +228,7 @@ def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Yield a note on the wind and the ground at a landing for which the scenario has no strip."""
+    """Yield a note on wind and ground at a landing for which the scenario has no landing strip."""
     last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:

@@ -91,10 +91,10 @@ class LandingStart(NamedTuple):
 
 
 def nearest_landing_sequence(position: Position, landings: Sequence[LandingStart]) -> LandingStart | None:
-    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), or None if there is none.
+    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), or None.
 
-    ArduPlane chooses the sequence with the shortest distance in 3D (`AP_Mission::get_landing_sequence_start` in
-    libraries/AP_Mission/AP_Mission.cpp).
+    The result is None if there is no landing sequence. ArduPlane chooses the sequence with the shortest distance in
+    three dimensions (`AP_Mission::get_landing_sequence_start` in libraries/AP_Mission/AP_Mission.cpp).
 
     >>> far, near = (LandingStart(k, (x, 0.0, 50.0), (x, 0.0, 50.0)) for k, x in ((8, 900.0), (12, -500.0)))
     >>> nearest_landing_sequence((0.0, 0.0, 50.0), [far, near]).item, nearest_landing_sequence((0.0, 0.0, 50.0), [])
@@ -217,8 +217,8 @@ def choose_target(
 ) -> ReturnTarget:
     """Choose the destination of an RTL: the nearest rally point, or home.
 
-    If the nearest rally point is beyond the distance limit, the RTL goes home, at any distance.  An autopilot that may
-    return to a mission's landing chooses the first landing if that is nearer.
+    If the nearest rally point is beyond the distance limit, the RTL goes home, however far away home is. An autopilot
+    that may return to a mission's landing chooses the first landing if it is nearer than both.
 
     start: east, north, up at the start of the RTL, m AMSL.
     landings: the mission's landing sequences; only those that lead to a landing count.
@@ -260,7 +260,7 @@ def _home_target(rules: ReturnRules, start: Position, home: ReturnPoint) -> Retu
 
 
 def rally_target(rules: ReturnRules, start: Position, point: ReturnPoint) -> ReturnTarget:
-    """Return a rally point as the destination of an RTL from a start, whatever the autopilot would choose.
+    """Return a rally point as the destination of an RTL from a start, even if the autopilot would choose another.
 
     >>> rules = ReturnRules(holds_height=True, transit_height=300.0, rally_height=100.0)
     >>> target = rally_target(rules, (0.0, 0.0, 700.0), ReturnPoint(1000.0, 0.0, 500.0))
@@ -275,10 +275,12 @@ def rally_target(rules: ReturnRules, start: Position, point: ReturnPoint) -> Ret
 
 
 def _altitudes(rules: ReturnRules, start: Position, base: float, height: float) -> tuple[float, float]:
-    """Return the altitudes of an RTL on the way to a destination and at its end, m AMSL; NaN and the end for a slope.
+    """Return the altitudes of an RTL on the way to its destination and at its end, m AMSL.
+
+    For an RTL that descends on a slope, the altitude on the way is NaN.
 
     base: altitude of the destination, m AMSL.
-    height: height above it at the end, m; NaN to keep the altitude of the start.
+    height: height above the destination at the end, m; NaN to keep the altitude of the start.
     """
     end = start[2] if math.isnan(height) else base + height
     if not rules.holds_height:
@@ -297,7 +299,7 @@ def _nearest_with_landing(
 ) -> ReturnTarget:
     """Return the nearest of the mission's landing, the rally points and, if the rules include it, home.
 
-    The distance to the landing is that to its landing point (`RTL::findRtlDestination` in PX4's `rtl.cpp`).
+    The distance to the landing is measured to its landing point (`RTL::findRtlDestination` in PX4's `rtl.cpp`).
     """
     point = ReturnPoint(*(landing.landing or landing.position))
     transit, _ = _altitudes(rules, start, point.up, 0.0)
@@ -325,7 +327,7 @@ def _nearest_with_landing(
 def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
     """Return a note that describes an RTL.
 
-    start_altitude: altitude of its start, m AMSL.
+    start_altitude: altitude at the start of the RTL, m AMSL.
     continuation: name of the sequence after the loiter; "" if the RTL stays in the loiter.
 
     >>> rtl_note(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
@@ -365,7 +367,7 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
 
 
 def _held_altitude_text(target: ReturnTarget, start_altitude: float) -> str:
-    """Describe the altitudes of an RTL that holds its altitude, up to the word before the altitude of its end."""
+    """Return the beginning of a text on an RTL that holds its altitude; its end altitude follows the text."""
     first_climb, sink = target.transit_altitude - start_altitude, target.transit_altitude - target.position[2]
     sink_text = f"descending {sink:.0f} m in a loiter there, to"
     if first_climb < 1.0:
@@ -390,10 +392,10 @@ def rtl_waypoints(
         in the loiter.
 
     The turn takes the shorter direction. A descent follows the straight slope from the start of the turn to the target,
-    but is no steeper than the aircraft can fly; a climb or a small descent begins at once. The aircraft covers the
-    remaining altitude difference in the loiter, which then lasts
-    `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. A climb before the turn does not depend on the altitude of the
-    target. An RTL that holds its altitude descends in the loiter only.
+    but is no steeper than the aircraft can fly. A climb or a small descent begins at once. The aircraft covers the
+    remaining altitude difference in the loiter, which then lasts `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. A
+    climb before the turn has the same height for every target altitude. An RTL that holds its altitude descends only in
+    the loiter.
     """
     start = previous_points[-1].map_position
     course = (
@@ -435,30 +437,29 @@ class _ReturnBuilder:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
         self._end_altitude = end_altitude
-        self._min_slope_height, self._ability, self._dive_slope, self._next_position = (
-            min_slope_height,
-            ability,
-            dive_slope,
-            next_position,
-        )
+        self._min_slope_height = min_slope_height
+        self._ability = ability
+        self._dive_slope = dive_slope
+        self._next_position = next_position
         self._position = self._slope_start = start
         # Altitude of the climb before the turn, m; it may lie above the target.
         self._first_climb_altitude = -math.inf
 
     @property
     def _is_line_point(self) -> bool:
-        """True if the descent is too small for a slope and is flown at once."""
+        """True if the descent is too small for a slope, so that the altitude changes at once."""
         return abs(self._slope_start[2] - self._circle.up + self._slope_base) < self._min_slope_height
 
     @property
     def _altitude_difference(self) -> float:
-        """Altitude of the loiter above the current position, m."""
+        """Height of the loiter above the current position, m."""
         return self._circle.up - self._position[2]
 
     def add_gentle_turn(self, course: float, rules: ReturnRules) -> float:
-        """Add the turn at the bank limit of the initial climb, and return the course at its end.
+        """Add the turn with the bank limit of the initial climb; return the course at its end, rad.
 
-        The turn ends where the climb or the turn to the target ends. Without an initial climb nothing is added.
+        The turn ends where the climb ends, or where the aircraft points to the target. Without an initial climb,
+        nothing is added.
         """
         first_climb = max(0.0, self._altitude_difference) if math.isinf(rules.initial_climb) else rules.initial_climb
         if first_climb <= 0.0:
@@ -480,7 +481,7 @@ class _ReturnBuilder:
         return tangent if sweep == full_sweep else end_course
 
     def _add_climb_leg(self, course: float) -> None:
-        """Add the straight leg to the end of the first climb, or to the loiter if that is nearer."""
+        """Add the straight leg on which the first climb ends, or the leg to the loiter if that is nearer."""
         east, north = point_on_circle(self._circle, course)
         length = (self._first_climb_altitude - self._position[2]) / self._ability.climb_slope
         length = min(length, math.hypot(east - self._position[0], north - self._position[1]) - _MIN_TANGENT_M)
@@ -490,7 +491,7 @@ class _ReturnBuilder:
             )
 
     def add_turn(self, course: float) -> None:
-        """Add the turn to the target, the straight leg, and the loiter there."""
+        """Add the turn to the target, the straight leg to the target, and the loiter there."""
         bearing = _course(self._position, (self._circle.east, self._circle.north, 0.0))
         arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
         point = Node(self._stop, *self._position)
@@ -508,7 +509,7 @@ class _ReturnBuilder:
         self.add_loiter(*point_on_circle(self._circle, leg_course), leg_course)
 
     def _add_slope_break(self, leg_course: float) -> None:
-        """Add a waypoint on the straight leg where a climb or step ends, or where the descent starts."""
+        """Add a waypoint on the straight leg where a climb or altitude step ends, or where the descent starts."""
         join_point = point_on_circle(self._circle, leg_course)
         leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
         if self._altitude_difference > 0.0:
@@ -528,7 +529,7 @@ class _ReturnBuilder:
             self._add_waypoint(east, north, 0.0)
 
     def add_loiter(self, east: float, north: float, course: float) -> None:
-        """Add the leg to a point on the circle, and the loiter until its altitude is reached and its time is over."""
+        """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached."""
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
         self._circle = replace(self._circle, up=self._end_altitude)
@@ -546,7 +547,7 @@ class _ReturnBuilder:
         self._add_circle(course, sweep)
 
     def _add_circle(self, course: float, sweep: float) -> None:
-        """Add the loiter from its entry course (rad) through an angle (rad)."""
+        """Add the part of the loiter that starts at a course (rad) and covers an angle (rad)."""
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(
             *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.signed_radius)),
@@ -555,7 +556,7 @@ class _ReturnBuilder:
         )
 
     def _add_exit(self, course: float, spiral_angle: float, next_position: Position) -> None:
-        """Add the loiter until its altitude is reached, and the turn towards the next position.
+        """Add the loiter until its altitude is reached, then the turn towards the next position.
 
         The turn takes the shorter direction.
         """
@@ -573,8 +574,11 @@ class _ReturnBuilder:
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
         """Return the arc from the current position to a tangent of the target's loiter, in the shorter direction.
 
-        course: at the start of the arc, rad.  radius: m.
-        Returns the arc's circle, its angle, rad, and the course at its end, rad; None if there is no such tangent.
+        course: course at the start of the arc, rad.
+        radius: radius of the arc, m.
+
+        Returns the circle of the arc, the angle of the arc (rad), and the course at its end (rad). Returns None if
+        there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
         turn_sign = math.copysign(1.0, course_error)
@@ -586,7 +590,10 @@ class _ReturnBuilder:
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
     def _turn_on_side(self, course: float, signed_radius: float) -> tuple[Node, float, float] | None:
-        """Return the arc of `_turn_to_tangent` for a turn to one side, to the right if the radius is positive."""
+        """Return the arc of `_turn_to_tangent` for a turn to one side.
+
+        A positive radius means a turn to the right.
+        """
         east, north, up = self._position
         node = Node(
             self._stop,
@@ -601,12 +608,18 @@ class _ReturnBuilder:
         return node, (math.copysign(1.0, signed_radius) * (tangent - course)) % (2.0 * math.pi), tangent
 
     def _add_arc(self, node: Node, course: float, sweep: float, *, on_circle: bool = False) -> None:
-        """Add the corners of an arc; ``on_circle`` is True for an arc of the loiter, where no slope applies."""
+        """Add the corners of an arc.
+
+        on_circle: True for an arc of the loiter, on which no slope applies.
+        """
         for east, north in circle_corners(node, course, sweep):
             self._add_waypoint(east, north, abs(node.signed_radius), on_circle=on_circle)
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
-        """Add a waypoint at the altitude that the RTL has there.  arc: radius of its turn, m, 0 for a sharp corner."""
+        """Add a waypoint at the altitude that the RTL has at this position.
+
+        arc: radius of the turn at the waypoint, m; 0 for a sharp corner.
+        """
         distance = math.hypot(east - self._position[0], north - self._position[1])
         altitude, climb_altitude = self._position[2], max(self._circle.up, self._first_climb_altitude)
         if climb_altitude >= altitude:
@@ -618,7 +631,10 @@ class _ReturnBuilder:
         self.points.append(self._stop.at(self._position, arc))
 
     def _slope_altitude(self, east: float, north: float) -> float:
-        """Return the altitude of the slope to the target at a point, m AMSL; for a step, the target's altitude."""
+        """Return the altitude of the slope to the target at a position, m AMSL.
+
+        If the altitude changes in a step, the result is the target's altitude.
+        """
         start_altitude, end_altitude = self._slope_start[2], self._circle.up
         if self._is_line_point:
             return end_altitude
@@ -628,7 +644,7 @@ class _ReturnBuilder:
         )
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction of the slope, from its start to the target, that lies before a point."""
+        """Return the fraction (0..1) of the slope to the target that is already flown at a position."""
         start_east, start_north, _ = self._slope_start
         slope_east, slope_north = self._circle.east - start_east, self._circle.north - start_north
         return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(
@@ -637,9 +653,10 @@ class _ReturnBuilder:
 
 
 def _rim_point_ahead(position: Position, course: float, circle: Node) -> tuple[float, float, float]:
-    """Return the point where a straight path from inside a circle reaches it, and the course along the circle there.
+    """Return the point at which a straight path from inside a circle crosses the circle, and the course there.
 
-    course: of the straight path, rad.  Returns east and north, m, and the course, rad.
+    course: course of the straight path, rad. Returns east and north of the point, m, and the course along the circle at
+        the point, rad.
     """
     offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
     distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)

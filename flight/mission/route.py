@@ -82,8 +82,8 @@ def route_points(position: ArrayLike, airspeed: ArrayLike, **fields: ArrayLike) 
 
     position: (w, 3) east, north, up, m.
     airspeed: airspeed on each leg, m/s, (w - 1,) or one number.
-    fields: other fields of `ROUTE_POINT`, each (w,) or one value. By default a point is without an item and nothing is
-        stated about it, and successive points of one item are one stop.
+    fields: other fields of `ROUTE_POINT`, each (w,) or one value. By default a point belongs to no item and its other
+        fields state nothing. Successive points of one item are one stop.
 
     >>> points = route_points(np.eye(3), 25.0, item=[1, 2, 2])
     >>> points["airspeed"].tolist(), points["stop"].tolist()
@@ -101,7 +101,7 @@ def route_points(position: ArrayLike, airspeed: ArrayLike, **fields: ArrayLike) 
 
 
 def _set_fields(points: Records, fields: dict[str, ArrayLike]) -> None:
-    """Set fields of the points of a route; the airspeed has one value a leg."""
+    """Set fields of a route's points; the airspeed has one value for each leg."""
     for name, values in fields.items():
         points[name][1 if name == "airspeed" else 0 :] = values
 
@@ -140,14 +140,14 @@ class Route:
     open_items: tuple[OpenItem, ...] = ()
 
     def __post_init__(self) -> None:
-        """Lock a copy of the points, whose first has no airspeed."""
+        """Lock a copy of the points; the first point gets no airspeed, because no leg leads to it."""
         points = self.points.copy()
         points["airspeed"][0] = NOT_STATED
         points.setflags(write=False)
         object.__setattr__(self, "points", points)
 
     def with_fields(self, **fields: ArrayLike) -> "Route":
-        """Return the route with other values in some fields of its points; arguments as for `route_points`."""
+        """Return the route with other values in some fields of its points; fields as for `route_points`."""
         points = self.points.copy()
         _set_fields(points, fields)
         return replace(self, points=points)
@@ -169,12 +169,12 @@ class Route:
 
     @property
     def items(self) -> Ints:
-        """Seq of the mission item of each waypoint, (w,), `NO_ITEM` for none."""
+        """Number (seq) of the mission item of each waypoint, (w,); `NO_ITEM` without an item."""
         return self.points["item"]
 
     @property
     def arc_radii(self) -> Floats:
-        """Turn radius at each waypoint, m, (w,), 0 for the radius at the bank limit."""
+        """Turn radius at each waypoint, m, (w,); 0 for the radius at the bank limit."""
         return self.points["arc_radius"]
 
     @property
@@ -191,12 +191,14 @@ class Route:
     def leg_numbers(self) -> Ints:
         """Number of each leg in messages, (w - 1,).
 
-        All legs around a loiter have the number of the leg to the loiter.
+        All legs around a loiter have the number of the leg that leads to it.
         """
         return np.maximum(self.stops[1:] - 1, 0)
 
     def leg_numbers_of(self, legs: NDArray[np.integer[Any]]) -> Ints:
-        """Return the numbers in messages of legs by their indices, (n,); an index beyond the route is its last leg's.
+        """Return the numbers in messages of legs that are given by their indices, (n,).
+
+        An index beyond the route gives the number of the last leg.
 
         >>> route_of_loiter = Route(route_points(np.eye(3)[[0, 1, 2, 0]], 25.0, item=[1, 2, 2, 3]), "")
         >>> route_of_loiter.leg_numbers_of(np.array([0, 1, 2, 3])).tolist()
@@ -206,7 +208,7 @@ class Route:
 
     @property
     def rtl_end(self) -> int:
-        """Index of the waypoint at which an RTL joins the landing sequence, or the number of waypoints."""
+        """Index of the waypoint at which an RTL joins the landing sequence; else the number of waypoints."""
         if self.rtl_start is None:
             return len(self.points)
         is_return_item = self.items[self.rtl_start + 1 :] == self.items[self.rtl_start + 1]
@@ -214,12 +216,12 @@ class Route:
 
     @property
     def rtl_legs(self) -> range:
-        """Legs of an RTL, whose path the autopilot chooses; empty without an RTL."""
+        """Legs of an RTL, on which the autopilot chooses the path; empty without an RTL."""
         return range(0) if self.rtl_start is None else range(self.rtl_start, min(self.rtl_end, self.legs))
 
 
 def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
-    """Return True if a route ends at a plain waypoint, without a loiter, a landing or an RTL.
+    """Return True if a route ends at a plain waypoint, not at a loiter, a landing or an RTL.
 
     >>> route = Route(route_points(np.eye(3)[:2], 25.0, item=[1, 2]), "")
     >>> ends_at_plain_waypoint(route, Mission(None, ()))
@@ -235,7 +237,7 @@ def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
 
 
 def part_of_route(route: Route, first: int, last: int) -> Route:
-    """Return the part of a route from waypoint ``first`` to waypoint ``last``, both included.
+    """Return the part of a route from waypoint ``first`` to waypoint ``last``, inclusive.
 
     >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
     >>> whole = Route(route_points(way, 25.0, item=np.arange(4)), "")
@@ -293,16 +295,16 @@ SHARPEST_FLY_BY_RAD = math.radians(150.0)
 def fly_over_waypoints(
     points: Records, limits: Limits | None, turn_distance: Callable[[float, float], float] | None = None
 ) -> Flags:
-    """Return a mask of the waypoints that must be flown over, (w,), because a fly-by arc would pass too far from them.
+    """Return a mask of the waypoints that must be flown over, (w,).
 
     points: points of a route, (w,) of `ROUTE_POINT`.
     limits: limits of the aircraft; None if unknown, for a result of False.
     turn_distance: see `RouteRules`.
 
-    An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1). At 25 m/s and 30 degrees of bank R is 110
-    m, and the arc passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km.
-    It misses the waypoint if that distance exceeds the acceptance radius of the mission, or, without one, the
-    autopilot's turn distance; the autopilot then flies on to that distance before it turns.
+    A fly-by arc with a turn angle ``turn`` passes its waypoint at the distance R(1/cos(turn/2) - 1). At 25 m/s and 30
+    degrees of bank R is 110 m, and the distance is 46 m for a turn of 90 degrees, 110 m for 120 degrees, and 2 km for
+    174 degrees. The limit of this distance is the acceptance radius that the mission states, or else the autopilot's
+    turn distance. If the arc would pass further away, the autopilot flies on to the limit before it turns.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
@@ -354,9 +356,10 @@ _MIN_COURSE_CHANGE_RAD = math.radians(0.5)
 def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     """Return a route that starts on the scenario's start course and ends on its destination course.
 
-    A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent plus
-    `END_LEG_LENGTH_M`. The turn onto the first leg, or off the last, is therefore flown and judged like any other. A
-    route that ends elsewhere, or whose scenario states no course, is unchanged.
+    A level lead-in leg is added before the first waypoint, and a level lead-out leg after the last. The turn onto the
+    first leg and the turn off the last leg are then flown and judged like any other turn. Each added leg is as long as
+    the turn's tangent plus `END_LEG_LENGTH_M`. A route is unchanged at an end that is not the scenario's start or
+    destination, and at an end without a stated course.
 
     >>> from types import SimpleNamespace
     >>> from world.scenario import load_scenario
@@ -404,10 +407,10 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
 def _lead_point(
     point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
 ) -> np.ndarray | None:
-    """Return the outer end of a lead-in or lead-out leg, (3,) m, or None if no such leg is needed.
+    """Return the outer end of a lead-in or lead-out leg, (3,) m; None if no such leg is needed.
 
     point: (3,) m, end of the route.
-    course: the scenario's course there, rad.
+    course: the scenario's course at this end, rad.
     leg_course: course of the route's first or last leg, rad.
     end_sign: -1 for a lead-in, 1 for a lead-out.
     """
@@ -451,10 +454,9 @@ def make_route(
         spiral (5 % if None).
     rules: rules by which the autopilot flies a route.
 
-    Without a take-off item the route starts at the first position item; with a take-off item, over home at the altitude
-    of that item. Every leg has a horizontal length of at least `flight.mission.placing.SAME_POSITION_DISTANCE_M`.
-    Raises MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two
-    positions.
+    The route starts at the first item with a position. With a take-off item it starts above home, at the altitude of
+    that item. Every leg has a horizontal length of at least `flight.mission.placing.SAME_POSITION_DISTANCE_M`. Raises
+    MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -477,7 +479,7 @@ def route_through_stops(
     limits: Limits | None = None,
     rules: RouteRules = DEFAULT_ROUTE_RULES,
 ) -> Route:
-    """Return the route through the placed stops of a mission; arguments as for `make_route`.
+    """Return the route through the stops of a mission that are placed on the map; arguments as for `make_route`.
 
     Raises MissionError for fewer than two stops, or for a loiter too wide or too long to lay out.
 
@@ -525,7 +527,7 @@ def route_through_stops(
 
 
 def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: float) -> Records:
-    """Return placed points as `ROUTE_POINT` records, without `fly_over`.
+    """Return points on the map as `ROUTE_POINT` records; the field `fly_over` is not set.
 
     acceptance_limit: see `RouteRules`.
     home_up: altitude of home for a point that states none, m AMSL.
@@ -544,7 +546,7 @@ def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: f
 
 
 def _height_above_ground(stop: RoutePoint) -> float:
-    """Return the height above ground held on the leg to a stop, m; `NOT_STATED` for a straight leg."""
+    """Return the height above ground that the leg to a stop holds, m; `NOT_STATED` for a straight leg."""
     return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else NOT_STATED
 
 
@@ -558,14 +560,17 @@ def _check_point_count(source: str, point_count: int) -> None:
 def _route_notes(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:
     """Return the notes of an itinerary and of the landing sequence after its RTL.
 
-    A note that items are never reached is omitted if the landing sequence reaches them.
+    The note about items that are never reached is omitted if the landing sequence reaches them.
     """
     notes = itinerary.px4_notes if reads_as_px4 else itinerary.notes
     return notes if landing is None else (*(note for note in notes if NEVER_REACHED not in note), *landing.notes)
 
 
 def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
-    """Return the items that leave the verdict undecided, in an itinerary and in the landing sequence after its RTL."""
+    """Return the items that leave the verdict undecided.
+
+    They are in an itinerary, or in the landing sequence after its RTL.
+    """
     open_items = itinerary.px4_open_items if reads_as_px4 else itinerary.open_items
     return open_items if landing is None else open_items + landing.open_items
 
@@ -573,7 +578,7 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 def _lay_out_waypoints(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[RoutePoint]
 ) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
-    """Lay out waypoints as `lay_out_waypoints` does, with loiters and spirals within the limits of the aircraft."""
+    """Lay out waypoints as `lay_out_waypoints` does, with loiters and spirals that the aircraft can fly."""
     return lay_out_waypoints(
         source, stops, notes, _default_radius_function(limits), _spiral_slope_function(limits), loiters
     )
@@ -582,7 +587,7 @@ def _lay_out_waypoints(
 def _find_direct_landing(
     placed_mission: PlacedMission, stops: list[RoutePoint], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence to which the mission's RTL flies directly, or None.
+    """Return the landing sequence to which the mission's RTL flies without a loiter, or None.
 
     stops: stops before the RTL.
     """
@@ -601,9 +606,9 @@ def _find_direct_landing(
 def _find_landing(
     placed_mission: PlacedMission, position: tuple[float, float, float], notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence that an RTL chooses at a position (m), or None.
+    """Return the landing sequence that an RTL chooses at a position (m), or None if it chooses none.
 
-    If the simulated RTL does not continue to that sequence, return None and add a note.
+    If the simulation of the RTL does not continue to that sequence, return None, and add a note.
     """
     start = nearest_landing_sequence(position, placed_mission.landing_starts)
     landing = next((landing for landing in placed_mission.landings if landing.start == start), None)
@@ -615,7 +620,7 @@ def _find_landing(
 
 
 def _landing_choice_text(placed_mission: PlacedMission) -> str:
-    """Return the number of landing sequences among which the nearest was chosen, as text; "" for a single one."""
+    """Return a text on how many landing sequences the nearest was chosen from; "" for a single one."""
     count = len(placed_mission.landing_starts)
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
@@ -625,7 +630,7 @@ def _note_unsimulated_loiters(
 ) -> None:
     """Add notes on the parts of the autopilot's loiters that are not simulated.
 
-    placed_stops: stops of the mission, without an RTL.
+    placed_stops: stops of the mission before an RTL.
     """
     final_stop = placed_stops[-1]
     if loiters.unflown_note and (
@@ -651,10 +656,10 @@ def _append_rtl(
     limits: Limits | None,
     notes: Notes,
 ) -> tuple[dict[str, Any], PlacedLanding | None]:
-    """Append the waypoints of an RTL to the points.
+    """Append the waypoints of an RTL to the points of a route.
 
-    Return the keyword arguments of `Route` for the RTL, and the landing sequence, None if the RTL stays in its loiter.
-    Raises MissionError if the RTL's altitude is outside the allowed range.
+    Return the keyword arguments of `Route` for the RTL, and the landing sequence that follows. The sequence is None if
+    the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside the allowed range.
     """
     source, start = placed_mission.mission.source, points[-1].map_position
     home, *rally = placed_mission.return_points
@@ -706,10 +711,10 @@ _MAX_GATE_DISTANCE_M = 10.0
 
 
 def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
-    """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed or the camera.
+    """Return the stops of a mission with the gates between them at which PX4 changes airspeed or camera.
 
-    Each gate is placed where its plane cuts the leg, because an aircraft on the leg passes the gate there. The plane is
-    perpendicular to the line from the gate to the next stop.
+    PX4 passes a gate when the aircraft crosses the plane through the gate that is perpendicular to the line from the
+    gate to the next stop. Each gate is placed where this plane cuts the leg.
     """
     placed_stops = list(placed_mission.stops[:1])
     for next_stop in placed_mission.stops[1:]:
@@ -751,7 +756,9 @@ def _distance_to_line(a: Floats, b: Floats, position: tuple[Any, Any]) -> float:
 
 
 def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
-    """Return the fraction of the leg from a to b at which the plane of a gate cuts the leg.
+    """Return the fraction of the leg from a to b at which the aircraft passes a gate.
+
+    The plane of the gate cuts the leg there; see `_insert_gates`.
 
     gate: east and north, m.
     """
@@ -781,7 +788,7 @@ MAX_CRUISE_SPEED_DIFFERENCE = 0.2
 
 
 def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint, notes: Notes) -> None:
-    """Add a note if a mission's cruiseSpeed differs from the default airspeed, and its first leg has that airspeed.
+    """Add a note if a mission states a cruise speed (cruiseSpeed) that its first leg does not use.
 
     airspeed: default airspeed, m/s.
     """
@@ -810,7 +817,7 @@ def _default_radius_function(limits: Limits | None) -> DefaultRadius:
 
 
 def _tightest_circle_radius(limits: Limits | None, airspeed: float, up: float) -> float | None:
-    """Return the radius of the tightest circle that the aircraft can fly in the wind, m; None if it is unknown.
+    """Return the radius of the tightest circle that the aircraft can fly in the wind, m; None if unknown.
 
     The radius is also unknown if the wind is too strong for some of the circle's courses.
     """
@@ -821,9 +828,9 @@ def _tightest_circle_radius(limits: Limits | None, airspeed: float, up: float) -
 
 
 def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
-    """Return a function that computes the climb and dive slopes (tangents) of a spiral.
+    """Return a function that computes the steepest climb and descent of a spiral, as tangents.
 
-    Both slopes are a fraction of the aircraft's slope limits on the worst course of the spiral.
+    Both are a fraction of the aircraft's slope limit on the course of the spiral where this limit is lowest.
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:

@@ -63,7 +63,7 @@ class _Line(NamedTuple):
 
     @property
     def point_items(self) -> list[MissionItem]:
-        """The items that are points of the line."""
+        """Items that are points of the line."""
         return [item for item in self.items if _is_line_point(item, self.flown)]
 
 
@@ -82,19 +82,19 @@ class _SurveyItems(NamedTuple):
 
 
 def min_turn_around(route: Route, survey: Survey) -> float:
-    """Return the minimum straight extension of a survey's lines beyond their photos at a turn-around, m."""
+    """Return the shortest straight extension of the lines of a survey beyond their photos, m."""
     return min(_lead_lengths(route, survey))
 
 
 def _lead_lengths(route: Route, survey: Survey) -> list[float]:
-    """Return the straight distance of each line beyond its photos, at each end of each turn-around, m."""
+    """Return the straight extension of each line beyond its photos, at each end of each turn-around, m."""
     points, pairs = route.positions[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
     ends = [pair for line, next_line in pairs for pair in ((line.last, line.ends), (next_line.begins, next_line.first))]
     return [math.dist(points[start], points[end]) for start, end in ends]
 
 
 def layout_obstacle(mission: Mission, route: Route, survey: Survey) -> str:
-    """Return the reason why a survey's layout cannot be changed, or "" if it can be changed."""
+    """Return the reason why the layout of a survey cannot be changed, or "" if it can."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission contains jumps"
     index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}
@@ -117,8 +117,8 @@ def with_layout(
 ) -> Mission | None:
     """Return the mission with a new layout of a survey, or None if that is impossible.
 
-    route: the mission's route, on the map about ``origin``. A survey with a `layout_obstacle` cannot be changed; a
-        course change also needs straight lines and one altitude for all of them.
+    route: the mission's route, on the map about ``origin``. A survey with a `layout_obstacle` cannot be changed. A
+        change of course is possible only if all lines are straight and have the same altitude.
     """
     if layout_obstacle(mission, route, survey):
         return None
@@ -156,23 +156,21 @@ def _flown_items(route: Route) -> frozenset[int]:
 
 
 def _is_line_point(item: MissionItem, flown: Collection[int]) -> bool:
-    """Return True if an item is a point of a line: a navigation item, or a gate on the route.
+    """Return True if an item is a point of a survey line: a navigation item, or a gate on the route.
 
-    flown: numbers of the items that the route leads to.  A gate that is not flown, such as any gate of ArduPlane's, is
-        kept like a command.
+    flown: numbers of the items that the route leads to. A gate that is not flown, such as every gate with ArduPlane, is
+        treated like a command.
     """
     return is_navigation(item.command) or (item.command == Command.CONDITION_GATE and item.seq in flown)
 
 
 def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
-    """Return the indices of a survey's items.
+    """Return the indices of a survey's items, line by line.
 
-    Each line includes the commands that switch something at its ends.
+    The items of a line include the commands that switch something, such as a camera, at its ends.
     """
-    index_by_seq, item_count = (
-        {item.seq: item_index for item_index, item in enumerate(mission.items)},
-        len(mission.items),
-    )
+    index_by_seq = {item.seq: item_index for item_index, item in enumerate(mission.items)}
+    item_count = len(mission.items)
     seqs, flown = [int(seq) for seq in route.items], _flown_items(route)
 
     def index(waypoint: int) -> int:
@@ -198,9 +196,9 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item and gate, by number of the item.
+    """Return the waypoint of each navigation item and gate, by item number.
 
-    An item without a waypoint gets the previous waypoint.
+    For an item without a waypoint it is the waypoint before it.
     """
     waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
@@ -216,8 +214,8 @@ def _without_lead_waypoints(
     """Return the items before or after a survey without its lead waypoints, which the new layout replaces.
 
     end: index of the waypoint at that end of the survey.
-    max_lead_length: distance from that waypoint within which a waypoint is a lead, m; more distant waypoints belong to
-        the transit and are kept.
+    max_lead_length: distance from that waypoint within which a waypoint is a lead waypoint, m. More distant waypoints
+        belong to the transit, and are kept.
     """
     points, waypoint_of = route.positions[:, :2], _waypoint_of_item(mission, route)
 
@@ -229,7 +227,7 @@ def _without_lead_waypoints(
 
 
 def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
-    """Return the lines in flying order, in alternating directions; the first line keeps its direction.
+    """Return the lines in flying order and alternating directions; the first line keeps its direction.
 
     The lines are unchanged if the layout keeps their order.
     """
@@ -254,7 +252,7 @@ def _order_lines(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
 def _reverse_line(line: _Line) -> _Line:
     """Return a line in the opposite direction.
 
-    Its waypoints are reversed; the commands between them keep their positions in the list.
+    Its waypoints are in reverse order. The commands between them keep their positions in the list.
     """
     reversed_items = reversed(line.point_items)
     items = tuple(next(reversed_items) if _is_line_point(item, line.flown) else item for item in line.items)
@@ -262,7 +260,7 @@ def _reverse_line(line: _Line) -> _Line:
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
-    """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
+    """Return the items of a line, extended for its turn-arounds and for a longer lead-in."""
     steps = line.point_items
     entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     entry_direction, exit_direction = (
@@ -292,7 +290,7 @@ def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin)
 
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
-    """Return lines on another course over the hull of the present lines, or None if that is impossible."""
+    """Return lines on another course that cover the hull of the present lines; None if impossible."""
     waypoint_items = [item for line in lines for item in line.point_items]
     if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
@@ -323,7 +321,7 @@ def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, orig
 
 
 def convex_hull(points: Floats) -> Floats | None:
-    """Return the corners of the convex hull of (n, 2) points, or None if all lie on a line.
+    """Return the corners of the convex hull of (n, 2) points; None if all points lie on one line.
 
     The corners are in counter-clockwise order (Andrew 1979).
 
@@ -353,7 +351,7 @@ def _is_bent(corners: Floats) -> bool:
 
 
 def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -> tuple[float, float] | None:
-    """Return where a line enters and leaves a convex outline, m along the line, or None if they do not cross.
+    """Return where a line enters and leaves a convex outline, m along the line; None if it misses it.
 
     lateral, longitudinal: coordinates of the outline's corners across and along the line, m.
     offset: lateral coordinate of the line, m.
@@ -372,7 +370,7 @@ def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -
 
 
 def _move_items(line: _Line, ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
-    """Return a line's items moved to another line; its waypoints between the first and the last are left out.
+    """Return a line's items moved to another line; waypoints between its ends are left out.
 
     ends: ends of the other line, (2, 2) m.
     """

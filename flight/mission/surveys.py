@@ -115,7 +115,7 @@ class Survey:
     def has_leg(self, leg: int) -> bool:
         """Return True if a leg belongs to the survey.
 
-        The leg to the first line's run and the leg after the last line's run belong to it, too.
+        The leg to the first line and the leg after the last line also belong to it.
         """
         return self.lines[0].begins - 1 <= leg <= self.lines[-1].ends
 
@@ -124,11 +124,11 @@ class Survey:
         return any(line.camera_on_at >= 0 or line.camera_off_at >= 0 or line.photo > 0.0 for line in self.lines)
 
     def turn_arounds(self) -> list[tuple[int, int]]:
-        """Return the index of the first and last waypoint of each turn-around between two lines."""
+        """Index of the first and last waypoint of each turn-around between two lines."""
         return [(line.last, following.first) for line, following in zip(self.lines[:-1], self.lines[1:], strict=True)]
 
     def transitions(self) -> list[tuple[int, int]]:
-        """Return the index of the first and last waypoint of the entry, of each turn-around and of the exit.
+        """Index of the first and last waypoint of the entry, of each turn-around, and of the exit.
 
         The entry leads to the first line, and the exit leads away from the last line. Between the two waypoints of a
         pair the autopilot chooses the path.
@@ -170,28 +170,25 @@ class LineAxis:
             distance = np.hypot(along - np.clip(along, min_along, max_along), right)
             is_nearer = distance < min_distance
             min_distance[is_nearer] = distance[is_nearer]
-            coordinates[0, is_nearer], coordinates[1, is_nearer] = (
-                self.along[index] + along[is_nearer],
-                right[is_nearer],
-            )
+            coordinates[0, is_nearer] = self.along[index] + along[is_nearer]
+            coordinates[1, is_nearer] = right[is_nearer]
             coordinates[2, is_nearer] = math.atan2(direction[0], direction[1])
         return coordinates[0], coordinates[1], coordinates[2]
 
     def points_at(self, along: Floats) -> Floats:
-        """Return the points on the line at distances (n,) m along it: (n, 2 or 3) m, as many columns as the corners.
+        """Return the points at distances (n,) m along the line, (n, 2 or 3) m.
 
-        A distance beyond an end of the line gives that end.
+        The points have as many columns as the corners. A distance beyond an end of the line gives that end.
         """
         columns = [np.interp(along, self.along, self.corners[:, axis]) for axis in range(self.corners.shape[1])]
         return np.stack(columns, axis=1)
 
 
 def camera_spacing(mission: Mission, route: Route) -> Floats:
-    """Return the distance between photos on the leg that begins at each of the route's w waypoints, m: (w,).
+    """Return the distance between photos on the leg after each of the route's w waypoints, m, (w,).
 
-    The distance is 0 with the camera off, and NaN if the camera is on and no item states the distance. Items after a
-    waypoint's item, or after a gate on the route, switch the camera as soon as the aircraft is there. If several items
-    lead to a waypoint by jumps, the legs to the waypoint are assigned to the waypoint's own item.
+    The distance is 0 with the camera off, and NaN if the camera is on and no item states the distance. Items that
+    follow the item of a waypoint or gate switch the camera as soon as the aircraft is at this waypoint or gate.
     """
     route_items = set(route.items.tolist())
     spacing_after, spacing, waypoint_seq = dict[int, float](), 0.0, None
@@ -217,10 +214,10 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
 
 
 def survey_plan(mission: Mission, photo_spacing: float) -> SurveyPlan | None:
-    """Return the settings that the ground station stored in the mission for a survey, or None.
+    """Return the settings of a survey that the ground station stored in the mission, or None.
 
-    The settings with the survey's distance between photos are returned. If no settings, or several different ones, have
-    this distance, the first settings without a distance are returned; None if there are none.
+    The settings are identified by the survey's distance between photos. If no settings have this distance, or if
+    several different ones have it, the result is the first settings without a distance, or None without such settings.
 
     photo_spacing: distance between photos of the survey, m.
     """
@@ -235,7 +232,7 @@ def survey_plan(mission: Mission, photo_spacing: float) -> SurveyPlan | None:
 
 
 def camera_notes(mission: Mission, route: Route) -> tuple[str, ...]:
-    """Return notes on trigger distances that the settings of their camera contradict, or that it cannot follow."""
+    """Return notes on trigger distances that contradict the camera's settings, or that are too short for it."""
     notes, spacings = [], camera_spacing(mission, route)[:-1]
     for plan in dict.fromkeys(mission.survey_plans):
         photo_spacing = plan.photo or 0.0
@@ -280,8 +277,8 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
     """Find the surveys of a route, in flying order.
 
     camera: distance between photos on each leg, (w,) m, from `camera_spacing`.
-    turn_arounds: a pair of distances for each survey of the ground station: between photos, m, and from a line's first
-        or last photo to the end of its run, m.
+    turn_arounds: two distances for each survey of the ground station: between photos, and from a line's first or last
+        photo to the end of its straight run, m.
 
     >>> from flight.mission.route import route_points
     >>> lines = [[0, 0], [0, 900], [60, 900], [60, 0], [120, 0], [120, 900]]
@@ -310,7 +307,7 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
 def _straight_runs(route: Route) -> list[tuple[int, int]]:
     """Return the index of the first and last waypoint of each straight run.
 
-    The legs of a take-off, a landing, a loiter's circle and a return to launch are left out.
+    The legs of a take-off, a landing, a loiter and an RTL are left out.
     """
     courses, arcs, end = leg_courses(route.positions), route.arc_radii, route.legs
     last = end if route.rtl_start is None else route.rtl_start
@@ -378,7 +375,7 @@ class _Runs:
         return self.runs[run - 1][1] == self.runs[run][0]
 
     def spacing(self, run: int, other_run: int) -> float | None:
-        """Return the distance between two runs (m), or None if they cannot be neighboring lines.
+        """Return the distance between two runs (m); None if they cannot be neighboring lines.
 
         Neighboring lines are parallel, overlap, and are far enough apart.
         """
@@ -387,7 +384,7 @@ class _Runs:
         return self._spacings[run, other_run]
 
     def _compute_spacing(self, run: int, other_run: int) -> float | None:
-        """Return the distance between two runs as `spacing` does, without the cache."""
+        """Return the result of `spacing`, computed without the cache."""
         length, other_length = self.run_lengths[run], self.run_lengths[other_run]
         min_length = min(length, other_length)
         if min_length < _MIN_LINE_LENGTH_M:
@@ -413,13 +410,13 @@ class _Runs:
         return east * course_east + north * course_north, east * course_north - north * course_east
 
     def next_lines(self, run: int) -> list[int]:
-        """Return the runs after a run with which the next line may start, in flying order."""
+        """Return the runs with which the next line after a run may start, in flying order."""
         if run not in self._next_lines:
             self._next_lines[run] = self._find_next_lines(run)
         return self._next_lines[run]
 
     def _find_next_lines(self, run: int) -> list[int]:
-        """Return the runs for `next_lines` without the cache."""
+        """Return the result of `next_lines`, computed without the cache."""
         candidates, own_length = list[tuple[int, float, float]](), self.length((run, run))
         for next_run in range(run + 1, min(len(self.runs), run + 2 + _MAX_TURN_AROUND_RUNS)):
             link_length = self._distances[self.runs[next_run][0]] - self._distances[self.runs[run][1]]
@@ -444,7 +441,7 @@ class _Runs:
 
 
 def _find_chain(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of the survey that starts at a run, or a few runs before or after that run."""
+    """Return the lines of the survey that starts at a run, or a few runs before or after it."""
     chain = _follow_lines(runs, start)
     if len(chain) > 1:
         # The entry to the first line may be parallel to the second line.
@@ -463,7 +460,7 @@ def _find_chain(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
-    """Return True if a line is only a turn-around between two longer lines of another survey's chain."""
+    """Return True if a line is only a turn-around between two longer lines of another survey."""
     enclosing_pairs = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
     length = runs.length(line)
     return len(chain) >= _MIN_LINES and any(
@@ -472,9 +469,9 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the successive parallel lines from a start run on; the first line may begin before the start run.
+    """Return the successive parallel lines that start at a run.
 
-    Only the first line is returned if no run after it can be the next line.
+    The first line may begin before this run. Only the first line is returned if no later run can be the next line.
     """
     chain = [(start, start)]
     while True:
@@ -496,7 +493,7 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
-    """Return True if two lines are still parallel ``bend_count`` runs before and after the turn-around between them.
+    """Return True if two lines are still parallel ``bend_count`` runs away from the turn-around between them.
 
     run, next_run: last run of the first line, and first run of the second line.
     """
@@ -524,7 +521,7 @@ def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool
 def _make_survey(
     runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
-    """Build a survey from a chain of lines, or return None if the lines have too few different lateral positions."""
+    """Build a survey from a chain of lines; return None for too few different lateral positions."""
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
     midpoints = np.array([runs.midpoint(line) for line in chain])
     _, offsets, _ = LineAxis(points[run_start : run_end + 1]).project(midpoints)
@@ -545,7 +542,7 @@ def _make_survey(
 
 
 def _line_gaps(positions: Floats) -> list[float]:
-    """Return the gaps between lines at sorted lateral positions (n,) m, m; a line flown twice counts once."""
+    """Return the gaps between lines at sorted lateral positions (n,), m; a line flown twice counts once."""
     gaps = [float(gap) for gap in np.diff(positions) if gap >= _MIN_LINE_SPACING_M]
     neighbors = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
     return [
@@ -556,7 +553,7 @@ def _line_gaps(positions: Floats) -> list[float]:
 
 
 def _make_photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """Return the part of a run with the camera on as a photo line, or the whole run if the camera is never on."""
+    """Return the part of a run on which the camera is on, as a line; the whole run if it is never on."""
     first_waypoint, last_waypoint = run
     photo_legs = np.flatnonzero(camera[first_waypoint:last_waypoint] != 0.0)
     if not photo_legs.size:
@@ -576,11 +573,11 @@ def _make_photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
 def _remove_leads(
     points: Floats, lines: tuple[PhotoLine, ...], turn_arounds: Sequence[tuple[float, float]]
 ) -> tuple[PhotoLine, ...]:
-    """Return the lines without their lead-in and lead-out legs, or unchanged if no leads are found.
+    """Return the lines without their lead-in and lead-out legs; unchanged if no such legs are found.
 
-    A lead is a leg before a line's first photo or after its last photo. Leads have the length that the ground station
-    stores. If it stores none, the first and last legs are leads if they are equally long on all lines, because all
-    turn-arounds of a survey have one length.
+    A lead is a leg before a line's first photo or after its last photo. Its length is the length that the ground
+    station stores. Without a stored length, the first and last legs are leads if they have the same length on all
+    lines, because all turn-arounds of a survey have one length.
     """
     for photo_spacing, lead in turn_arounds:
         if abs(photo_spacing - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:
@@ -616,9 +613,9 @@ def _remove_leads(
 
 
 def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
-    """Return a line shortened to the waypoints at a distance ``lead_length`` (m) from the ends of its run.
+    """Return a line shortened by a lead of ``lead_length`` (m) at each end of its run.
 
-    An end without such a waypoint is kept. The line is unchanged if no leg would remain.
+    An end is unchanged if no waypoint lies at this distance from it. The line is unchanged if no leg would remain.
     """
     inner_waypoints = range(line.first + 1, line.last)
     tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
@@ -633,6 +630,9 @@ def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLi
 
 
 def _track_components(offsets: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the along-track and cross-track (right positive) components of offsets (n, 2), m, (n,) each."""
+    """Return the along-track and cross-track components of offsets (n, 2), m, (n,) each.
+
+    The cross-track component is positive to the right.
+    """
     east, north = math.sin(course), math.cos(course)
     return offsets[:, 0] * east + offsets[:, 1] * north, offsets[:, 0] * north - offsets[:, 1] * east

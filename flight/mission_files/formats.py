@@ -41,7 +41,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> FileKind:
-    """Return the form of a mission file, judged by its suffix. Raises MissionError for an unknown suffix.
+    """Return the format of a mission file, judged by its suffix. Raises MissionError for an unknown suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
     ('plan', 'waypoints')
@@ -64,8 +64,8 @@ def mission_kind(path: Path) -> FileKind:
 def read_mission(path: Path) -> Mission:
     r"""Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
 
-    The suffix must be known; if text and suffix disagree, the text decides. Raises MissionError with one line: file,
-    line or field, value, allowed values.
+    The suffix must be known. If text and suffix disagree, the format of the text applies. Raises MissionError with one
+    line: file, line or field, value, allowed values.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -83,7 +83,7 @@ def read_mission(path: Path) -> Mission:
 
 
 def parse_mission(text: str, source: str) -> Mission:
-    """Read the text of a mission as WPL 110, or as a `.plan` if it starts with a brace or bracket.
+    """Parse the text of a mission: a `.plan` if it starts with a brace or bracket, otherwise WPL 110.
 
     source: name of the mission in messages; a name that ends with ``.plan`` also selects a `.plan`.
 
@@ -107,10 +107,11 @@ class FenceContents(NamedTuple):
 
 
 def read_fence(path: Path) -> FenceContents:
-    r"""Read the fence of a mission file in any form or of a list of points from older tools, or a file of rally points.
+    r"""Read the fence in a mission file of any format, or the rally points.
 
-    Other contents of the file are ignored, such as rally points beside a fence. Raises MissionError as `read_mission`
-    does, and if the file has neither a fence nor rally points.
+    The older tools' lists of fence points are read, too. All other contents of the file are ignored, such as rally
+    points in a file with a fence. Raises MissionError as `read_mission` does, and if the file has neither a fence nor
+    rally points.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -133,7 +134,7 @@ def read_fence(path: Path) -> FenceContents:
 
 
 def mission_text(mission: Mission, kind: FileKind) -> str:
-    r"""Return a mission as the text of a file; the same mission always gives the same bytes.
+    r"""Return a mission as the text of a file; equal missions give equal bytes.
 
     kind: "waypoints" (QGC WPL 110), "plan" (QGroundControl's JSON), or only its "fence" or "rally" points, as WPL.
 

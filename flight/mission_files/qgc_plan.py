@@ -54,8 +54,8 @@ _COORDINATE_TEXT = "expected latitude, longitude and altitude"
 def expand_items(items: list[Any], source: str, warnings: list[str], plans: list[SurveyPlan]) -> list[Any]:
     """Return the items of a `.plan` with each ComplexItem replaced by its simple items.
 
-    warnings: list to which a warning is added for each replaced item.
-    plans: list to which the settings of each survey are added.
+    warnings: list; a warning for each replaced item is appended.
+    plans: list; the settings of each survey are appended.
 
     Raises MissionError, naming the kind, if an item cannot be expanded. The contents of an item are checked later.
     """
@@ -86,11 +86,12 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
 
 
 def _to_current_form(item: Any, location: str, warnings: list[str]) -> Any:
-    """Convert a simple item of an older version, or without an altitude, to QGroundControl's current form.
+    """Convert a simple item of an older version, or without an altitude, to QGroundControl's present form.
 
-    Until 2018 a position was in ``coordinate``, next to four parameters (`MissionItem::_convertJsonV2ToV3`). An
-    altitude that QGroundControl computes from the terrain is null in the parameters until it knows the terrain; it is
-    ``Altitude`` above the ground at that position, as in an item in a terrain frame.
+    Until 2018 a position was in ``coordinate``, next to four parameters (`MissionItem::_convertJsonV2ToV3`). If
+    QGroundControl computes an altitude from the terrain, the altitude is null in the parameters until QGroundControl
+    knows the terrain. Then ``Altitude`` is the height above ground at the item's position, as in an item in a terrain
+    frame.
     """
     if not isinstance(item, dict) or not isinstance(params := item.get("params"), list):
         return item
@@ -145,7 +146,10 @@ class _CameraCalc(BaseModel):
     MinTriggerInterval: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
 
     def camera(self) -> Camera:
-        """Return the camera's footprint on level ground. QGC assumes square pixels, from the longer side."""
+        """Return the camera's footprint on level ground.
+
+        As in QGC, pixels are square, with the size that the longer side gives.
+        """
         width_ratio, height_ratio = self.SensorWidth / self.FocalLength, self.SensorHeight / self.FocalLength
         if self.ImageWidth is not None and self.ImageHeight is not None:
             height_ratio = width_ratio * self.ImageHeight / self.ImageWidth
@@ -194,7 +198,7 @@ def _trigger_distance(items: list[Any]) -> float:
 
 
 def _last_number(items: list[Any]) -> int:
-    """Return the number of the last item; if the item states none, return the number of items."""
+    """Return the number of the last item, or the number of items if the last item states no number."""
     number = items[-1].get("doJumpId") if items and isinstance(items[-1], dict) else None
     return number if isinstance(number, int) else len(items)
 
@@ -202,8 +206,8 @@ def _last_number(items: list[Any]) -> int:
 def _landing_items(item: dict[str, Any], source: str, location: str, number: int) -> list[Any]:
     """Return the items of a landing pattern as QGC sends them (`LandingComplexItem::appendMissionItems`).
 
-    They are DO_LAND_START, a change of speed, commands that stop photos and video, the approach, and NAV_LAND; the
-    change of speed and the stops are optional. The approach is a descending loiter or a waypoint.
+    They are DO_LAND_START, an optional change of speed, optional commands that stop photos and video, the approach, and
+    NAV_LAND. The approach is a descending loiter or a waypoint.
 
     location: location of the item in the file, for messages.
     number: number of the first returned item.
@@ -386,9 +390,9 @@ def _check_vehicle(kind: int | None, source: str) -> None:
 
 
 def _autopilot_name(firmware: int | None, source: str) -> str:
-    """Return the name that scenarios use for the autopilot of a firmwareType; "" if the plan names no autopilot.
+    """Return the autopilot's name for a firmwareType; "" if the plan names no autopilot.
 
-    Raises MissionError for an unknown firmwareType.
+    The name is that used in scenarios. Raises MissionError for an unknown firmwareType.
     """
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
@@ -401,8 +405,8 @@ def _autopilot_name(firmware: int | None, source: str) -> str:
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
-    Items are numbered as in QGroundControl, from 1 by their order; a jump leads to the item whose doJumpId it names.
-    null is NaN. Raises MissionError with file, field, value and allowed values.
+    Items are numbered from 1 in their order, as in QGroundControl. A jump leads to the item with the doJumpId that it
+    names. A null is read as NaN. Raises MissionError with file, field, value and allowed values.
     """
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
@@ -451,7 +455,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
 
 
 def _expand_complex_items(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
-    """Replace the ComplexItems in a plan's JSON data, in place, by the simple items that they stand for.
+    """Replace the ComplexItems in a plan's JSON data by the simple items that they contain, in place.
 
     Returns warnings, and the settings of each survey.  Raises MissionError if the data is not a plan.
     """
@@ -552,12 +556,12 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
 
 
 def plan_file_text(mission: Mission) -> str:
-    """Return a mission as the text of a `.plan` file; the same mission always gives the same bytes.
+    """Return a mission as the text of a `.plan` file; equal missions give equal bytes.
 
-    cruiseSpeed is `stated_cruise_speed`, or QGC's default if the mission states none. It is written in whole m/s, as
-    hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC reads
-    both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for planfly's own
-    guidance, which no ground station knows.
+    cruiseSpeed is `stated_cruise_speed`, or QGC's default if the mission states none. cruiseSpeed and hoverSpeed are
+    written in whole m/s, because they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses
+    "25.0". QGC reads both as numbers, and sends neither of them to an aircraft. firmwareType names the mission's
+    autopilot; it is 0 for planfly's guidance, which no ground station knows.
     """
     mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
@@ -599,7 +603,7 @@ def _altitude_modes(items: tuple[MissionItem, ...]) -> list[int]:
 def stated_cruise_speed(mission: Mission) -> float | None:
     """Return the cruise speed that a mission states, m/s, or None.
 
-    It is the cruiseSpeed of its `.plan`, or a DO_CHANGE_SPEED before its second position.
+    The mission states it as cruiseSpeed of a `.plan`, or in a DO_CHANGE_SPEED before its second position.
     """
     if mission.cruise_speed is not None:
         return mission.cruise_speed

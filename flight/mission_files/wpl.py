@@ -86,10 +86,13 @@ class _Row:
 def parse_waypoints(text: str, source: str) -> Mission:
     """Read the text of a WPL 110 file; ``source`` names it in messages.
 
-    Accepted: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
-    decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries). Items are numbered by their lines, as in
-    Mission Planner, QGroundControl and MAVProxy, and so are the targets of jumps: seq only shows whether the first line
-    is home. Raises MissionError with file, line, field, value and allowed values.
+    The reader accepts CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, and more than
+    seven decimals (rounded to the 1e-7 degrees of MISSION_ITEM_INT).
+
+    Items and the targets of jumps are numbered by lines, as in Mission Planner, QGroundControl and MAVProxy. The column
+    seq only shows whether the first line is home.
+
+    Raises MissionError with file, line, field, value and allowed values.
     """
     line_break_count = max(text.count("\n"), text.count("\r"))
     if line_break_count > MAX_LINES:
@@ -185,7 +188,7 @@ def _parse_number(location: TextLine, name: str, text: str) -> float:
 
 
 def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
-    """Return the rows with items numbered in the order of their lines, from 0 if the file has a home line, else from 1.
+    """Return the rows numbered in the order of their lines: from 0 if the file has a home line, else from 1.
 
     Fence and rally items without a home line are numbered from 0, too.
     """
@@ -194,7 +197,7 @@ def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
 
 
 def _begins_with_home(rows: list[_Row]) -> bool:
-    """Return True if the first line is home.
+    """Return True if the first row is home.
 
     Files of fences and rally points may have no home line, as MAVProxy writes them.
     """
@@ -212,7 +215,7 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
 
 
 def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
-    """Return warnings about home, numbers and positions of a file's rows.
+    """Return warnings about the home, the numbers and the positions in a file's rows.
 
     body: rows without home.
     """
@@ -269,9 +272,10 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
 
 
 def waypoints_text(mission: Mission) -> str:
-    """Return a mission's items as a WPL 110 file: TABs, LF, coordinates with at least eight decimals.
+    """Return a mission's items as the text of a WPL 110 file.
 
-    A NaN is written as 0, which is this form's value for "unset". Fences and rally points have files of their own.
+    The file has TABs, LF, and coordinates with at least eight decimals. A NaN is written as 0, which means "unset" in
+    this format. Fences and rally points have files of their own.
     """
     return _file_text(mission.home, renumber_items(mission).items)
 
@@ -303,7 +307,7 @@ def _file_text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
 
 
 def _item_line(item: MissionItem, *, current: bool) -> str:
-    """Return the line of an item; ``current`` marks the item at which a mission starts."""
+    """Return the line of an item; ``current`` marks the item at which the mission starts."""
     numbers = [_format_decimal(value, 0) for value in item.params]
     position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
     integers = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
@@ -311,7 +315,7 @@ def _item_line(item: MissionItem, *, current: bool) -> str:
 
 
 def _format_decimal(value: float, places: int) -> str:
-    """Return a number as text that reads back to the same double, without an exponent.
+    """Return a number as text without an exponent, from which the same double is read.
 
     places: minimum number of decimals.
     """
@@ -339,7 +343,7 @@ MAX_POINTS = 255
 
 
 def is_point_list(text: str) -> bool:
-    r"""Return True if a fence's text begins with a number: only the older tools' list of points does.
+    r"""Return True if a fence's text begins with a number, as only the older tools' lists of points do.
 
     >>> is_point_list("# saved\n36.5 -84.2\n"), is_point_list("QGC WPL 110\n")
     (True, False)
@@ -354,8 +358,8 @@ def is_point_list(text: str) -> bool:
 def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     r"""Return the polygon items of a fence file of the older tools; ``source`` names the file in messages.
 
-    The return point is not part of the zone and is left out; a file without one, whose first point is its last, is
-    accepted. Raises MissionError with file, line, value and allowed values.
+    The return point is not part of the zone, and is left out. A file without a return point, whose first point is also
+    its last, is accepted. Raises MissionError with file, line, value and allowed values.
 
     >>> square = ["36.505 -84.195", "36.5 -84.2", "36.5 -84.19", "36.51 -84.19", "36.51 -84.2", "36.5 -84.2"]
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]

@@ -214,11 +214,11 @@ class Airborne(ABC):
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return the extra length that is flown in loiters too tight for the bank limit, m.
+    """Return the extra length flown in loiters whose radius is too small for the bank limit, m.
 
-    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires,
-    and once more until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing, because
-    no time limit is long enough.
+    An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires. It
+    then flies one more lap until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing,
+    because no time limit would be long enough.
 
     waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
@@ -229,11 +229,9 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     # Process waypoints of one loiter that agree in these fields only once.
     first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
     for waypoint in circles[first_indices]:
-        stated_radius, speed, altitude = (
-            abs(float(waypoint["loiter_radius"])),
-            float(waypoint["airspeed"]),
-            float(waypoint["up"]),
-        )
+        stated_radius = abs(float(waypoint["loiter_radius"]))
+        speed = float(waypoint["airspeed"])
+        altitude = float(waypoint["up"])
         flown_radius = max(
             setup.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
         )
@@ -248,7 +246,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
 
 def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
-    """Return the lowest ground speed on any leg, in the mean wind at the leg's altitudes, m/s."""
+    """Return the lowest ground speed on any leg, m/s, in the mean wind at the altitudes of the leg."""
     limits: Limits = setup.limits
     points, courses = setup.route.positions, leg_courses(setup.route.positions)
     tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
@@ -260,9 +258,10 @@ def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
 
 
 def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
-    """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s; 0 without a forecast.
+    """Return the largest deviation of a forecast's wind from the mean wind around a flight, m/s.
 
-    length: m, of the flight.
+    length: length of the flight, m.
+    Without a forecast the result is 0.
     """
     field = setup.scenario.wind.field
     if field is None:

@@ -124,7 +124,7 @@ class Ground:
 
 
 def _map_outside_raster() -> PolyMap:
-    """Return a map from every position to a pixel outside any raster."""
+    """Return a map that converts every position to a pixel outside any raster."""
 
     def outside_pixel(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         return np.full_like(x, -9.0), np.full_like(y, -9.0)

@@ -92,7 +92,7 @@ class Damage:
 
     @property
     def lossy(self) -> bool:
-        """True if more than the file's end is lost."""
+        """True if a part of the file other than its end is lost."""
         return self.places > 0 or self.unreadable > 0
 
 
@@ -140,7 +140,7 @@ class MissingItems:
 
     @property
     def beyond(self) -> bool:
-        """True if the mission continues beyond the judged items."""
+        """True if the mission continues beyond the items that are judged."""
         return self.last < self.end
 
 
@@ -247,7 +247,7 @@ class FlightSetup:
 
     @property
     def name(self) -> str:
-        """Stem for file names: name of a plan's scenario, or of a mission's file."""
+        """Stem for file names: the name of a plan's scenario, or the name of a mission's file."""
         return self.scenario.name if self.plan is not None else Path(self.mission.source).stem
 
     @property
@@ -257,7 +257,7 @@ class FlightSetup:
 
     @property
     def corridor(self) -> float:
-        """Half width of the corridor along the legs that the flight must not leave, m."""
+        """Half width of the corridor along the legs, which the flight must not leave, m."""
         return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.turns.acceptance_radius)
 
     @property
@@ -278,7 +278,7 @@ class FlightSetup:
 
     @property
     def ground_phases(self) -> GroundPhases:
-        """Take-off and landing of the flight; empty for an autopilot that flies neither."""
+        """Take-off and landing that the flight simulates; empty for an autopilot that flies neither."""
         has_ground_ends = self.scenario.launch is not None or self.scenario.landing is not None
         if self.source is not None or not has_ground_ends:
             return GroundPhases()
@@ -307,12 +307,12 @@ class FlightSetup:
 
     @property
     def display_waypoints(self) -> Floats:
-        """Waypoints of the route for pictures and tables, m, (w, 3), including ground ends that are flown."""
+        """Waypoints of the route for pictures and tables, (w, 3) m; its ends are on the ground if they are flown."""
         return display_waypoints(self.route, self.ground_phases)
 
     @property
     def started(self) -> str:
-        """Description of the flight's start, with the reasons why the scenario's launch or landing is not flown."""
+        """Description of the flight's start, and the reasons why a launch or landing of the scenario is not flown."""
         ground_phases, description = self.ground_phases, self.route.started
         if ground_phases.take_off is not None:
             description = ground_phases.take_off.description()
@@ -320,7 +320,7 @@ class FlightSetup:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Parts of the mission that are not flown as written, in sentences."""
+        """Sentences on the parts of the mission that are not flown as written."""
         return flown_notes(self.route, self.ground_phases)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
@@ -330,7 +330,7 @@ class FlightSetup:
         return setup
 
     def with_long_reversals(self) -> "FlightSetup":
-        """Return a copy of the setup with the longer turn at each course reversal."""
+        """Return a copy of the setup that takes the longer turn at each course reversal."""
         setup = copy.copy(self)
         path = fly_by_path(self.demanded_route, self.limits, self.scenario.terrain, fly_over_turn="long")
         object.__setattr__(setup, "path", path)
@@ -338,7 +338,7 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: the scenario's limits, or the aircraft's limits if the scenario states none.
+    """Return the limits of a path: those of the scenario, and those of the aircraft where it states none.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.

@@ -190,7 +190,7 @@ def simulate(flight: Airborne, block_duration: float = BLOCK_DURATION_S) -> Iter
 
 
 def fly_to_end(flight: Airborne) -> SimulatedFlight:
-    """Fly until the flight ends. The same setup gives the same track, bit for bit.
+    """Fly until the flight ends. The same setup always gives the same track, bit for bit.
 
     Raises FlightError if a program does not fly to the end.
 

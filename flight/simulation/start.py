@@ -132,7 +132,7 @@ class Release:
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
-    """Return the gear to add to a model without contacts: wheels for a take-off from a runway, otherwise a belly."""
+    """Return the gear that is added to a model without contacts: wheels for a runway, otherwise a belly."""
     return (
         "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
     )

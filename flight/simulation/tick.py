@@ -274,13 +274,11 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
 
     Sets ``state``, ``true`` and ``place`` of a record of `flight.simulation.tick.WORKSPACE`.
     """
-    state, true, air, settings, place = (
-        workspace.state,
-        workspace.true,
-        workspace.air,
-        workspace.settings,
-        workspace.place,
-    )
+    state = workspace.state
+    true = workspace.true
+    air = workspace.air
+    settings = workspace.settings
+    place = workspace.place
     if not _to_si(state, workspace.state_factors):
         return False
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
@@ -307,7 +305,7 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
 def end_tick(workspace: Record, block: Floats) -> int:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    block: of the `Workspace`, with the wind field.
+    block: block of the `Workspace`, which contains the wind field.
 
     Return the code of the flight's end, a key of `ENDS`, or 0 if the flight continues.
     """
@@ -332,9 +330,13 @@ def airborne_end_code(workspace: Record) -> int:
 def fill_tick(workspace: Record, block: Floats) -> None:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    block: of the `Workspace`, with the wind field.
+    block: block of the `Workspace`, which contains the wind field.
     """
-    state, true, air, timing, place = workspace.state, workspace.true, workspace.air, workspace.timing, workspace.place
+    state = workspace.state
+    true = workspace.true
+    air = workspace.air
+    timing = workspace.timing
+    place = workspace.place
     cos, sin = place.north_cos, place.north_sin
     row = workspace.rows[timing.row]
     turbulence = workspace.noise[timing.row].turbulence
@@ -368,9 +370,10 @@ def fill_tick(workspace: Record, block: Floats) -> None:
 def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
     """Update the progress of an RTL around its loiter, and end the flight once the loiter is complete.
 
-    For autopilots that fly an RTL by their own control law or program: they follow no line, so the cross-track error is
-    NaN.  The loiter is complete after a full circle and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`, both counted
-    from the arrival at the loiter and its altitude, or after `rtl_loiter_timeout`.
+    This is for autopilots that fly an RTL by their own control law or program. They do not follow a line, so the
+    cross-track error is NaN. The loiter is complete after a full circle and
+    `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. Both are counted from the moment at which the aircraft has reached
+    the loiter and its altitude. The loiter also ends after `rtl_loiter_timeout`.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -397,8 +400,8 @@ def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: floa
 def update_end_loiter(motion: Record, memory: Record, dt: float) -> None:
     """Update the course change in the loiter at a mission's end, and end the flight at `END_LOITER_ANGLE_RAD`.
 
-    The course is used instead of the bearing from the waypoint: an aircraft that cannot fly the loiter's radius flies
-    loops next to the waypoint, and the bearing then turns by 360 degrees in one loop or in three.
+    The course is used instead of the bearing from the waypoint. An aircraft that cannot fly the loiter's radius flies
+    loops next to the waypoint, and the bearing may then turn by 360 degrees in one loop or in three.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
@@ -439,7 +442,7 @@ def _find_airborne_end(
 ) -> int:
     """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
 
-    The conditions, in this order: ground contact, bank, stall, end of the route, empty battery.
+    The conditions are, in this order, ground contact, bank, stall, end of the route, and empty battery.
     """
     if height_above_ground <= 0.0:
         return GROUND
@@ -512,7 +515,10 @@ def _fill_row(
     """Fill a `flight.simulation.track.TRACK_ROW` record, except for the wind."""
     row.time = time
     # Element by element: assigning a whole array would check shapes.
-    position, velocity, attitude, rates = row.position, row.velocity, row.attitude, row.rates
+    position = row.position
+    velocity = row.velocity
+    attitude = row.attitude
+    rates = row.rates
     position[0], position[1], position[2] = true.east, true.north, true.up
     velocity[0], velocity[1], velocity[2] = true.velocity_east, true.velocity_north, true.velocity_up
     attitude[0], attitude[1], attitude[2] = state.roll, state.pitch, state.yaw
@@ -522,11 +528,9 @@ def _fill_row(
     flow[0], flow[1] = state.alpha, state.beta
     controls[ELEVATOR], controls[AILERON], controls[RUDDER] = state.elevator, state.aileron, state.rudder
     controls[THROTTLE] = state.throttle
-    commands_row[ELEVATOR], commands_row[AILERON], commands_row[RUDDER] = (
-        commands.elevator,
-        commands.aileron,
-        commands.rudder,
-    )
+    commands_row[ELEVATOR] = commands.elevator
+    commands_row[AILERON] = commands.aileron
+    commands_row[RUDDER] = commands.rudder
     commands_row[THROTTLE] = commands.throttle
     row.load_factor = state.load_factor
     row.current = state.current

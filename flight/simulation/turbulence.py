@@ -30,7 +30,7 @@ def dryden_scales(height: float) -> tuple[float, float, float]:
 
 
 def start_gusts(noise: Floats, filters: Record) -> None:
-    """Initialise the gust filters, so that the statistics of the gusts do not change over the flight.
+    """Initialise the gust filters so that the statistics of the gusts are the same throughout the flight.
 
     noise: random numbers from the standard normal distribution, (5,).
     filters: a record of `GUST_FILTERS`, which is set.
@@ -45,7 +45,7 @@ def start_gusts(noise: Floats, filters: Record) -> None:
 def step_gusts(
     filters: Record, noise: Floats, w20: float, height: float, airspeed: float, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the gust filters by a tick; return the gust along the mean wind, to the right of it, and down, m/s.
+    """Advance the gust filters by a tick; return the gust, m/s: along the mean wind, to its right, and down.
 
     filters: a record of `GUST_FILTERS`.
     noise: random numbers from the standard normal distribution, (3,).

@@ -53,7 +53,7 @@ def zone_penetration(
     error_below: float,
     error_above: float,
 ) -> float:
-    """Return the depth of the leg a-b in zones with their margins, integrated over its length, m x km.
+    """Return the depth of the leg a-b inside zones with their margins, integrated along the leg, m x km.
 
     sample_spacing: spacing of terrain samples (m), for levels above ground.
     lateral_error, error_below, error_above: tracking error, m.
@@ -104,12 +104,12 @@ def zone_penetration(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z with its margin, and the part of the line abreast of it.
+    """Return the depth of a line in exclusion z and its margin, and the part of the line next to the zone.
 
     required_distance: required distance from the zone, m.
 
-    The depth is the shift of the line (m) that would move it to `required_distance` from the zone; 0 if the line is far
-    enough away. The part of the line is given by two fractions of the line's length.
+    The depth is the distance by which the line would have to be shifted to be `required_distance` away from the zone,
+    m; 0 if it is far enough away. The part of the line is given by two fractions of its length.
     """
     view = view_shape(records, z, line, required_distance)
     if not view.inside and view.distance >= required_distance:
@@ -119,18 +119,16 @@ def penetration_depth(
     else:
         depth = required_distance - view.distance
     per_metre = 1.0 / max(line.length, 1e-9)
-    first_fraction, last_fraction = (
-        (view.first - required_distance) * per_metre,
-        (view.last + required_distance) * per_metre,
-    )
+    first_fraction = (view.first - required_distance) * per_metre
+    last_fraction = (view.last + required_distance) * per_metre
     return max(depth, 1e-9), min(1.0, max(0.0, first_fraction)), min(1.0, max(0.0, last_fraction))
 
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return how far a line is outside inclusion z or near its edge, integrated along the line, m x km.
+    """Return how far a line is outside inclusion z, or too near to its edge, integrated, m x km.
 
-    required_distance: required distance inside the edge, m.
+    required_distance: required distance from the edge, on the inside, m.
     """
     view = view_shape(records, z, line, required_distance)
     if view.inside and view.distance >= required_distance:
@@ -149,14 +147,14 @@ def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_d
 
 @inlined
 def altitude_band(start_altitude: float, end_altitude: float, error_below: float, error_above: float) -> AltitudeBand:
-    """Return the vertical range of a straight line over unknown ground, with the tracking error added.
+    """Return the range of altitudes of a straight line, extended by the tracking error.
+
+    The ground is unknown, so the heights above ground are not limited.
 
     error_below, error_above: vertical tracking error, m.
     """
-    min_altitude, max_altitude = (
-        min(start_altitude, end_altitude) - error_below,
-        max(start_altitude, end_altitude) + error_above,
-    )
+    min_altitude = min(start_altitude, end_altitude) - error_below
+    max_altitude = max(start_altitude, end_altitude) + error_above
     return AltitudeBand(min_altitude, max_altitude, -UNKNOWN_HEIGHT_BOUND, UNKNOWN_HEIGHT_BOUND)
 
 
@@ -172,12 +170,12 @@ def _sampled_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the vertical range of a part of the line a-b, with heights above ground at samples.
+    """Return the range of altitudes of a part of the line a-b, and the range of its heights above ground.
 
-    sample_spacing: m.
+    sample_spacing: spacing of the ground samples, m.
     first_fraction, last_fraction: limits of the part, as fractions of the line.
 
-    If the ground is unknown at a sample, the heights above ground are not limited.
+    The heights above ground are measured at samples. If the ground is unknown at a sample, they are not limited.
     """
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     band = altitude_band(a[2] + first_fraction * dz, a[2] + last_fraction * dz, error_below, error_above)
@@ -201,10 +199,10 @@ def _sampled_altitude_band(
 
 @inlined
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
-    """Return the distance of a vertical range below a zone's floor or above its ceiling, m.
+    """Return the distance of a range of altitudes below a zone's floor or above its ceiling, m.
 
-    The distance is negative between floor and ceiling. It is the smallest distance of any height of the range for an
-    exclusion, and the largest for an inclusion.
+    The distance is negative between floor and ceiling. For an exclusion it is the smallest distance of any altitude of
+    the range, for an inclusion the largest.
     """
     floor_min, floor_max = band.min_altitude, band.max_altitude
     if zone.floor_above_ground:
@@ -241,9 +239,9 @@ def measure_zone_margin(
     error_above: float,
     margin: Record,
 ) -> None:
-    """Fill the `ZONE_MARGIN` record of the straight piece a-b of a path.
+    """Fill the `ZONE_MARGIN` record for a straight piece a-b of a path.
 
-    depths: negated heights of the ground.
+    depths: heights of the ground with the opposite sign.
     lateral_error: (2,) lateral tracking error at a and b, m.
     error_below, error_above: vertical tracking error, m.
     """
@@ -263,10 +261,8 @@ def measure_zone_margin(
         band = altitude_band(a[2], b[2], error_below, error_above)
         if uses_ground:
             band = _exact_altitude_band(heights, depths, to_pixel, a, b, lateral_error, error_below, error_above)
-        horizontal, vertical = (
-            _horizontal_distance(records, z, a, b, search_distance + max_lateral_error) - max_lateral_error,
-            vertical_distance(zone, band),
-        )
+        horizontal = _horizontal_distance(records, z, a, b, search_distance + max_lateral_error) - max_lateral_error
+        vertical = vertical_distance(zone, band)
         if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
         piece_count = max(1, math.ceil(horizontal_length / MAX_PIECE_LENGTH))
@@ -282,17 +278,17 @@ def measure_zone_margin(
                     heights, depths, to_pixel, piece_start, piece_end, piece_error, error_below, error_above
                 )
             max_piece_error = max(piece_error[0], piece_error[1])
-            horizontal, vertical = (
+            horizontal = (
                 _horizontal_distance(records, z, piece_start, piece_end, search_distance + max_piece_error)
-                - max_piece_error,
-                vertical_distance(zone, band),
+                - max_piece_error
             )
+            vertical = vertical_distance(zone, band)
             _update_margin(zone, required, z, horizontal, vertical, margin)
 
 
 @inner
 def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
-    """Update the record with the distances of a piece of the path from zone z."""
+    """Update a `ZONE_MARGIN` record with the distances between a piece of the path and zone z."""
     excess = max(horizontal - required.horizontal, vertical - required.vertical)
     if not zone.exclusion:
         excess = min(horizontal - required.horizontal, -vertical - required.vertical)
@@ -309,7 +305,7 @@ def _update_margin(zone: Record, required: Record, z: int, horizontal: float, ve
 
 @inner
 def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> float:
-    """Return the distance that is left before a zone is violated, m; negative if it is violated.
+    """Return the distance to a violation of a zone, m; negative if the zone is violated.
 
     horizontal: distance outside an exclusion or inside an inclusion, m.
     vertical: distance below the zone's floor or above its ceiling, m.
@@ -319,10 +315,10 @@ def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> 
 
 @inner
 def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, max_distance: float) -> float:
-    """Return the smallest horizontal distance of the line a-b outside an exclusion or inside an inclusion.
+    """Return the smallest horizontal distance from the line a-b to the edge of zone z, m.
 
-    The distance (m) is negative for a line that enters the exclusion or leaves the inclusion. Distances above
-    `max_distance` may be inf.
+    The distance is positive for a line that is outside an exclusion or inside an inclusion, and negative for a line
+    that enters the exclusion or leaves the inclusion. Distances above `max_distance` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     view = view_shape(records, z, line, max_distance)
@@ -346,9 +342,9 @@ def _exact_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the vertical range of the line a-b, with exact heights above the ground around it.
+    """Return the ranges of altitudes and of exact heights above ground of the line a-b.
 
-    lateral_error: (2,) distance of the ground on both sides that is included, at a and at b, m.
+    lateral_error: (2,) width of the ground strip on each side of the line that is included, at a and at b, m.
     """
     band = altitude_band(a[2], b[2], error_below, error_above)
     horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
@@ -363,8 +359,6 @@ def _exact_altitude_band(
         depth_clearance, _ = segment_clearance(depths, to_pixel, offset_start, offset_end)
         if math.isnan(clearance) or math.isnan(depth_clearance):
             return band
-        min_height, max_height = (
-            min(min_height, clearance - error_below),
-            max(max_height, error_above - depth_clearance),
-        )
+        min_height = min(min_height, clearance - error_below)
+        max_height = max(max_height, error_above - depth_clearance)
     return AltitudeBand(band.min_altitude, band.max_altitude, min_height, max_height)

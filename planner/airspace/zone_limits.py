@@ -53,7 +53,7 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with margins; the margin of a zone is reduced if a fixed end violates it.
+    """Return zones with margins; the margin of a zone is smaller if a fixed end violates it.
 
     ends: (k, 3) m.
 
@@ -111,7 +111,7 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
-    """Return the index of the first exclusion that may reach east of a position `west`, m.
+    """Return the index of the first exclusion that may extend east of a position `west`, m.
 
     `west` is the western edge of the area that is searched for exclusions.
     """
@@ -150,8 +150,8 @@ class PlannerAirspace(NamedTuple):
 def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> PlannerAirspace:
     """Make the airspace of a scenario with its margins.
 
-    buffer: margin below the maximum height, m; at a fixed end with a smaller margin, a fraction
-    (`ZoneMargins.end_fraction`) of the end's own margin.
+    buffer: margin below the maximum height, m. If a fixed end has a smaller margin, only a fraction of that margin
+        (`ZoneMargins.end_fraction`) is required there.
 
     >>> from world.scenario import load_scenario
     >>> space = make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
@@ -218,7 +218,7 @@ class ShapeView(NamedTuple):
 
 @inlined
 def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
-    """Return the line from a to b; a line without length points north."""
+    """Return the line from a to b; a line without length gets the course north."""
     dx, dy = bx - ax, by - ay
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     if horizontal_length < 1e-9:
@@ -228,7 +228,7 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
 
 @inner
 def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: float) -> ShapeView:
-    """Measure the shape of zone z along and across a line; distances above `max_distance` (m) may be inf."""
+    """Measure the shape of zone z in the axes of a line; distances above `max_distance` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
         east_offset, north_offset = zone.centre_east - line.east, zone.centre_north - line.north
@@ -236,7 +236,10 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         across = north_offset * line.course_east - east_offset * line.course_north
         return _view_circle(along, across, zone.radius, line.length)
     is_inside, distance2 = False, math.inf
-    right, left, first, last = math.inf, -math.inf, math.inf, -math.inf
+    right = math.inf
+    left = -math.inf
+    first = math.inf
+    last = -math.inf
     edges = records.edges
     for k in range(zone.first_edge, zone.last_edge):
         edge = edges[k]
@@ -246,7 +249,10 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         east_offset, north_offset = edge.to_east - line.east, edge.to_north - line.north
         to_along = east_offset * line.course_east + north_offset * line.course_north
         to_across = north_offset * line.course_east - east_offset * line.course_north
-        right, left, first, last = min(right, across), max(left, across), min(first, along), max(last, along)
+        right = min(right, across)
+        left = max(left, across)
+        first = min(first, along)
+        last = max(last, along)
         if (across > 0.0) != (to_across > 0.0):
             crossing = along + (to_along - along) * across / (across - to_across)
             is_inside = is_inside != (crossing > 0.0)
@@ -268,7 +274,7 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
 
 @inlined
 def _view_circle(along: float, across: float, radius: float, horizontal_length: float) -> ShapeView:
-    """Measure a circle along and across a line, given its centre in the line's axes."""
+    """Measure a circle in the axes of a line, given its centre along and across the line."""
     distance_beyond_end = along - min(horizontal_length, max(0.0, along))
     min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - radius
     max_inside_distance = math.sqrt(max(abs(along), abs(along - horizontal_length)) ** 2 + across * across) - radius
@@ -280,7 +286,7 @@ def _view_circle(along: float, across: float, radius: float, horizontal_length: 
 
 @inlined
 def _edge_distance2(along: float, across: float, to_along: float, to_across: float, horizontal_length: float) -> float:
-    """Return the squared distance between a line and an edge that does not cross it, m^2.
+    """Return the squared distance between a line and an edge that does not cross the line, m^2.
 
     along, across, to_along, to_across: ends of the edge in the line's axes, m.
     """

@@ -43,7 +43,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `AIRSPACE_PIECE` records of a path (w, 3): those of its legs, then those of its corners."""
+    """Return `AIRSPACE_PIECE` records of a path (w, 3): first its legs, then its corners."""
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
     )
@@ -107,7 +107,7 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 
 @inner
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
-    """Return the maximum height above ground along a piece and on both its sides, m; NaN off the terrain."""
+    """Return the maximum height above ground along a piece and beside it, m; NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
@@ -145,9 +145,9 @@ def add_airspace_violations(
 
     path: (w, 3) m.
     legs: measurements of the path's legs.
-    corners: its corners as planned.
-    flown_corners: its corners as flown.
-    lags: altitude lags on its legs.
+    corners: corners of the path as planned.
+    flown_corners: corners of the path as flown.
+    lags: altitude lags on the legs.
 
     Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.
     """
@@ -215,7 +215,10 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
-    """Return the depth of a leg in zones enlarged by the tracking error (m), integrated, m x km."""
+    """Return the depth of a leg in zones enlarged by the tracking error, integrated along the leg, m x km.
+
+    lateral, below, above: tracking error, m.
+    """
     zones = data.airspace.zones
     return zone_penetration(zones, data.heights, data.to_pixel, data.sample_spacing, start, end, lateral, below, above)
 
@@ -230,10 +233,10 @@ def _leg_excess_height(
     lag: Record,
     across: float,
 ) -> float:
-    """Return the excess of a leg over the maximum height above ground, integrated over the leg, m x km.
+    """Return the excess of a leg over the maximum height above ground, integrated along the leg, m x km.
 
-    lag: height lag of the autopilot on the leg, which is added to the leg's altitude.
-    across: half width of the ground strip below the leg that is examined, m.
+    lag: height lag of the autopilot on the leg, which is added to the altitude of the leg.
+    across: half width of the examined ground strip below the leg, m.
     """
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, leg_start, leg_end, 0.0, 0.0, math.inf)
@@ -260,9 +263,9 @@ def _swath_excess_height(
 ) -> float:
     """Return the excess of a line over the maximum height, integrated along it, m x km.
 
-    The excess is the largest among the line and two lines that are offset by `lateral` (m) to both sides.
+    The excess is the largest of three lines: the line itself, and one line at the distance `lateral` (m) on each side.
 
-    If the excess is larger than `max_excess`, return a lower bound that is larger than `max_excess`, too.
+    If the excess exceeds `max_excess`, the result is a lower bound that exceeds `max_excess`, too.
     """
     horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))
     east, north = lateral * (end[1] - start[1]) / horizontal_length, -lateral * (end[0] - start[0]) / horizontal_length
@@ -270,7 +273,10 @@ def _swath_excess_height(
     for side in (0.0, -1.0, 1.0):
         if side != 0.0 and lateral < _MIN_OFFSET_M:
             break
-        x, y, x2, y2 = start[0] + side * east, start[1] + side * north, end[0] + side * east, end[1] + side * north
+        x = start[0] + side * east
+        y = start[1] + side * north
+        x2 = end[0] + side * east
+        y2 = end[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
         excess = terrain_excess(depths, bounds, required, above, ends, x, y, -start[2], x2, y2, -end[2], max_excess)
@@ -284,7 +290,7 @@ def _swath_excess_height(
 def _cut_segment(
     leg_start: Floats, leg_end: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `start` and `end` with the ends of the part of a leg between two fractions of its length."""
+    """Fill `start` and `end` with the ends of a part of a leg, between two fractions of the leg's length."""
     for axis in range(3):
         start[axis] = leg_start[axis] + begin_fraction * (leg_end[axis] - leg_start[axis])
         end[axis] = leg_start[axis] + end_fraction * (leg_end[axis] - leg_start[axis])
@@ -295,8 +301,8 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
     paths: (n, w, 3) m.
 
-    There are six pieces per leg. The paper counts points, six per leg, and has no zones; a path could pass through a
-    zone between two points, so pieces are tested along their full length.
+    There are six pieces per leg. The paper has no zones, and counts points, six per leg. Here pieces are tested along
+    their full length, because a path could pass through a zone between two points.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -35,10 +35,11 @@ _EPSILON = 1e-9
 
 
 def certify(problem: Problem, waypoints: Floats) -> Certificate:
-    """Compute the certificate of a path (w, 3) against the margins of `Problem.certified`.
+    """Compute the certificate of a path (w, 3) with the margins of `Problem.certified`.
 
-    Clearance is exact for the bilinear terrain, along the legs and along the chords of the fly-by arcs. Distances to
-    missile spheres and zones, and the headroom below the maximum height above ground, are measured on the same pieces.
+    The clearance is measured along the legs and along the chords of the fly-by arcs; it is exact for bilinearly
+    interpolated terrain. The distances to missile spheres and zones, and the headroom below the maximum height, are
+    measured along the same lines.
     """
     data = problem.certified
     # A copy: compiled code has one type for arrays that are locked, as a plan's, and one for others.
@@ -66,17 +67,18 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the distance from a path (w, 3) to the nearest missile sphere, m; negative inside.
+    """Return the distance from a path (w, 3) to the nearest missile sphere, m.
 
-    The distance is inf without missiles.
+    The distance is negative inside a sphere, and inf without missiles.
     """
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
 def required_kill_distance(problem: Problem) -> float:
-    """Return the distance from missile spheres that a search demands of a path, m.
+    """Return the distance from missile spheres that a search requires of a path, m.
 
-    It is the certificate's margin, or slightly less than the distance of an end that is closer.
+    The distance is the margin of the certificate. If an end is closer to a sphere than this, it is slightly less than
+    the distance of the end.
     """
     # A path is never further from missile spheres than its own ends.
     ends = (problem.scenario.start, problem.scenario.destination)
@@ -103,7 +105,10 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Return a line about the faults of one kind: the worst, and the other places; [] without faults."""
+    """Return a line about the faults of one kind: the worst fault, and the places of the others.
+
+    Without faults the result is [].
+    """
     if not faults:
         return []
     (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
@@ -113,12 +118,15 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
 
 
 def _without_rounding(margin: float) -> float:
-    """Return a margin, or 0 for one that is negative only by rounding, so that a margin below 0 is a problem."""
+    """Return a margin, or 0 if it is negative only because of rounding.
+
+    Therefore a margin below 0 always means a problem.
+    """
     return 0.0 if -_EPSILON <= margin < 0.0 else margin
 
 
 def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a turn to its limit, rad; append too sharp turns to `problems`."""
+    """Return the smallest margin of a turn to its limit, rad; append turns that are too sharp to `problems`."""
     turns = turning_angles(with_end_course_points(data, waypoints))
     problems += _summarise_faults(
         [
@@ -135,7 +143,7 @@ def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) ->
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a leg's length to the required length, m; append too short legs to `problems`."""
+    """Return the smallest margin of a leg's length, m; append legs that are too short to `problems`."""
     runs = leg_runs(waypoints)
     problems += _summarise_faults(
         [
@@ -166,9 +174,9 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
 
 
 def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin on the turn arcs, rad; append too steep arcs to `problems`.
+    """Return the smallest slope margin on turn arcs, rad; append arcs that are too steep to `problems`.
 
-    An arc is shorter than the two parts of the legs that it replaces, so the same height change makes it steeper. The
+    An arc is shorter than the parts of the legs that it replaces, so the same change of height makes it steeper. The
     margin is inf if the arcs need no check.
     """
     min_margin = math.inf
@@ -200,7 +208,7 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin of the legs, rad; append too steep legs to `problems`."""
+    """Return the smallest slope margin of the legs, rad; append legs that are too steep to `problems`."""
     min_margin = math.inf
     limits = leg_slope_limits(data, waypoints)
     faults: list[_Fault] = []
@@ -214,7 +222,7 @@ def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: float, place_text: str = "") -> str:
-    """Describe a slope (rad, positive up) beyond the climb or dive limit (rad).
+    """Describe a slope that exceeds the climb limit or the dive limit (rad, positive up).
 
     place_text: place on the path, such as `` along its arc``.
     """
@@ -226,9 +234,9 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height above the required height, m; append violations to `problems`.
+    """Return the smallest height of a path above the required height, m; append violations to `problems`.
 
-    The required height above ground is the clearance and the buffer. The margin is NaN if the path leaves the terrain.
+    The required height above ground is the clearance plus the buffer. The margin is NaN if the path leaves the terrain.
     """
     pieces = heights_above_ground(data, waypoints)
     margins = pieces["height"] - data.clearance - pieces["buffer"]
@@ -266,10 +274,10 @@ class _LowPlace(NamedTuple):
 
 
 def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m.
+    """Return the smallest distance of a waypoint from the limits of the area, m.
 
-    From the edge of the map it is less by the autopilot's excursion at the corner. Violations are appended to
-    `problems`.
+    The limits are the edges of the map, the floor and the ceiling. The distance from an edge of the map is reduced by
+    the autopilot's excursion at the corner. Violations are appended to `problems`.
     """
     min_corner = np.array([data.west, data.south, data.floor])
     max_corner = np.array([data.east, data.north, data.ceiling])
@@ -287,7 +295,7 @@ def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) 
 
 
 def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Return the smallest margins to the required distance from a zone and to the maximum height, m.
+    """Return the smallest margins to the required distance from a zone, and to the maximum height, m.
 
     Both are inf if the scenario has neither zones nor a maximum height. Violations are appended to `problems`.
     """
@@ -331,7 +339,10 @@ def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) 
 
 
 def _zone_fault_text(problem: Problem, distance: float, z: int) -> str:
-    """Return the message for a piece at this distance (m) from zone z, in the kernels' numbering."""
+    """Return the message about a piece of the path at a distance (m) from zone z.
+
+    Zone z is numbered as in the kernels.
+    """
     required = problem.certified.airspace.zones.required[z]
     zone = problem.scenario.zones[int(required["number"])]
     if distance < 0.0:

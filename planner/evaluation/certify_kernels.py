@@ -56,7 +56,7 @@ END_DISTANCE_M = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records of a path (w, 3): those of its legs, then those of its corners."""
+    """Return `TRACKED_PIECE` records of a path (w, 3): first its legs, then its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind_vector(data.aircraft), data.tracking.across
@@ -73,10 +73,8 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
             piece = pieces[piece_count]
             _cut_piece(waypoints[i], waypoints[i + 1], begin_fraction, end_fraction, piece)
             piece.number = i
-            piece.lateral_begin, piece.lateral_end = (
-                _lateral_deviation(data, piece.begin, across),
-                _lateral_deviation(data, piece.end, across),
-            )
+            piece.lateral_begin = _lateral_deviation(data, piece.begin, across)
+            piece.lateral_end = _lateral_deviation(data, piece.end, across)
             _set_deviations(lags[i], begin_fraction, end_fraction, piece)
             piece.lateral = max(piece.lateral_begin, piece.lateral_end)
             begin_fraction = end_fraction
@@ -104,9 +102,9 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _piece_ends(decay: float, horizontal_length: float) -> Floats:
-    """Return the fractions of a leg at which its pieces end, in increasing order; the last is 1.
+    """Return the ends of the pieces of a leg, as increasing fractions of the leg; the last is 1.
 
-    decay: length of the leg in lengths of the height lag.
+    decay: length of the leg, in multiples of the lag length.
     """
     fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
@@ -119,7 +117,7 @@ def _piece_ends(decay: float, horizontal_length: float) -> Floats:
 
 @inner
 def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set a piece's ends to the points of a line at two fractions of its length."""
+    """Set the ends of a piece to the points at two fractions of a line."""
     for axis in range(3):
         piece.begin[axis] = start[axis] + begin_fraction * (end[axis] - start[axis])
         piece.end[axis] = start[axis] + end_fraction * (end[axis] - start[axis])
@@ -127,7 +125,7 @@ def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: 
 
 @inner
 def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set a piece's deviations below and above the leg between two fractions of the leg."""
+    """Set the deviations of a piece below and above its leg, between two fractions of the leg."""
     begin_lag, end_lag = lag_at(lag, begin_fraction), lag_at(lag, end_fraction)
     piece.below, piece.above = max(0.0, begin_lag, end_lag), max(0.0, -begin_lag, -end_lag)
 
@@ -136,7 +134,7 @@ def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, pie
 def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> float:
     """Return the lateral deviation of the flight at a position on the path, m.
 
-    It is smaller near the fixed ends.
+    The deviation is smaller near the fixed ends.
     """
     end_distance = min(
         math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
@@ -160,8 +158,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
     """Return the distance between the flight of a path (w, 3) and the nearest missile sphere, m.
 
-    The flight is on the legs and arcs, or deviates from them by up to the tracking error. The distance is inf without
-    missiles.
+    The flight may deviate from the legs and arcs by the tracking error. The distance is inf without missiles.
     """
     min_distance = math.inf
     if data.tracking.has_error:
@@ -205,10 +202,10 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
 
 @compiled
 def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
-    """Return a path with a point added at each end, so that turns from and to end courses can be measured.
+    """Return a path with one more point at each end, for measuring the turns from and to the end courses.
 
-    One distant point is before the start, the other after the destination, both on the prescribed courses. Without a
-    prescribed course the point is on the extension of the leg, so that no turn results.
+    One distant point lies before the start, the other after the destination, both on the prescribed courses. Without a
+    prescribed course the point extends the leg, so that there is no turn.
     """
     count = path.shape[0]
     out = np.empty((count + 2, 3))
@@ -230,7 +227,7 @@ def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg needs for its turns and for the roll between them, m, (w - 1,)."""
+    """Return the length that each leg needs for its turns and for the roll between them, m, (w - 1,)."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -270,7 +267,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `CERTIFIED_PIECE` records of a path (w, 3): of its legs, then of its arcs or corners."""
+    """Return `CERTIFIED_PIECE` records of a path (w, 3): first its legs, then its arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     leg_count = waypoints.shape[0] - 1
@@ -289,7 +286,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and on both sides of them.
+    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and beside them.
 
     pieces: `TRACKED_PIECE` records.
     """
@@ -315,9 +312,10 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
 
 @inner
 def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
-    """Fill the `CERTIFIED_PIECE` record of the straight piece from `start` to `end`.
+    """Fill the `CERTIFIED_PIECE` record for a straight piece from `start` to `end`.
 
-    of_arc, number: True for a piece of an arc, and the number of the leg or arc.
+    of_arc: True for a piece of an arc, False for a piece of a leg.
+    number: number of the leg or arc.
     """
     height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height
@@ -328,16 +326,20 @@ def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:
-    """Return the buffer required on a piece, m, which grows with the distance from a fixed end.
+    """Return the buffer required on a piece a-b, m, which grows with the distance from a fixed end.
 
     buffer: buffer away from the ends, m.
     end_buffers: buffers at the start and the destination, m.
 
-    The buffer grows half as fast as in a search, which allows for the ground between the search's samples.
+    The buffer grows half as fast as in a search. The difference allows for the ground between the samples of the
+    search.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:
-            dx, dy, x, y = b[0] - a[0], b[1] - a[1], a[0] - end[0], a[1] - end[1]
+            dx = b[0] - a[0]
+            dy = b[1] - a[1]
+            x = a[0] - end[0]
+            y = a[1] - end[1]
             run2 = dx * dx + dy * dy
             fraction = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
             distance = math.sqrt((x + fraction * dx) ** 2 + (y + fraction * dy) ** 2)

@@ -58,11 +58,14 @@ def measure_legs(path: Floats, legs: Records) -> None:
 
 @inner
 def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records) -> None:
-    """Fill `CORNER` records (w,) of a path (w, 3) whose legs are measured."""
+    """Fill `CORNER` records (w,) of a path (w, 3) whose legs are already measured."""
     aircraft, tracking = data.aircraft, data.tracking
     leg_count: int = legs.shape[0]
     for i in range(1, leg_count):
-        ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
+        ux = legs[i - 1].east
+        uy = legs[i - 1].north
+        vx = legs[i].east
+        vy = legs[i].north
         is_turning = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
         measure_corner(aircraft, tracking, wind, is_turning, ux, uy, vx, vy, path[i, 2], corners[i])
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
@@ -110,7 +113,10 @@ def courses_at_waypoint(data: ProblemArrays, legs: Records, i: int) -> tuple[flo
     """
     leg_count = legs.shape[0]
     leg_after, leg_before = min(i, leg_count - 1), max(i - 1, 0)
-    ux, uy, vx, vy = legs[leg_before].east, legs[leg_before].north, legs[leg_after].east, legs[leg_after].north
+    ux = legs[leg_before].east
+    uy = legs[leg_before].north
+    vx = legs[leg_after].east
+    vy = legs[leg_after].north
     if i == 0 and not math.isnan(data.start_course):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
     if i == leg_count and not math.isnan(data.destination_course):
@@ -120,9 +126,9 @@ def courses_at_waypoint(data: ProblemArrays, legs: Records, i: int) -> tuple[flo
 
 @compiled_inline
 def settling_length(turn_lengths: float, horizontal_length: float) -> float:
-    """Return the straight length of a leg for settling between its two turns, m.
+    """Return the straight length of a leg that is needed for settling between its two turns, m.
 
-    turn_lengths: length of both turns, m.
+    turn_lengths: sum of the lengths that both turns take up, m.
     """
     return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH_M, turn_lengths)
 
@@ -180,22 +186,23 @@ def fly_by_vertices(
 ) -> Floats:
     """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`.
 
-    The blend has the length for the waypoint's altitude.
+    The length of the blend is computed at the altitude of the waypoint.
     """
     return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
 
 @inner
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
-    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flight.
+    """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flown path.
 
     blend: half length of a blend (`half_blend_length`).
     radius: radius of the fly-by arc, m; 0 for none.
 
-    The vertices are a point on the leg where the blend of slopes begins, the arc from tangent point to tangent point,
-    and a point on the next leg where the blend ends. Height is linear along the arc; where the slope decreases, a
-    parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that. Without a radius, or
-    where a leg is shorter than the tangent, the arc is the waypoint itself.
+    The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
+    points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
+    slope decreases, the flight cuts the crest by (slope change) x (half length of the blend) / 4, and the vertices are
+    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the waypoint itself replaces the
+    arc.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
@@ -207,10 +214,8 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
         tangent = 0.0
     ux, uy = (waypoint[0] - previous[0]) / length_before, (waypoint[1] - previous[1]) / length_before
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_after, (next_waypoint[1] - waypoint[1]) / length_after
-    slope_in, slope_out = (
-        (waypoint[2] - previous[2]) / length_before,
-        (next_waypoint[2] - waypoint[2]) / length_after,
-    )
+    slope_in = (waypoint[2] - previous[2]) / length_before
+    slope_out = (next_waypoint[2] - waypoint[2]) / length_after
     chord_count = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
     arc_length = radius * turn if chord_count > 0 else 0.0
     start_height, end_height = waypoint[2] - tangent * slope_in, waypoint[2] + tangent * slope_out
@@ -254,7 +259,7 @@ def leg_parts_at_corner(
 ) -> Floats:
     """Return the parts of both legs next to `waypoint` as three vertices, (3, 3) m.
 
-    length_before, length_after: lengths of both parts, m, at most the whole leg.
+    length_before, length_after: lengths of the two parts, m, at most the length of the leg.
 
     The waypoint is the second vertex.
     """
@@ -278,11 +283,11 @@ def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> 
 
 @compiled
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
-    """Return the radius of the fly-by arc at each waypoint, m, (w,); 0 at the ends and without a turn.
+    """Return the radius of the fly-by arc at each waypoint, m, (w,).
 
-    Where only a number limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have radius
-    0: the corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them. A fly-over turn
-    passes outside its corner and has radius 0 too.
+    The radius is 0 at the ends, without a turn, and at a fly-over turn, which passes outside its corner. If turns are
+    limited only by a maximum angle, a leg may be shorter than its two turns. Such arcs cannot be flown, and have the
+    radius 0. Their corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them.
     """
     if data.fly_over:
         return np.zeros(path.shape[0])

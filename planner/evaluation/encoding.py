@@ -71,9 +71,10 @@ class WaypointFrames(NamedTuple):
 
 
 def route_frames(route: Floats) -> WaypointFrames:
-    """Make the frames of waypoints along a route (n + 1, 2) on the map, one for each straight piece of it.
+    """Make the frames of waypoints along a route (n + 1, 2) on the map, one for each straight piece.
 
-    A piece that is too short for a course takes the course of the piece before it, or of the first piece with a course.
+    A piece that is too short to have a course gets the course of the piece before it. If there is none, it gets the
+    course of the first piece that has one.
     """
     steps = np.diff(route, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -91,7 +92,7 @@ def route_frames(route: Floats) -> WaypointFrames:
 
 
 def straight_frames(east: float, north: float, cosine: float, sine: float, edges: Floats) -> WaypointFrames:
-    """Return frames of n waypoints that all have the same origin and axes.
+    """Return the frames of n waypoints that all have the same origin and axes.
 
     east, north: origin, m.
     cosine, sine: cosine and sine of the angle from east to the axis.
@@ -103,7 +104,7 @@ def straight_frames(east: float, north: float, cosine: float, sine: float, edges
 
 
 def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return points (count, 3) at equal distances along a route (k, 3), and their distances along it, m.
+    """Return points (count, 3) at equal distances along a route (k, 3), and these distances, m.
 
     >>> points, along = sample_route(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
     >>> along.tolist(), points[:, 0].tolist(), points[:, 1].tolist()
@@ -224,14 +225,14 @@ class Space:
 
 
 def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
-    """Return paths (n, w, 3) of inner waypoints (n, w - 2, 3), with start and destination added."""
+    """Return paths (n, w, 3) made of inner waypoints (n, w - 2, 3) and the start and destination."""
     out = np.empty((len(inner_waypoints), inner_waypoints.shape[1] + 2, 3))
     out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner_waypoints, space.destination
     return out
 
 
 def rotated_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding, with inner waypoint i in the i-th interval of the axis (section III).
+    """Make the rotated encoding, in which inner waypoint i lies in the i-th interval of the axis (section III).
 
     waypoints: number w of waypoints, including both ends.
 
@@ -252,9 +253,10 @@ def rotated_encoding(space: Space, waypoints: int) -> Encoding:
 
 
 def route_encoding(space: Space, route: Floats) -> Encoding:
-    """Make an encoding like `rotated_encoding`, with a route (w - 1, 2) as its axis, which may turn back.
+    """Make an encoding like `rotated_encoding` whose axis is a route (w - 1, 2), which may turn back.
 
-    Inner waypoint i lies along the i-th piece of the route, and across within `HALF_WIDTH` lengths of a piece.
+    Inner waypoint i lies along the i-th piece of the route. Across the route it lies within `HALF_WIDTH` times the
+    length of a piece.
     """
     frames = route_frames(route)
     waypoints = len(route) + 1
@@ -279,17 +281,17 @@ def require_frames(encoding: Encoding) -> WaypointFrames:
 
 
 def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
-    """Return the vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
+    """Return the vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to the encoding's box."""
     inner_points = rotated_frame(space.start, space.destination).to_frame(paths[:, 1:-1])
     return np.clip(inner_points.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
 def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Return the lower and upper limits of `across` in each of k intervals along the axis, m, (k,) each.
+    """Return the lower and upper limits of `across` in each of k intervals of the axis, m, (k,) each.
 
     edges: (k + 1,) limits of the intervals along the axis, m.
 
-    The limits are the map's edges, or the half-width that the space states.
+    The limits are the edges of the map, or the half-width that `space` states.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -307,7 +309,7 @@ def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Fl
 
 
 def cartesian_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding of each inner waypoint as absolute east, north and up, anywhere on the map."""
+    """Make an encoding of each inner waypoint as east, north and up, anywhere on the map."""
     lower = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
     upper = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
 
@@ -319,27 +321,26 @@ def cartesian_encoding(space: Space, waypoints: int) -> Encoding:
 
 
 def polar_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding of each inner waypoint as a step (r, theta, up) from the previous (section III.A).
+    """Make an encoding of each inner waypoint as a step (r, theta, up) from the previous one (section III.A).
 
-    theta: "the turning angle at each waypoint", relative to the previous leg, at the first waypoint to the direction
-        from start to destination; within +-180 degrees, positive to the left.
-    r: from 5 % to 200 % of the straight distance over the number of legs.
-
-    The paper states neither range; `polar_45_encoding` allows no turn beyond the paper's limit.
+    theta is "the turning angle at each waypoint", within +-180 degrees, positive to the left. It is relative to the
+    previous leg, and at the first waypoint to the direction from start to destination. r is 5 % to 200 % of the
+    straight distance divided by the number of legs. The paper states neither of the two ranges; `polar_45_encoding`
+    allows no turn beyond the paper's limit.
     """
     return _step_encoding("polar", space, waypoints, math.pi, turning=True)
 
 
 def polar_45_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding like `polar_encoding`, with theta within the paper's turn limit of +-45 degrees."""
+    """Make an encoding like `polar_encoding` with theta within the paper's turn limit of +-45 degrees."""
     return _step_encoding("polar-45", space, waypoints, math.pi / 4.0, turning=True)
 
 
 def bearing_encoding(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding like `polar_encoding`, with theta relative to the direct line.
+    """Make an encoding like `polar_encoding` with theta relative to the direct line.
 
-    Errors then do not accumulate. Not in the paper: changing one waypoint shifts the following waypoints but does not
-    turn them.
+    This encoding is not in the paper. Errors do not accumulate, because a change of one waypoint shifts the following
+    waypoints but does not turn them.
     """
     return _step_encoding("bearing", space, waypoints, math.pi, turning=False)
 
@@ -352,10 +353,8 @@ def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *,
     """
     frame = rotated_frame(space.start, space.destination)
     mean_leg = frame.length / (waypoints - 1)
-    lower, upper = (
-        np.array([_MIN_POLAR_STEP * mean_leg, -max_angle, space.up[0]]),
-        np.array([2.0 * mean_leg, max_angle, space.up[1]]),
-    )
+    lower = np.array([_MIN_POLAR_STEP * mean_leg, -max_angle, space.up[0]])
+    upper = np.array([2.0 * mean_leg, max_angle, space.up[1]])
 
     def decode(vectors: Floats) -> Floats:
         """Convert vectors (n, d) to paths (n, w, 3)."""

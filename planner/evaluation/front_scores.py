@@ -38,7 +38,7 @@ class Value(IntEnum):
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
     """Return the values of each path in the order of `Value`, (n, 5), in m, s, m, s and J.
 
-    energy: cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
+    energy: cost of energy with any weight, as `make_travel_cost` returns it; if None, the energy is NaN.
     paths: (n, w, 3) m.
     """
     out = np.zeros((len(paths), len(Value)))
@@ -54,7 +54,7 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
 def _fill_values(
     data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, paths: Floats, out: Floats
 ) -> None:
-    """Add the values of paths (n, w, 3) to a zeroed table (n, 5), in the order of `Value`."""
+    """Add the values of paths (n, w, 3) to a table of zeros (n, 5), in the order of `Value`."""
     for n in range(paths.shape[0]):
         path = paths[n]
         min_height = math.inf
@@ -72,7 +72,7 @@ def _fill_values(
 
 @inner
 def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float) -> float:
-    """Return the mean detection density along the leg (dx, dy, dz) from a start point."""
+    """Return the mean detection density along a leg (dx, dy, dz) from a start point."""
     total, length2 = 0.0, dx * dx + dy * dy + dz * dz
     if length2 < 1e-12:
         return 0.0
@@ -96,13 +96,14 @@ def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz
 
 @inner
 def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
-    """Return the minimum height above ground at samples of a leg and of earlier legs, m.
+    """Return the minimum height above ground at samples of a leg, or of earlier legs if it is lower, m.
 
-    start, dx, dy, dz: start of the leg, and the leg, m.
-    min_height: minimum height of the earlier legs, m.
+    start: start of the leg, m.
+    dx, dy, dz: vector of the leg, m.
+    min_height: minimum height on the earlier legs, m.
 
-    The result is -inf off the terrain. Samples are skipped where the steepest slope nearby shows that the ground cannot
-    be closer.
+    The result is -inf off the terrain. A sample is skipped if the steepest slope nearby shows that the ground cannot be
+    closer there.
     """
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     count = 1 + int(horizontal_length / data.sample_spacing)
@@ -115,10 +116,8 @@ def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: fl
             min_height = -math.inf if math.isnan(height) else height
         if k == count or min_height == -math.inf:
             return min_height
-        i, j = (
-            min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1),
-            min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1),
-        )
+        i = min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1)
+        j = min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1)
         skip_fraction = (height - min_height) / (tiles[i, j] * horizontal_length + abs(dz) + 1e-9)
         skip_fraction = min(skip_fraction, data.slope_bounds.tile_side / (horizontal_length + 1e-9))
         k = min(count, k + max(1, int(skip_fraction * count)))

@@ -103,7 +103,7 @@ def score_path(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Evaluate a path (w, 3): add to a zeroed `VIOLATIONS` record and fill an `OBJECTIVES` record."""
+    """Evaluate a path (w, 3): fill a `VIOLATIONS` record of zeros and an `OBJECTIVES` record."""
     score_legs(data, limits, scratch, path, violations, objectives)
     score_ground(data, limits, scratch, path, violations)
     score_missiles(data, limits, scratch, path, violations, objectives)
@@ -119,19 +119,17 @@ def score_legs(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Add the violations of legs and turns, and fill the length ratio: the first part of `score_path`.
+    """Add the violations of legs and turns, and set the length ratio: the first part of `score_path`.
 
-    objectives: the kill exposure is set to 0 until `score_missiles`.
+    objectives: the kill exposure is set to 0; `score_missiles` sets it later.
 
     The other parts read the measurements that this part stores in `scratch`.
     """
-    legs, corners, flown_corners, extents, lags = (
-        scratch.legs,
-        scratch.corners,
-        scratch.flown,
-        scratch.extents,
-        scratch.lags,
-    )
+    legs = scratch.legs
+    corners = scratch.corners
+    flown_corners = scratch.flown
+    extents = scratch.extents
+    lags = scratch.lags
     aircraft = data.aircraft
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
@@ -151,7 +149,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Add the violations of the clearance below the legs: the second part of `score_path`."""
+    """Add the violations of the clearance along the legs: the second part of `score_path`."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -178,7 +176,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Add the exposure to missiles, and clearance violations of corners: the third part of `score_path`."""
+    """Set the exposure to missiles, and add the clearance violations of corners: the third part of `score_path`."""
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
@@ -241,10 +239,11 @@ def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, viol
 def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
     """Return the graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3).
 
-    The legs and the flown corners are scored along their whole length. Violations by `planner.plan.Violation`: rad and
-    100 m of leg; m per m; m x km; m. Objectives by `planner.plan.Objective`: length ratio, and kill exposure as the
-    mean density along the path times the paper's number of points, which is comparable with the paper's sum. Detection
-    and height stay 0: they would only decide between paths of exactly equal length.
+    The legs and the flown corners are scored along their whole length. The columns of the violations are those of
+    `planner.plan.Violation`, in rad and 100 m of leg; m per m; m x km; m. The columns of the objectives are those of
+    `planner.plan.Objective`. The kill exposure is the mean density along the path times the paper's number of points,
+    which makes it comparable with the paper's sum. Detection and height stay 0, because they would only decide between
+    paths of exactly the same length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path is read-only, which would compile another kernel.
@@ -254,7 +253,7 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
 @compiled
 def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, objectives: Records) -> None:
-    """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3)."""
+    """Fill the `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3)."""
     limits = precompute_limits(data)
     scratch = make_scratch(paths.shape[1])
     for n in range(paths.shape[0]):
@@ -265,8 +264,8 @@ def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, object
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:
     """Return the radius of the arc at waypoint i, m.
 
-    The radius is 0 if only a number limits turns and a leg is too short for its two turns. The ends have no arc.
-    `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
+    The radius is 0 at the ends. It is also 0 if turns are limited only by a maximum angle and a leg is too short for
+    its two turns. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):
@@ -291,10 +290,10 @@ def _measure_arcs(
     flown: Records,
     extents: Floats,
 ) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of a path's corners without tracking error.
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for a path's corners without tracking error.
 
-    The flown corner deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) -
-    1) plus the sagitta of a chord; it does so within the tangent and half the arc, or within the blend.
+    The flight deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) - 1)
+    plus the sagitta of a chord. It does so within the tangent and half the arc, or within the blend.
     """
     start, second = path[0], path[1]
     slope_out = (second[2] - start[2]) / max(legs[0].run, 1e-6)
@@ -329,7 +328,7 @@ def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, floa
 
 @inlined
 def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of a path's corners with tracking error."""
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) for a path's corners with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         excursion = corners[i].excursion
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, excursion
@@ -346,9 +345,9 @@ def _clearance_deficit(
     extra_height: float,
     vertices: Floats,
 ) -> float:
-    """Return the clearance deficit integrated along a flown turn `vertices` (k, 3), m x km.
+    """Return the clearance deficit along a flown turn `vertices` (k, 3), integrated, m x km.
 
-    extra_height: height in addition to the required clearance, m.
+    extra_height: height that is required in addition to the clearance, m.
     """
     total = 0.0
     for k in range(vertices.shape[0] - 1):
@@ -361,7 +360,7 @@ def _clearance_deficit(
 
 @inner
 def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
-    """Return the kill density times length along a flown corner (k, 3).
+    """Return the kill density times the length along a flown corner (k, 3).
 
     below, above: vertical tracking error, m.
     """

@@ -27,6 +27,7 @@ PATHS_PER_BLOCK = 128
 def _block_fields(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
     """Return the definitions of record fields that have one value for each path of a block.
 
+    names: names of the fields.
     kind: type of the values.
     names: names of the fields.
     """
@@ -73,7 +74,7 @@ def clear_sums(sums: Record) -> None:
 
 @inlined
 def copy_point(source: Record, target: Record, size: int) -> None:
-    """Copy one point of each path of a block into another record."""
+    """Copy a point of each path of a block into another record."""
     for b in range(size):
         target.east[b], target.north[b], target.up[b] = source.east[b], source.north[b], source.up[b]
         target.column[b], target.row[b] = source.column[b], source.row[b]
@@ -81,7 +82,7 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 @inlined
 def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
-    """Fill `out` with the step from one point of each path of a block to another."""
+    """Fill `out` with the vector from one point to another, for each path of a block."""
     for b in range(size):
         out.east[b] = end.east[b] - start.east[b]
         out.north[b] = end.north[b] - start.north[b]
@@ -92,7 +93,7 @@ def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
 
 @inlined
 def interpolate_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
-    """Fill `out` with the point of each path's leg at a fraction of the leg."""
+    """Fill `out` with the point at a fraction of a leg, for each path of a block."""
     for b in range(size):
         out.east[b] = start.east[b] + fraction * step.east[b]
         out.north[b] = start.north[b] + fraction * step.north[b]
@@ -103,17 +104,24 @@ def interpolate_legs(start: Record, step: Record, fraction: float, size: int, ou
 
 @inlined
 def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: int, size: int, block: Record) -> None:
-    """Fill waypoint i of each path of a block, and its pixel as `polymap` computes it.
+    """Fill waypoint i of each path of a block, and its raster pixel, as `polymap` computes it.
 
-    first_path, size: first path of the block, and number of its paths.
+    first_path: number of the first path of the block.
+    size: number of paths in the block.
     """
-    end, x, y, inner = block.end, block.x, block.y, block.inner
+    end = block.end
+    x = block.x
+    y = block.y
+    inner = block.inner
     east, north, up = end.east, end.north, end.up
     for b in range(size):
         east[b] = paths[first_path + b, i, 0]
         north[b] = paths[first_path + b, i, 1]
         up[b] = paths[first_path + b, i, 2]
-    centre_x, centre_y, half_x, half_y = to_pixel.centre_x, to_pixel.centre_y, to_pixel.half_x, to_pixel.half_y
+    centre_x = to_pixel.centre_x
+    centre_y = to_pixel.centre_y
+    half_x = to_pixel.half_x
+    half_y = to_pixel.half_y
     for b in range(size):
         x[b] = (east[b] - centre_x) / half_x
         y[b] = (north[b] - centre_y) / half_y
@@ -176,7 +184,7 @@ class PrecomputedLimits(NamedTuple):
 
 @inner
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
-    """Return the limits that hold for all paths of a problem."""
+    """Return limits that are the same for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
     slopes_by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
@@ -204,7 +212,7 @@ def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
 
     air_angles: (h,) flight-path angles relative to the air at the table's heights.
 
-    The slope over the ground is smallest with the strongest tailwind. The result is -1 if there is no such slope.
+    The slope over the ground is smallest in the strongest tailwind. The result is -1 if there is no such slope.
     """
     wind = max(wind_speed_at(data.aircraft, data.floor), wind_speed_at(data.aircraft, data.ceiling))
     speed, air_angle = data.aircraft.airspeed, math.inf
@@ -252,7 +260,7 @@ def _course_slope_limits(
 def slope_limits(data: ProblemArrays, start: Floats, end: Floats) -> tuple[float, float]:
     """Return the climb and dive limits of a leg, rad.
 
-    They are the smallest limits at three altitudes of the leg, minus the margin `angle_margin`.
+    Each limit is the smallest limit at three altitudes of the leg, minus the margin `angle_margin`.
     """
     dx, dy = end[0] - start[0], end[1] - start[1]
     horizontal_length = math.sqrt(dx * dx + dy * dy)
@@ -274,7 +282,7 @@ def slope_excess(
 
     ux, uy: unit vector along the leg's course.
     horizontal_length: m.
-    start_altitude, end_altitude: altitudes of its start and end, m.
+    start_altitude, end_altitude: altitudes of the leg's start and end, m.
 
     The excess is 0 within the limit.
     """
@@ -297,7 +305,10 @@ def slope_excess(
 
 @inlined
 def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the excess of the turn between two unit courses over the limit, rad; 0 within it (eq. 1-2)."""
+    """Return the excess of the turn between the unit courses u and v over its limit, rad (eq. 1-2).
+
+    The excess is 0 for a turn within the limit.
+    """
     dot = ux * vx + uy * vy
     if dot >= cos_max_turn or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
         return 0.0
@@ -320,7 +331,7 @@ def add_leg_violations(
     legs, corners: measurements of the path.
     by_amount: True to add the excess of each violation, False to add 1.
 
-    If `legs_hold_turns` is set, a leg that is too short for the turns at its two ends adds to the turn violations.
+    If `legs_hold_turns` is set, a leg that is too short for the turns at its ends adds to the turn violations.
     """
     # The order of these lines fixes the order of summation, and so the last digit.
     _add_turn_violations(data, limits, legs, by_amount, violations)
@@ -350,13 +361,16 @@ def add_leg_violations(
 def _add_turn_violations(
     data: ProblemArrays, limits: PrecomputedLimits, legs: Records, by_amount: bool, violations: Record
 ) -> None:
-    """Add turns that are too sharp, including those from and to prescribed end courses.
+    """Add the turns that are too sharp, including the turns from and to prescribed end courses.
 
     by_amount: True to add the excess, False to add 1.
     """
     max_turn, leg_count = data.max_turn, legs.shape[0]
     for i in range(1, leg_count):
-        ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
+        ux = legs[i - 1].east
+        uy = legs[i - 1].north
+        vx = legs[i].east
+        vy = legs[i].north
         violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
         if not math.isnan(end_course):
@@ -368,8 +382,14 @@ def _add_turn_violations(
 def _add_bounds_violations(
     data: ProblemArrays, path: Floats, corners: Records, by_amount: bool, violations: Record
 ) -> None:
-    """Add waypoints off the map (tracking error included), below the floor or above the ceiling (eq. 7)."""
-    west, east, south, north = data.west, data.east, data.south, data.north
+    """Add the waypoints that are off the map, below the floor or above the ceiling (eq. 7).
+
+    The tracking error at a waypoint counts for the map's edges.
+    """
+    west = data.west
+    east = data.east
+    south = data.south
+    north = data.north
     floor, ceiling = data.floor, data.ceiling
     for i in range(path.shape[0]):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
@@ -412,7 +432,7 @@ def _arc_slope_excess(
 ) -> float:
     """Return the excess of the slope of the arc at waypoint i over the aircraft's limits, m per m.
 
-    The limits are those on both courses of the corner.
+    The limits on both courses of the corner apply.
     """
     slope_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
@@ -428,9 +448,9 @@ def _arc_slope_excess(
 
 @inlined
 def _violation(excess: float, by_amount: bool) -> float:
-    """Return the score of an excess over a limit; 0 for no excess.
+    """Return the score of an excess over a limit; 0 if there is no excess.
 
-    by_amount: True for the excess itself, False for 1.
+    by_amount: True to return the excess itself, False to return 1.
     """
     if by_amount:
         return excess

@@ -45,7 +45,7 @@ POINTS_PER_LEG = 6
 
 
 def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Score paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
+    """Score paths (n, w, 3) at six points per leg and at the destination (eq. 1-11).
 
     Returns violations (n, 4) by `planner.plan.Violation`, and objectives (n, 4) by `planner.plan.Objective`.
     """
@@ -67,7 +67,7 @@ def _score_paths(
     violations: Records,
     objectives: Records,
 ) -> None:
-    """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
+    """Fill the `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
 
     scratch: a `BLOCK_SCRATCH` record (1,).
     legs, corners: scratch records of one path.
@@ -98,7 +98,7 @@ def _score_paths(
 
 @inlined
 def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
-    """Return True if turns and slopes have fixed limits, and no course is prescribed at the ends."""
+    """Return True if the limits of turns and slopes are constants, and no end course is prescribed."""
     has_free_courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
     return has_free_courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 
@@ -107,9 +107,9 @@ def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
-    """Fill the sums of `size` paths, from `first_path` on.
+    """Fill the sums of a block of `size` paths, which begins with `first_path`.
 
-    Each waypoint is mapped to the raster once; between waypoints a leg is taken as straight in pixels.
+    Each waypoint is mapped to the raster once. Between waypoints a leg is assumed to be straight in pixels.
     """
     leg_count = paths.shape[1] - 1
     clear_sums(block.sums)
@@ -133,13 +133,19 @@ def _score_block(
 
 @inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:
-    """Fill the ground height at the points, as `pixel_height` computes it."""
+    """Set the ground height at the points, as `pixel_height` computes it."""
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0
     point_column, point_row = block.point.column, block.point.row
-    index, us, vs, ground = block.index, block.u, block.v, block.ground
-    top_left, top_right, low_left, low_right = block.top_left, block.top_right, block.low_left, block.low_right
+    index = block.index
+    us = block.u
+    vs = block.v
+    ground = block.ground
+    top_left = block.top_left
+    top_right = block.top_right
+    low_left = block.low_left
+    low_right = block.low_right
     for b in range(size):
         # Points off the raster and NaN read an arbitrary pixel; the last loop sets them to NaN.
         column, row = point_column[b], point_row[b]
@@ -171,9 +177,12 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
 
 @inlined
 def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, block: Record) -> None:
-    """Add the points' terrain violations and heights above ground (eq. 5, 11)."""
+    """Add the terrain violations and the heights above ground of the points (eq. 5, 11)."""
     east, north, up = block.point.east, block.point.north, block.point.up
-    ground, required_height, below, height = block.ground, block.need, block.sums.below, block.sums.height
+    ground = block.ground
+    required_height = block.need
+    below = block.sums.below
+    height = block.sums.height
     for b in range(size):
         required_height[b] = required.clearance + required.buffer
     if not required.same_everywhere:
@@ -190,7 +199,7 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Find the list of units that may reach each point: fill its first entry and its length."""
+    """Find the list of units that may reach each point: set the list's first entry and its length."""
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
@@ -204,17 +213,20 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
         index[b] = cell_index if is_inside else outside_index
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
-        first_entry, entry_count, min_altitude, max_altitude = cell.first, cell.count, cell.lowest, cell.highest
+        first_entry = cell.first
+        entry_count = cell.count
+        min_altitude = cell.lowest
+        max_altitude = cell.highest
         first_entries[b] = first_entry
         entry_counts[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
 
 
 @inlined
 def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) -> None:
-    """Add kill and detection exposure of the points to the units found near them (eq. 9, 10).
+    """Add the kill and detection exposure of the points to the units near them (eq. 9, 10).
 
-    Round k takes the k-th unit of every list that has one. Within a round no branch depends on the contents of a list,
-    because branch prediction would fail.
+    Round k treats the k-th unit of every list that has one. Within a round no branch depends on the contents of a list,
+    because the processor could not predict it.
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
@@ -249,9 +261,12 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
-    """Add a leg's length, and count its slope and the turn into it if beyond their limits (eq. 1-4, 8)."""
+    """Add the length of a leg; count its slope, and the turn into it, if they exceed their limits (eq. 1-4, 8)."""
     climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
-    east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
+    east = block.step.east
+    north = block.step.north
+    up = block.step.up
+    runs = block.run
     east_before, north_before, run_before = block.east_before, block.north_before, block.run_before
     turns, slopes, lengths = block.sums.turns, block.sums.slopes, block.sums.length
     for b in range(size):
@@ -278,10 +293,16 @@ def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record
 
 @inlined
 def _add_bounds_violations(data: ProblemArrays, size: int, waypoints: Record, sums: Record) -> None:
-    """Count a waypoint that is off the map, below the floor or above the ceiling (eq. 7)."""
-    west, east, south, north = data.west, data.east, data.south, data.north
+    """Count the waypoints that are off the map, below the floor or above the ceiling (eq. 7)."""
+    west = data.west
+    east = data.east
+    south = data.south
+    north = data.north
     floor, ceiling = data.floor, data.ceiling
-    xs, ys, zs, outside_counts = waypoints.east, waypoints.north, waypoints.up, sums.outside
+    xs = waypoints.east
+    ys = waypoints.north
+    zs = waypoints.up
+    outside_counts = sums.outside
     for b in range(size):
         x, y, z = xs[b], ys[b], zs[b]
         is_outside = (x < west) | (x > east) | (y < south) | (y > north) | (z < floor) | (z > ceiling)

@@ -130,7 +130,7 @@ class ProblemArrays(NamedTuple):
 
 
 def threat_records(threats: Threats) -> Records:
-    """Return threats of a scenario as `THREAT` records (m,)."""
+    """Return the threats of a scenario as `THREAT` records (m,)."""
     records = np.zeros(len(threats.position), dtype=THREAT)
     for axis, name in enumerate(("east", "north", "up")):
         records[name] = threats.position[:, axis]
@@ -141,7 +141,7 @@ def threat_records(threats: Threats) -> Records:
 
 
 def sphere_records(threats: Records) -> Records:
-    """Return `SPHERE` records (m,) of `THREAT` records."""
+    """Return the spheres of `THREAT` records as `SPHERE` records (m,)."""
     spheres = np.zeros(len(threats), dtype=SPHERE)
     for name in ("east", "north", "up"):
         spheres[name] = threats[name]
@@ -155,7 +155,7 @@ def sphere_records(threats: Records) -> Records:
 
 
 def as_columns(records: Records) -> Floats:
-    """Return records (n,), whose fields are all float64, as a table (n, fields)."""
+    """Return records (n,) whose fields are all float64 as a table (n, fields)."""
     return records.view(np.float64).reshape(len(records), -1)
 
 
@@ -201,9 +201,9 @@ def required_clearance(data: ProblemArrays) -> RequiredClearance:
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
-    """Return the maximum height above ground as a required clearance.
+    """Return the maximum height above ground as a required clearance, for negated heights.
 
-    It applies to the negated heights of path and ground.
+    It applies if the heights of the path and the ground are both negated.
     """
     space = data.airspace
     return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
@@ -213,7 +213,7 @@ def required_headroom(data: ProblemArrays) -> RequiredClearance:
 def _make_required_clearance(
     data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
 ) -> RequiredClearance:
-    """Make a required clearance with buffers at both ends and away from them.
+    """Make a required clearance with different buffers at the two ends and away from them.
 
     clearance: height above ground, m.
     buffer, start_buffer, destination_buffer: additional heights away from the ends and at them, m.
@@ -238,9 +238,9 @@ def _make_required_clearance(
 
 @inlined
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:
-    """Return the required height above ground at a point, m.
+    """Return the required height above ground at a position, m.
 
-    The buffer grows with the distance from an end that has less than the full buffer.
+    If an end has less than the full buffer, the buffer grows with the distance from this end.
     """
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
     # reduces it.
@@ -307,7 +307,7 @@ class Problem:
 def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Problem:
     """Make the planning problem of a scenario.
 
-    attempt: number of searches that have failed; each increases the clearance of the next.
+    attempt: number of searches that have already failed; each failure increases the clearance of the next search.
 
     Raises ScenarioError if no path can be planned in the scenario.
     """
@@ -350,7 +350,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
 
 
 def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> ProblemArrays:
-    """Return the arrays with the margins of the certificate."""
+    """Return the arrays of a problem with the margins of the certificate."""
     threats = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = zero_tracking_error() if limits.tracking is None else limits.tracking.record
@@ -400,7 +400,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 def _search_airspace(
     scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
 ) -> PlannerAirspace:
-    """Return the airspace with the margins of a search."""
+    """Return the airspace of a scenario with the margins of a search."""
     buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + up
     margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN_M, buffer + limits.reserve_threats, 1.0)
     return make_airspace(
@@ -409,9 +409,10 @@ def _search_airspace(
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
-    """Return the zone margins (m), changed by the scenario's `zone_margin_m`.
+    """Return the margins to zones (m), which the scenario's `zone_margin_m` may change.
 
-    It changes horizontal margins, and may increase vertical margins, but never reduces them.
+    `zone_margin_m` changes the horizontal margin by its difference from `CERTIFIED_ZONE_MARGIN_M`. An increase also
+    applies to the vertical margin, a reduction does not.
     """
     requested_margin = scenario.planner.zone_margin_m
     extra_margin = 0.0 if requested_margin is None else requested_margin - CERTIFIED_ZONE_MARGIN_M
@@ -419,9 +420,9 @@ def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fr
 
 
 def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
-    """Return the largest margin of a search to a limit of the height above ground, m.
+    """Return the largest possible margin of a search to a limit of the height above ground, m.
 
-    certified_margin: margin of the certificate to this limit, m.
+    certified_margin: margin of the certificate to the same limit, m.
 
     The margin is inf without a maximum height.
     """
@@ -431,7 +432,7 @@ def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
 
 
 def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Return the aircraft's performance, reduced for turbulence and to the autopilot's vertical rates."""
+    """Return the aircraft's performance, reduced for turbulence and limited to the autopilot's vertical rates."""
     slope_fraction, tracking = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
@@ -443,7 +444,7 @@ def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return the growth of the buffer with the distance from an end that the aircraft can follow, m per m."""
+    """Return how much the buffer may grow with the distance from an end, m per m, so that the aircraft can follow."""
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH_RATIO
     slopes = [
@@ -455,7 +456,7 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
 
 
 def _map_edges(bounds: Floats) -> dict[str, float]:
-    """Return the edges of a map with these bounds (2, 2), by name."""
+    """Return the edges of a map with some bounds (2, 2), by name."""
     (west, east), (south, north) = bounds.tolist()
     return {"west": west, "east": east, "south": south, "north": north}
 
@@ -466,9 +467,9 @@ def _none_to_nan(value: float | None) -> float:
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
-    """Return the clearance buffer at a fixed end, m.
+    """Return the buffer of the clearance at a fixed end, m.
 
-    It is the full buffer, or a fraction of the height available there if that is too little.
+    It is the full buffer. If the end is too low for the full buffer, it is a fraction of the available height.
     """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     available_height = height_above_ground - limits.min_clearance - 0.01
@@ -476,7 +477,7 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
-    """Return upper bounds on the slope of the whole terrain, and of each tile with its neighbours."""
+    """Return upper bounds on the terrain's slope: of the whole terrain, and of each tile with its neighbours."""
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     max_slope = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.
@@ -488,7 +489,7 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _fill_unknown_ground(data: ProblemArrays, terrain: Terrain) -> ProblemArrays:
-    """Return the arrays with ground up to the ceiling where the ground is unknown, so that a search leads around it.
+    """Return the arrays with unknown ground replaced by ground up to the ceiling, which a search avoids.
 
     The certificate reads the terrain without this ground.
     """
@@ -504,7 +505,7 @@ def _fill_unknown_ground(data: ProblemArrays, terrain: Terrain) -> ProblemArrays
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
-    """Return the arrays with a smaller area and height range, which still include both fixed ends.
+    """Return the arrays with a smaller area and a smaller range of altitudes, which include both fixed ends.
 
     lateral: margin to the edges of the map, m.
     height: margin to floor and ceiling, m.
@@ -522,7 +523,7 @@ def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemA
 
 
 def _make_space(scenario: Scenario, data: ProblemArrays) -> Space:
-    """Return the search space; its altitudes begin at the minimum altitude that the ground allows."""
+    """Return the search space, whose lowest altitude is the lowest altitude that the ground allows."""
     lowest_end = min(scenario.start[2], scenario.destination[2])
     min_height = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), lowest_end)
     max_height = max(data.ceiling, min_height + 1.0)

@@ -41,7 +41,7 @@ def _remaining_fraction(lengths: float) -> float:
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:
-    """Return the distance (m) that the aircraft covers over the ground during the altitude lag.
+    """Return the distance over the ground that the aircraft covers during its altitude lag, m.
 
     east, north: unit course.
     """
@@ -58,7 +58,7 @@ def lag_length(
 def set_lag(
     tracking: Record, length: float, horizontal_length: float, altitude_change: float, below: float, lag: Record
 ) -> float:
-    """Fill the `HEIGHT_LAG` record of a leg, and return the distance of the aircraft below its end, m.
+    """Fill the `HEIGHT_LAG` record of a leg; return the distance of the aircraft below the leg's end, m.
 
     length: lag length (`lag_length`), m.
     horizontal_length, altitude_change: horizontal length and altitude change of the leg, m.
@@ -78,7 +78,7 @@ def set_lag(
 def compute_height_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:
-    """Compute how far the aircraft lags in height on each leg of a path (w, 3), from no lag at its start.
+    """Compute how far the altitude of the aircraft lags on each leg of a path (w, 3), without a lag at its start.
 
     lags: `HEIGHT_LAG` records to fill, (w - 1,).
     """
@@ -141,29 +141,25 @@ def _take_sample(
     altitude_change: float,
     min_step: float,
 ) -> tuple[float, float]:
-    """Return the height above the required clearance at a point of a line, m, and the next step.
+    """Return the height above the required clearance at a point of a line, m, and the step to the next point.
 
     tiles, tile_side: see `SlopeBounds`.
     growth: see `RequiredClearance`.
     required_height: required clearance, m.
-    max_further_height: largest further requirement elsewhere on the line, m.
+    max_further_height: largest height that is required in addition elsewhere on the line, m.
     horizontal_length, altitude_change: horizontal length and altitude change of the whole line, m.
     min_step: minimum spacing of samples, as a fraction of the line.
 
-    The step leads to the next sample that is needed, as a fraction of the line.
+    The step leads to the next point that has to be sampled. It is a fraction of the line.
     """
     ground = pixel_height(heights, column, row)
     excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH_M
-    i, j = (
-        min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1),
-        min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1),
-    )
+    i = min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1)
+    j = min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
     max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * horizontal_length + abs(altitude_change) + 1e-9
-    next_step, tile_step = (
-        (excess_height - max_further_height - NEAR_GROUND_HEIGHT_M) / max_fall,
-        tile_side / (horizontal_length + 1e-9),
-    )
+    next_step = (excess_height - max_further_height - NEAR_GROUND_HEIGHT_M) / max_fall
+    tile_step = tile_side / (horizontal_length + 1e-9)
     next_step = next_step if next_step < tile_step else tile_step
     return excess_height, next_step if next_step > min_step else min_step
 
@@ -183,9 +179,9 @@ def terrain_excess(
     bz: float,
     max_excess: float,
 ) -> float:
-    """Return the depth below the required clearance along a-b, summed over samples, m x km.
+    """Return the depth below the required clearance along the line a-b, summed over samples, m x km.
 
-    extra_height: additional height required here, m.
+    extra_height: additional height that is required on this line, m.
     ends: columns and rows of a and b.
     max_excess: value beyond which the sum ends.
     """
@@ -261,13 +257,14 @@ def sample_terrain(
     terrain_legs: Records,
     unfinished: Ints,
 ) -> None:
-    """Fill the `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths and smallest heights of its legs.
+    """Fill the `TERRAIN_LEG` record of each leg of a path (w, 3): its depth and its smallest heights.
 
-    extents: (w,) distance within which a point is near a waypoint, m. unfinished: (w - 1,) scratch.
+    extents: (w,) distance within which a point is near a waypoint, m.
+    unfinished: (w - 1,) scratch.
 
-    Depths and heights are relative to the required clearance. Smallest heights are exact up to `NEAR_GROUND_HEIGHT_M`;
-    above that they are lower bounds. Legs take turns, one sample each: the next sample of a leg depends on the result
-    of its last one.
+    Depths and heights are measured from the required clearance. The smallest heights are exact up to
+    `NEAR_GROUND_HEIGHT_M`, and lower bounds above it. The legs are sampled in turn, because the next sample of a leg
+    depends on the result of its last one and the processor would have to wait for it.
     """
     count = legs.shape[0]
     _start_sampling(to_pixel, required.sample_spacing, path, legs, extents, terrain_legs)
@@ -305,10 +302,8 @@ def sample_terrain(
                 min_step,
             )
             leg.depth -= excess_height if excess_height < 0.0 else 0.0
-            gap_at_beginning, gap_at_end = (
-                excess_height if fraction <= leg.beginning else math.inf,
-                excess_height if fraction >= leg.ending else math.inf,
-            )
+            gap_at_beginning = excess_height if fraction <= leg.beginning else math.inf
+            gap_at_end = excess_height if fraction >= leg.ending else math.inf
             leg.height_at_beginning = (
                 gap_at_beginning if gap_at_beginning < leg.height_at_beginning else leg.height_at_beginning
             )

@@ -57,7 +57,7 @@ class ThreatCells(NamedTuple):
 
 
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
-    """List, for each cell of a grid, the units whose sphere meets the cell, seen from above.
+    """List, for each cell of a grid on the map, the units whose sphere reaches above or below the cell.
 
     position: (m, 3) positions of the units.
     radius: (m,) radii of the spheres, m; 0 for none.
@@ -89,7 +89,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the records of cells: their part of the list of units, and the altitude range of these units."""
+    """Fill the records of the cells: their part of the list of units, and the altitude range of these units."""
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
@@ -236,10 +236,12 @@ def kill_density(
     below: float,
     above: float,
 ) -> tuple[float, float, float]:
-    """Return the mean kill density over the segment a-b, and the distances to spheres near both ends, m.
+    """Return the mean kill density over the segment a-b, and the distances to spheres near its ends, m.
 
-    margin: distance added to the radii, m. max_distance: a returned distance is exact if it is below this, m.
-    length_a, length_b: lengths at a and b from which the distances are measured; below, above: vertical error, m.
+    margin: distance that is added to the radii, m.
+    max_distance: a returned distance is exact if it is below this, m.
+    length_a, length_b: lengths at a and at b on which the distances are measured, m.
+    below, above: vertical tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -263,10 +265,8 @@ def kill_density(
             )
             x, end_x = ax + begin_fraction * dx - missile_class.west, ax + end_fraction * dx - missile_class.west
             x, end_x = (x, end_x) if x < end_x else (end_x, x)
-            first_column, last_column = (
-                _cell_index((x - radius) * per_metre, columns),
-                _cell_index((end_x + radius) * per_metre, columns),
-            )
+            first_column = _cell_index((x - radius) * per_metre, columns)
+            last_column = _cell_index((end_x + radius) * per_metre, columns)
             if last_column < 0 or first_column >= columns:
                 continue
             row_start = missile_class.first_cell + row * columns
@@ -287,10 +287,8 @@ def kill_density(
                     end_a, begin_b = length_a / max(length, length_a), 1.0 - length_b / max(length, length_b)
                     distance2_a = _closest2(-along * inverse, 0.0, end_a, along, start2, length2)
                     distance2_b = _closest2(-along * inverse, begin_b, 1.0, along, start2, length2)
-                    distance_a, distance_b = (
-                        min(distance_a, math.sqrt(distance2_a) - grown_radius),
-                        min(distance_b, math.sqrt(distance2_b) - grown_radius),
-                    )
+                    distance_a = min(distance_a, math.sqrt(distance2_a) - grown_radius)
+                    distance_b = min(distance_b, math.sqrt(distance2_b) - grown_radius)
                     if closest2 < grown_radius * grown_radius:
                         density += _sphere_density(along, start2, length2, grown_radius, missile.scale)
     return density, distance_a, distance_b
@@ -298,7 +296,7 @@ def kill_density(
 
 @inlined
 def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, float]:
-    """Sort two fractions along a line, and intersect the interval between them with [0, 1].
+    """Sort two fractions of a line, and intersect the interval between them with [0, 1].
 
     The first result exceeds the second if the interval lies off the line.
     """
@@ -310,7 +308,9 @@ def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, 
 
 @inlined
 def _shift_towards_missile(z: float, altitude_change: float, below: float, above: float) -> float:
-    """Return the height of a segment's start above a missile, shifted towards it by the tracking error, m.
+    """Return the height of a segment's start above a missile, reduced by the tracking error, m.
+
+    The segment is shifted towards the missile by up to the tracking error.
 
     altitude_change: altitude change of the segment up to its closest point, m.
     """
@@ -333,7 +333,7 @@ def _cell_index(position: float, count: int) -> int:
 def _closest2(
     closest_fraction: float, begin_fraction: float, end_fraction: float, along: float, start2: float, length2: float
 ) -> float:
-    """Return the squared distance from a point to the part of a segment between two fractions.
+    """Return the squared distance from a point to the part of a segment between two fractions, m^2.
 
     closest_fraction: fraction of the infinite line that is closest to the point.
     along, start2, length2: see `window_exposure`.

@@ -124,7 +124,7 @@ def make_travel_cost(
     """Make the cost function of an objective, in equivalent metres.
 
     The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
-    Returns None for energy if the aircraft's power is unknown.
+    Returns None for the objective energy if the aircraft's power is unknown.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -145,8 +145,9 @@ def make_time_cost(table: PerformanceTable, winds: WindGrid = NO_WINDS) -> Trave
 def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGrid = NO_WINDS) -> TravelCost | None:
     """Return the cost of a path's energy, in m of level flight in still air; None if power is unknown.
 
-    Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full throttle.
-    At heights without level flight, it is the power at the nearest height with level flight.
+    The power is that of `Envelope.power`: a parabola through idle at the steepest descent, level flight, and full
+    throttle. At a height at which level flight is impossible, the power at the nearest height with level flight
+    applies.
     """
     rows = np.array([_power_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
     is_known = np.isfinite(rows).all(axis=1)
@@ -160,9 +161,10 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable, winds: WindGri
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Return the parabola of power over the sine of the climb angle, and the bounds of this sine.
+    """Return the parabola of power over the sine of the climb angle, and the limits of this sine.
 
-    The result is level, linear, square, min_sine and max_sine of `TravelCost`. All are NaN if power is unknown.
+    The result has the fields level, linear, square, min_sine and max_sine of `TravelCost`. All are NaN if the power is
+    unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -191,9 +193,9 @@ class LegTime(NamedTuple):
 
 @inner
 def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
-    """Return the time of a leg in wind: the smaller positive T with |d - w T| = V T.
+    """Return the time of a leg d in wind w: the smaller positive T with |d - w T| = V T.
 
-    dx, dy, dz: the leg d, m.
+    dx, dy, dz: vector d of the leg, m.
     wind_east, wind_north, airspeed: wind w and airspeed V, m/s.
 
     T solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
@@ -231,7 +233,10 @@ class _FlightConditions(NamedTuple):
 
 @inner
 def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return the wind of a grid at a place, m/s, east and north, trilinear; beyond the grid, that at its edge."""
+    """Return the wind of a grid at a place, m/s, east and north, by trilinear interpolation.
+
+    Beyond the grid the wind at its edge applies.
+    """
     velocities = winds.velocities
     place_x = min(velocities.shape[0] - 1.0, max(0.0, (x - winds.first[0]) / winds.step[0]))
     place_y = min(velocities.shape[1] - 1.0, max(0.0, (y - winds.first[1]) / winds.step[1]))
@@ -250,7 +255,7 @@ def _interpolate_wind(winds: WindGrid, x: float, y: float, z: float) -> tuple[fl
 
 @inner
 def _conditions_at(travel: TravelCost, table: PerformanceTable, x: float, y: float, amsl: float) -> _FlightConditions:
-    """Return the airspeed, the wind and the power coefficients at a place, world m and m AMSL."""
+    """Return the airspeed, the wind and the power coefficients at a place (x, y on the map, m, and m AMSL)."""
     airspeed = true_airspeed(table, amsl)
     if travel.winds.velocities.size == 0:
         (wx, wy), wind_speed = downwind_vector(table), wind_speed_at(table, amsl)
@@ -287,7 +292,7 @@ def _time_energy_cost(
     y: float,
     amsl: float,
 ) -> tuple[float, bool]:
-    """Return the cost of time and energy of a leg in the wind of one place, and True if the leg is flyable."""
+    """Return the cost of time and energy of a leg in the wind of one place; and True if it can be flown."""
     dx, dy, dz = leg
     conditions = _conditions_at(travel, table, x, y, amsl)
     time = leg_time(dx, dy, dz, conditions.wind_east, conditions.wind_north, conditions.airspeed)
@@ -304,7 +309,7 @@ def _time_energy_cost(
 def leg_cost(
     travel: TravelCost, table: PerformanceTable, start: NDArray[np.float64], end: NDArray[np.float64]
 ) -> float:
-    """Return the cost of a leg; inf if it is not flyable."""
+    """Return the cost of a leg; inf if the leg cannot be flown."""
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
     if travel.time == 0.0 and travel.energy == 0.0:
@@ -321,7 +326,7 @@ def leg_cost(
 
 @compiled
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:
-    """Return the cost of a path (w, 3) world m, the sum over its legs; inf if a leg is not flyable.
+    """Return the cost of a path (w, 3), m: the sum over its legs; inf if a leg cannot be flown.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -344,10 +349,11 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, finite for any leg; fill its derivatives and curvature by the leg's ends.
+    """Return the cost of a leg, which is always finite; fill its derivatives with respect to the leg's ends.
 
-    The curvature is the sum of the curvatures of the length, of the time at each height, and of the power, all convex;
-    the coupling of height and course is omitted, so that the matrix has no negative eigenvalue.
+    The curvature (second derivative) is filled, too. It is the sum of the curvatures of the length, of the time at each
+    height, and of the power, which are all convex. The coupling of height and course is omitted, so the matrix has no
+    negative eigenvalue.
     """
     slopes, curvature = model.slopes, model.curvature
     slopes[:], curvature[:] = 0.0, 0.0
@@ -372,7 +378,10 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
         conditions = _conditions_at(travel, table, x, y, amsl)
         time = leg_time(dx, dy, dz, conditions.wind_east, conditions.wind_north, conditions.airspeed)
         # The cost is time x rate, plus a cost per metre of climb.
-        rate, climb_cost, power_curvature, timed_cost = travel.time, 0.0, 0.0, travel.time * time.seconds
+        rate = travel.time
+        climb_cost = 0.0
+        power_curvature = 0.0
+        timed_cost = travel.time * time.seconds
         if travel.energy != 0.0:
             sine = dz / (conditions.airspeed * time.seconds)
             is_interior = conditions.min_sine < sine < conditions.max_sine
@@ -408,11 +417,13 @@ def _add_place_model(
     timed_cost: float,
     model: LegModel,
 ) -> None:
-    """Add the slopes and the curvature of a leg's cost by the place at which its wind and power are taken.
+    """Add the derivatives of a leg's cost with respect to the place at which its wind and power are taken.
 
-    start, step: start of the leg, and the leg, m.
-    fraction: the place's fraction of the leg.
-    weight, timed_cost: the place's weight in the cost of the leg, and the leg's cost of time and energy there.
+    start: start of the leg, m.
+    step: vector of the leg, m.
+    fraction: fraction of the leg at which the place lies.
+    weight: weight of the place in the cost of the leg.
+    timed_cost: cost of time and energy of the leg in the wind of the place.
     """
     x, y, amsl = start[0] + fraction * step[0], start[1] + fraction * step[1], start[2] + fraction * step[2]
     # A forecast changes wind on each axis, the mean profile only with altitude.
@@ -432,7 +443,7 @@ def _add_place_model(
 
 @inner
 def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, float], length: float) -> Floats:
-    """Fill in the Hessian (3, 3) of a leg's length with respect to its displacement (east, north, up)."""
+    """Fill the Hessian (3, 3) of a leg's length with respect to the leg's vector (east, north, up)."""
     for axis in range(3):
         for other_axis in range(3):
             identity = 1.0 if axis == other_axis else 0.0
@@ -445,7 +456,7 @@ def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, floa
 def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions) -> None:
     """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D.
 
-    Here g is the gradient of the time, w the wind, V the airspeed and D as in `leg_time`.
+    Here g is the gradient of the time, w is the wind, V is the airspeed, and D is as in `leg_time`.
     """
     wind = (conditions.wind_east, conditions.wind_north, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)
@@ -468,9 +479,9 @@ def _add_step_model(
     gradient: tuple[float, float, float],
     slope_factor: float,
 ) -> None:
-    """Add a leg's curvature and gradient, given with respect to its step, to the arrays for its two ends.
+    """Add a leg's curvature and gradient, given with respect to its vector, to the arrays for its two ends.
 
-    The step is the end minus the start, so the gradient with respect to the start has the opposite sign.
+    The vector is the end minus the start, so the gradient with respect to the start has the opposite sign.
     """
     for axis in range(3):
         slopes[0, axis] -= slope_factor * gradient[axis]

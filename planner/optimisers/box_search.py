@@ -40,7 +40,7 @@ class BoxSearch(ABC):
         self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
-        """Return the samples to score, (n, d), which are inside the box."""
+        """Return the samples to score, (n, d); they are inside the box."""
         return self._pending_samples
 
     @abstractmethod

@@ -34,7 +34,7 @@ class DifferentialEvolution(BoxSearch):
     _generation = 0
 
     def tell(self, scores: Floats) -> None:
-        """Process the scores (n, c) of the trial vectors, select the survivors, and make new trial vectors."""
+        """Process the scores (n, c) of the last trial vectors, select the survivors, and make new trial vectors."""
         if not len(self.scores):
             self.samples, self.scores = self._pending_samples.copy(), np.array(scores)
         else:
@@ -47,12 +47,12 @@ class DifferentialEvolution(BoxSearch):
         self._pending_samples = self._trial_vectors(self._target_rows())
 
     def _target_rows(self) -> Ints:
-        """Return the rows that this generation challenges: the two halves of the population take turns."""
+        """Return the rows that this generation challenges; the two halves of the population alternate."""
         count = len(self.samples)
         return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)
 
     def _trial_vectors(self, rows: Ints) -> Floats:
-        """Return trial vectors: a + F (b - c) in most variables, and the target's own value in the others."""
+        """Return a trial vector for each row: a + F (b - c) in most variables, the row's own value in the others."""
         count, size = self.samples.shape
         parent_rows = self._rng.integers(0, count, (3, rows.size))
         a, b, c = (self.samples[index] for index in parent_rows)

@@ -31,7 +31,10 @@ class Emna(Umda):
     """
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples of the maximum-likelihood Gaussian (1/N), redrawn and finally clipped to the box."""
+        """Draw samples of the maximum-likelihood Gaussian (1/N).
+
+        Samples outside the box are drawn again, and finally clipped to the box.
+        """
         mean = self.samples.mean(axis=0)
         # Scaled to the box, so that the regularisation suits variables of different units.
         width = self.upper - self.lower

@@ -101,7 +101,7 @@ class FrontSampling:
         self.objectives: Floats = np.empty((0, reference.size))
 
     def ask(self) -> Floats:
-        """Draw samples (population, d): solutions of the archive, randomly displaced and clipped to the box."""
+        """Draw samples (population, d): solutions of the archive with random displacements, clipped to the box."""
         mean_rows = self._rng.integers(len(self.vectors), size=self._population)
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[mean_rows]
@@ -112,7 +112,7 @@ class FrontSampling:
         return np.clip(samples, self._lower, self._upper)
 
     def _draw_near_displacements(self, mean_rows: Ints) -> Floats:
-        """Draw displacements (n, d) with the covariance of the solutions nearest to each mean.
+        """Draw displacements (n, d) with the covariance of the solutions that are nearest to each mean.
 
         mean_rows: (n,) rows of the means in the archive.
 
@@ -134,7 +134,7 @@ class FrontSampling:
         return displacements
 
     def _draw_block_displacements(self, mean_rows: Ints) -> Floats:
-        """Draw displacements (n, d) of a block of points towards their positions in another solution."""
+        """Draw displacements (n, d) that move a block of points towards its position in another solution."""
         rng, count, point_count = self._rng, len(mean_rows), self._lower.size // self._axes
         other_rows = rng.integers(len(self.vectors), size=count)
         block_lengths = rng.integers(1, point_count + 1, size=count)
@@ -150,9 +150,9 @@ class FrontSampling:
         return np.asarray(fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[mean_rows]))
 
     def _draw_noise(self, scales: Floats) -> Floats:
-        """Draw noise (n, d) along a few directions per sample.
+        """Draw noise (n, d) along a few directions for each sample.
 
-        scales: (n, 1) scales of the samples, which a random factor per sample multiplies.
+        scales: (n, 1) scale of each sample; a random factor multiplies it.
         """
         rng, count, direction_count = self._rng, len(scales), len(self._directions)
         directions_per_sample = min(MAX_DIRECTIONS, direction_count)
@@ -170,7 +170,7 @@ class FrontSampling:
 
         vectors: (n, d) samples.
         objectives: (n, m).
-        violations: (n, c), all 0 if the constraints are met.
+        violations: (n, c), all 0 for a sample that meets the constraints.
         """
         feasible_rows = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
         is_in_archive = np.zeros(len(vectors), dtype=bool)
@@ -178,10 +178,8 @@ class FrontSampling:
             values = np.concatenate([self.objectives, objectives[feasible_rows]])
             archive_rows = self._archive_rows(values)
             is_in_archive[feasible_rows[archive_rows[archive_rows >= len(self.vectors)] - len(self.vectors)]] = True
-            self.vectors, self.objectives = (
-                np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows],
-                values[archive_rows],
-            )
+            self.vectors = np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows]
+            self.objectives = values[archive_rows]
         kinds, self._kinds = self._kinds, np.empty(0, dtype=np.int64)
         for kind in np.unique(kinds):
             should_grow = is_in_archive[kinds == kind].mean() > TARGET_SUCCESS

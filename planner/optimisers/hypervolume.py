@@ -52,12 +52,14 @@ def _non_dominated(points: Floats) -> Floats:
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Return up to `count` rows of points (n, m) below a reference (m,), in the order of a greedy choice.
+    """Return up to `count` rows of points (n, m) in the order of a greedy choice.
 
-    rng: draws the probes; None for the same probes in every call.
+    reference: (m,) upper limit of the points.
+    rng: random generator of the probes; None for the same probes in every call.
 
-    The best point of each objective comes first. Each further point adds most to the covered volume, counted at random
-    probes between the points' best values and the reference. Points that add nothing come last, in their order.
+    The best point of each objective comes first. Each further point is the one that adds most to the covered volume.
+    The volume is counted at random probes between the best values of the points and the reference. Points that add
+    nothing come last, in their original order.
 
     >>> front = np.array([[0.0, 9.0], [9.0, 0.0], [4.0, 4.0], [4.1, 4.1]])
     >>> covering_order(front, np.array([10.0, 10.0]), 3).tolist()
@@ -97,11 +99,11 @@ def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
 
 @compiled
 def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
-    """Return `count` rows of marks (n, p): `first_rows`, then each time the row with most new probes.
+    """Return `count` rows of marks (n, p): `first_rows`, then repeatedly the row with most new probes.
 
-    Among equal rows, the first is chosen. The gain of a row only decreases as others are chosen. Its last count is
-    therefore an upper bound, and few rows are counted again (Minoux, Optimization Techniques, Lecture Notes in Control
-    and Information Sciences 7, 1978).
+    Of equal rows, the first is chosen. The gain of a row can only decrease when other rows are chosen. Its last count
+    is therefore an upper bound, and only few rows have to be counted again (Minoux, Optimization Techniques, Lecture
+    Notes in Control and Information Sciences 7, 1978).
     """
     size, width = marks.shape
     uncovered, count_positions, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)

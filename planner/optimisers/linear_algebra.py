@@ -64,7 +64,7 @@ def multiply_by_lower(rows: Floats, factor: Floats) -> Floats:
 
 @compiled
 def multiply_by_sparse(rows: Floats, basis: Floats) -> Floats:
-    """Multiply rows (n, d) by a basis (d, k) whose entries are mostly 0."""
+    """Multiply rows (n, d) by a basis (d, k) that consists mostly of zeros."""
     columns = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
     for k in range(basis.shape[1]):
@@ -83,9 +83,10 @@ def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
 
 @inner
 def band_cholesky(matrix: Floats, out: Floats) -> None:
-    """Fill `out` with the lower Cholesky factor of a positive definite band matrix, both stored as (d, b).
+    """Fill `out` with the lower Cholesky factor of a positive definite band matrix.
 
-    Entry [i, k] of both belongs to row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
+    Both are stored as (d, b); entry [i, k] belongs to row i and column i - k. A pivot is at least 1e-12 times the
+    diagonal entry.
     """
     size, width = matrix.shape
     for i in range(size):
@@ -100,7 +101,7 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:
 def solve_band(factor: Floats, right_side: Floats, out: Floats) -> None:
     """Fill `out` (d,) with the solution of a linear system.
 
-    factor: band factor of the matrix, as `band_cholesky` computes it.
+    factor: factor of the band matrix, as `band_cholesky` computes it.
     right_side: (d,).
     """
     size, width = factor.shape

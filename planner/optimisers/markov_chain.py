@@ -38,7 +38,10 @@ class MarkovChain(Umda):
     GROUP = 3
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples group by group, each conditional on the previous group; redraw those outside the box."""
+        """Draw samples group by group, each group conditional on the previous group.
+
+        Samples outside the box are drawn again.
+        """
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
         slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, VARIANCE_RIDGE)
@@ -86,7 +89,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
 
 @compiled
 def draw_chain(normals: Floats, slope: Floats, spread: Floats) -> Floats:
-    """Return samples of the chain, (n, d), computed from independent standard normal numbers (n, d).
+    """Return samples of the chain, (n, d), made of independent standard normal numbers (n, d).
 
     slope, spread: results of `fit_chain`.
     """

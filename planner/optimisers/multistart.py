@@ -82,7 +82,7 @@ class Gaussian:
 
     @property
     def width(self) -> float:
-        """Root mean square of the variables' standard deviations, as a fraction of the box."""
+        """Root mean square of the standard deviations of the variables, as a fraction of the box."""
         return self.deviation * math.sqrt(float(np.diag(self._matrix).mean()))
 
     def draw(self, rng: np.random.Generator) -> Floats:
@@ -91,7 +91,7 @@ class Gaussian:
         return reflect_into_box(self.mean + self.deviation * multiply_by_lower(self._draws, self._factor))
 
     def update(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
-        """Update the Gaussian by the scores (n, c) of its last generation (n, d).
+        """Update the Gaussian with the scores (n, c) of its last generation (n, d).
 
         noise: (n,) random numbers that break ties.
         """
@@ -123,7 +123,7 @@ class Gaussian:
         )
 
     def _update_distribution(self, draws: Floats) -> None:
-        """Update mean, deviation and covariance by the normal draws (m, d) of the better half, best first."""
+        """Update mean, deviation and covariance with the normal draws (m, d) of the better half, best first."""
         self._generations += 1
         steps = multiply_by_lower(draws, self._factor)
         mean_draw, mean_step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
@@ -211,7 +211,7 @@ class Multistart(BoxSearch):
         self._draw_generation(self._search)
 
     def _store_generation(self, points: Floats, scores: Floats) -> None:
-        """Store a generation, best first, after the best sample of all."""
+        """Store a generation, best first, behind the best sample of all."""
         if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
             points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
         self.samples, self.scores = points, scores
@@ -228,17 +228,17 @@ class Multistart(BoxSearch):
         )
 
     def _next_search(self, search: Gaussian) -> Gaussian:
-        """Return the search that gets the next slice of evaluations, after a slice of `search`."""
+        """Return the search that gets the next slice of evaluations after a slice of `search`."""
         self._spent_evaluations[self._is_continued] += search.evaluations - self._slice_start
         next_search = search if self._may_continue(search) else self._choose_search()
         self._slice_start = next_search.evaluations
         return next_search
 
     def _may_continue(self, search: Gaussian) -> bool:
-        """Return True if a search may get another slice at once.
+        """Return True if a search may get another slice of evaluations at once.
 
-        It must be among the better half of the searches that have reached the same width, compared by their results at
-        that width. The best search of all waits for its turn, so that half of the evaluations go to others.
+        It must be in the better half of the searches that have reached the same width, by their results at that width.
+        The best search of all has to wait for its turn, so that half of the evaluations go to other searches.
         """
         if search.best is None:
             return False
@@ -262,7 +262,7 @@ class Multistart(BoxSearch):
         return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow_scores)
 
     def _choose_search(self) -> Gaussian:
-        """Return the best waiting search or a new one, whichever kind has had fewer evaluations."""
+        """Return the best waiting search, or a new search if new searches have had fewer evaluations."""
         waiting_searches = [search for search in self._searches if search.curve and not search.is_done]
         self._is_continued = bool(waiting_searches) and self._spent_evaluations[True] <= self._spent_evaluations[False]
         if self._is_continued:
@@ -272,7 +272,7 @@ class Multistart(BoxSearch):
         return self._start_search()
 
     def _start_search(self) -> Gaussian:
-        """Start a search: the first from the centre with a typical width, later ones with a random width."""
+        """Start a search: the first one at the centre with a typical width, later ones with a random width."""
         size = self.lower.size
         min_population = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:

@@ -56,8 +56,8 @@ class NicheSampling:
     def first(self, count: int, extension: Floats | float = 0.0) -> Floats:
         """Draw samples (g, count, d), uniform in the boxes.
 
-        extension: (d,) fraction of the box by which samples extend above it before they are clipped, for variables with
-        their best values at the upper bound, which uniform samples would hardly ever reach.
+        extension: (d,) fraction of the box by which samples may exceed its upper bound before they are clipped. It is
+            for variables whose best value is at the upper bound, which uniform samples would hardly ever reach.
         """
         size = (len(self._lower), count, self._lower.shape[1])
         extended_upper = self._upper + extension * (self._upper - self._lower)
@@ -75,7 +75,7 @@ class NicheSampling:
     def next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
     ) -> Floats:
-        """Return samples (g, count, d): the elite, the best of each niche, and new samples around these.
+        """Return samples (g, count, d): the elite, the best sample of each niche, and new samples around them.
 
         rows: (g, n, d) samples.
         costs: (g, n) costs of the samples.
@@ -102,10 +102,10 @@ class NicheSampling:
         return out
 
     def _draw_feasible(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
-        """Draw samples of a shape, and redraw infeasible samples.
+        """Draw samples of a shape, and draw infeasible samples again.
 
         draw: function that returns samples (n, d) for group numbers (n,).
-        max_redraws: number of attempts, after which infeasible samples remain.
+        max_redraws: maximum number of further draws; after them, infeasible samples remain.
         """
         groups = np.repeat(np.arange(size[0]), size[1])
         samples = draw(groups)
@@ -123,7 +123,7 @@ class NicheSampling:
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, max_count: int
 ) -> tuple[Floats, Ints]:
-    """Select the elite and the best samples of each group that are distinct from one another.
+    """Select the elite, and in each group the best samples that are distinct from one another.
 
     Returns the selected samples, (g, max_count, d), padded with zeros, and the number of samples of each group, (g,).
     """
@@ -147,9 +147,9 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample (d,) is at least the clearing radius away from each other sample.
+    """Return True if a sample (d,) is at least the clearing radius away from every other sample.
 
-    Two samples are that far apart if they differ by the radius or more in at least one variable.
+    Two samples are at least the radius apart if they differ by it or more in at least one variable.
     """
     for n in range(other_rows.shape[0]):
         is_near = True

@@ -92,7 +92,7 @@ class PartialResampling(BoxSearch):
         self._stalled_generations = 0
 
     def tell(self, scores: Floats) -> None:
-        """Keep the samples of the last `ask` that are better than their parents, by their scores (n, c)."""
+        """Keep those samples of the last `ask` that are better than their parents, by their scores (n, c)."""
         if not len(self._points):
             self._points, self._point_scores = self._pending_samples.copy(), scores.copy()
         else:
@@ -108,7 +108,7 @@ class PartialResampling(BoxSearch):
             self._draw()
 
     def _replace_parents(self, scores: Floats) -> None:
-        """Replace parents by better samples, and let both parameters follow those of the better samples."""
+        """Replace parents by better samples, and adapt both parameters to the parameters of these samples."""
         count = len(self._points)
         ranks = self._rank(np.concatenate([self._point_scores, scores]))
         gains = ranks[:count] - ranks[count:]
@@ -125,14 +125,14 @@ class PartialResampling(BoxSearch):
         self._points[better], self._point_scores[better] = self._pending_samples[better], scores[better]
 
     def _store(self) -> None:
-        """Store the population after the best sample of all starts."""
+        """Store the population behind the best sample of all starts."""
         if self._best is None or self._rank(np.stack([self._best[1], self._point_scores[0]]))[1] == 0:
             self._best = self._points[0].copy(), self._point_scores[0].copy()
         self.samples = np.concatenate([self._best[0][None], self._points])
         self.scores = np.concatenate([self._best[1][None], self._point_scores])
 
     def _draw(self) -> None:
-        """Draw a sample for each sample of the population, which is sorted."""
+        """Draw a sample for each member of the population, which is sorted."""
         count, size = self._points.shape
         points = (self._points - self.lower) / (self.upper - self.lower)
         deviations = (points - points.mean(axis=0)) / math.sqrt(count)

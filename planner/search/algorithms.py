@@ -138,7 +138,7 @@ DEFAULT = "fda-seeded"
 
 
 def algorithm_lines() -> str:
-    """Return the names and summaries of the algorithms, one line per algorithm.
+    """Return the name and the summary of each algorithm, one line per algorithm.
 
     >>> print(algorithm_lines().splitlines()[3])
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
@@ -148,9 +148,9 @@ def algorithm_lines() -> str:
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
-    """Return the algorithm with this name, or the default for None.
+    """Return the algorithm with a name, or the default algorithm for None.
 
-    source: origin of the name, with which the error message begins.
+    source: origin of the name, which stands at the beginning of the error message.
 
     Raises ScenarioError for an unknown name.
 
@@ -165,8 +165,8 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Return the limits that an algorithm plans with.
+    """Return the limits of the path with which an algorithm plans.
 
-    An algorithm that counts violations, as the paper does, has no tracking error.
+    An algorithm that counts violations, as the paper does, ignores the tracking error.
     """
     return limits if algorithm.graded else replace(limits, tracking=None)

@@ -50,7 +50,7 @@ class SeparatingZones(NamedTuple):
 
 
 def separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Return the zones that separate start and destination; None if no zones do, or if the ground does.
+    """Return the zones that separate start and destination; None if the ground does, or if nothing does.
 
     A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
@@ -89,7 +89,7 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
 def _end_cell(
     scenario: Scenario, end: Floats, cell_side: float, min_heights: Floats, max_heights: Floats
 ) -> tuple[int, int, int]:
-    """Return the height, row and column indices of a fixed end's cell."""
+    """Return the indices of the cell of a fixed end: height, row and column."""
     cell = ((end[:2] - scenario.bounds[:, 0]) / cell_side).astype(np.int64)
     column, row = (
         int(np.clip(index, 0, size - 1))
@@ -102,14 +102,14 @@ def _end_cell(
 
 
 def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
-    """Return True if open cells connect the two ends."""
+    """Return True if the two ends are connected by open cells."""
     return bool(_reachable_cells(cells == _OPEN_CELL, ends[0])[ends[1]])
 
 
 def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
-    """Return a mask (as `is_open`): True for open cells that are connected to the start cell.
+    """Return a mask (as `is_open`) of the open cells that are connected to the start cell.
 
-    Cells are connected through sides. No cell is reachable if the start cell is not open.
+    Cells are connected if they share a side. No cell is reachable if the start cell is not open.
     """
     is_reachable = np.zeros_like(is_open)
     is_reachable[start] = is_open[start]
@@ -120,7 +120,7 @@ def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
 
 
 def _grow_cells(cells: Flags) -> Flags:
-    """Return a mask: True for the given cells and all cells that share a side with one of them."""
+    """Return a mask of the given cells and of all cells that share a side with one of them."""
     grown = cells.copy()
     for axis in range(cells.ndim):
         target, source = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
@@ -139,7 +139,7 @@ def _close_cells(
     max_heights: Floats,
     cells: Ints,
 ) -> None:
-    """Set each open cell that a zone closes to the index of the first such zone.
+    """Set each open cell that a zone blocks to the index of the first such zone.
 
     cells: (heights, rows, columns), changed in place.
     """
@@ -162,9 +162,9 @@ def _close_cells(
 
 
 def closed_bands(problem: Problem) -> list[str]:
-    """Return a line for each altitude band that the required margins close.
+    """Return a line about each altitude band that the required margins leave empty.
 
-    A band is that between clearance and maximum height above ground, or that of an inclusion.
+    One band lies between the clearance and the maximum height above ground, the others are those of inclusions.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -201,7 +201,7 @@ def closed_bands(problem: Problem) -> list[str]:
 
 
 def max_altitude(problem: Problem) -> tuple[float, str]:
-    """Return the maximum altitude of a plan, m AMSL, and the name of the limit that sets it.
+    """Return the maximum altitude of a plan, m AMSL, and the name of the limit that determines it.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -234,9 +234,9 @@ ZONE_SAMPLE_SPACING_M = 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
-    """Return lines that explain why a plan is infeasible, and which routes its search could not find.
+    """Return lines that explain why a plan is infeasible, and which routes the search cannot find.
 
-    limits: limits of the path; if given, the margins that a plan requires are checked, too, and the result is empty if
+    limits: limits of the path. If given, the margins that a plan requires are also checked, and the result is empty if
         the path keeps all of them.
 
     >>> from planner.plan import Certificate
@@ -286,7 +286,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _describe_walls(scenario: Scenario) -> list[str]:
-    """Return a line if the ground, or ground and missiles, block the whole width of the map."""
+    """Return a line if the ground, or ground and missiles together, block the whole width of the map."""
     terrain = scenario.terrain
     if terrain is None:
         return []
@@ -310,9 +310,9 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 
 
 def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map between start and destination: distance from the start, points (n, 2).
+    """Yield lines across the map between start and destination.
 
-    The distance is in m.
+    Each has its distance from the start, m, and its points, (n, 2).
     """
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
@@ -326,7 +326,7 @@ def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _describe_margin_walls(problem: Problem) -> list[str]:
-    """Return a line if ground, clearance and margins leave no height across the whole map."""
+    """Return a line if ground, clearance and margins leave no altitude free across the whole map."""
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
@@ -347,7 +347,7 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
 
 
 def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) -> bool:
-    """Return True if some altitude above some of the points (n, 2) is outside every kill sphere.
+    """Return True if some altitude above some of the points (n, 2) is free of kill spheres.
 
     min_altitudes: lowest allowed altitude at each point, m, (n,).
     """
@@ -366,7 +366,7 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Return a line on missiles or the altitude limit if they provably block every path, otherwise []."""
+    """Return a line if it is proven that missiles or the altitude limit block every path; otherwise []."""
     data, ceiling = problem.certified, "the ceiling"
     missiles, max_level_altitude = blocking_missiles(data), highest_level_flight(data)
     if missiles is None:
@@ -393,7 +393,7 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     """Return the names of the zones that a path (w, 3) violates.
 
-    These are exclusions that it enters and inclusions that it leaves.
+    They are the exclusions that the path enters, and the inclusions that it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

@@ -14,10 +14,10 @@ from world.arrays import Floats
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
-    """Remove the waypoints that a plan's safety does not need; this never makes the path longer.
+    """Remove the waypoints that are not needed for a plan's safety; this never makes the path longer.
 
-    The waypoints with the smallest detours are removed first. Distances to missiles stay at the distance that plans
-    keep, or at the plan's own distance if that is smaller.
+    The waypoints with the smallest detours are removed first. The path keeps the distance from missiles that plans
+    require, or the plan's own distance if that is smaller.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -48,11 +48,11 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
 def _drop_one_waypoint(
     problem: Problem, waypoints: Floats, min_kill_distance: float
 ) -> tuple[Floats, Certificate] | None:
-    """Remove one waypoint of a path (w, 3); return the path and its certificate, or None if impossible.
+    """Remove one waypoint of a path (w, 3); return the new path and its certificate, or None if impossible.
 
     min_kill_distance: required distance from missiles, m.
 
-    The path must be certified. The waypoint with the smallest detour is tried first.
+    The new path must meet the certificate's margins. The waypoint with the smallest detour is tried first.
     """
     legs, chords = np.diff(waypoints, axis=0), waypoints[2:] - waypoints[:-2]
     lengths = np.linalg.norm(legs, axis=1)

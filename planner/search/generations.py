@@ -44,7 +44,7 @@ SAFE_SEARCH_FRACTION = 0.1
 
 
 def path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
-    """Run an optimiser on whole paths, and return the best vector (d,) of the last generation.
+    """Run an optimiser on whole paths; return the best vector (d,) of the last generation.
 
     starts: vectors (s, d) around which the first population is sampled.
     """
@@ -75,7 +75,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
 
 
 def _preference_levels(search: Search) -> tuple[Level, ...]:
-    """Return the preference levels by which paths are ranked, with the goals of the scenario, if any."""
+    """Return the preference levels that rank paths, with the goals of the scenario, if it states any."""
     goals = search.problem.scenario.planner.goals
     length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
@@ -85,7 +85,7 @@ def _preference_levels(search: Search) -> tuple[Level, ...]:
 
 
 def _best_row(scores: Floats) -> Floats:
-    """Return the best row (8,) of scores (n, 8), in the archive's order."""
+    """Return the best row (8,) of scores (n, 8) in the order of the archive."""
     return np.asarray(scores[best_first(scores)[0]])
 
 
@@ -105,7 +105,7 @@ def _make_optimiser(
 
 
 def _is_stagnant(best_scores: list[Floats]) -> bool:
-    """Return True if the last `STALLED_GENERATIONS` generations gained almost nothing."""
+    """Return True if the last `STALLED_GENERATIONS` generations brought almost no improvement."""
     if len(best_scores) <= STALLED_GENERATIONS:
         return False
     earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
@@ -162,10 +162,10 @@ REPAIR_EVALUATIONS = 100
 
 
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
-    """Run the factorised distribution algorithm, and insert the paths that it finds into the archive.
+    """Run the factorised distribution algorithm; insert the paths that it finds into the archive.
 
-    population: candidates per interval in the first generation.
-    generations: limited to `MAX_GENERATIONS`, or `SEEDED_GENERATIONS` with seeds.
+    population: number of candidates per interval in the first generation.
+    generations: number of generations, at most `MAX_GENERATIONS`, or `SEEDED_GENERATIONS` with seeds.
     """
     encoding, space = search.encoding, search.problem.space
     inner_count = encoding.waypoints - 2
@@ -206,7 +206,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
-    """Return the number of candidates per interval in the first generation for a requested population."""
+    """Return the number of candidates per interval in the first generation, for a requested population."""
     max_count = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
     return max(2, min(int(population * (SEEDED_POPULATION_FRACTION if search.algorithm.seeded else 1.0)), max_count))
 
@@ -217,7 +217,7 @@ def _later_candidate_count(first_count: int) -> int:
 
 
 def _limit_generations(search: Search, generations: int) -> int:
-    """Return the requested number of generations, limited to the maximum for a search of single waypoints."""
+    """Return the requested number of generations, at most the maximum of a search of single waypoints."""
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 
@@ -230,12 +230,12 @@ def count_remaining_legs(search: Search) -> int:
 
 
 def may_try_again(search: Search) -> bool:
-    """Return True if enough legs are left for another attempt."""
+    """Return True if the remaining number of legs is sufficient for another attempt."""
     return count_remaining_legs(search) >= RETRY_LEG_FRACTION * _count_attempt_legs(search)
 
 
 def _count_attempt_legs(search: Search) -> int:
-    """Return the number of legs between all candidates of all generations of the first attempt."""
+    """Return the number of legs between all candidates in all generations of the first attempt."""
     settings = search.problem.scenario.planner
     first_count = _first_candidate_count(search, settings.population)
     candidate_pairs = (
@@ -246,16 +246,17 @@ def _count_attempt_legs(search: Search) -> int:
 
 
 def _as_vectors(rows: Floats) -> Floats:
-    """Convert k candidates per interval, (i, k, 3), to k vectors of one candidate per interval, (k, 3 i)."""
+    """Convert k candidates per interval, (i, k, 3), to k vectors with one candidate per interval, (k, 3 i)."""
     return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Find the best paths through the waypoints of paths (k, w, 3), up to a cost bound.
+    """Find the best paths through the waypoints of some paths (k, w, 3), up to a limit of the cost.
 
-    slack: fraction by which the bound exceeds the cost of the best known path.
+    slack: fraction by which the limit exceeds the cost of the best known path.
 
-    Without a bound almost every leg is evaluated; if few legs are left, only the first candidates are joined.
+    Without a limit almost every leg would be evaluated. If few legs may still be evaluated, only the first candidates
+    are joined.
     """
     data, space = search.problem.search, search.problem.space
     straight_length = math.dist(space.start, space.destination)
@@ -279,7 +280,7 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate whole paths through some of the best candidates, and repair one if none is feasible."""
+    """Evaluate whole paths through some of the best candidates; repair one path if none is feasible."""
     candidate_chains = set()
     for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:

@@ -31,15 +31,18 @@ LEVEL_FLIGHT_ROUNDING_M = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
-    """Return the side of the columns (m); a closed area narrower than about this may be treated as open."""
+    """Return the side of the columns, m.
+
+    A closed area narrower than about this length may be treated as open.
+    """
     return max(MIN_SIDE_M, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
-    """Return True if it is proven that ground, ceiling and missiles leave no path.
+    """Return True if it is proven that ground, ceiling and missiles together block every path.
 
-    missiles: (m,) True for the `data.threats` to consider; None for all.
-    margin: distance from their spheres, m.
+    missiles: (m,) True for each of `data.threats` to consider; None for all.
+    margin: required distance from the missiles' spheres, m.
 
     A path stays above the clearance, below the ceiling and outside the missiles' spheres.
 
@@ -52,10 +55,8 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     >>> [is_closed(make_problem(one, load_airframe(one).limits).certified) for one in (scenario, guarded)]
     [False, True]
     """
-    is_considered, max_altitude = (
-        np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles,
-        highest_level_flight(data),
-    )
+    is_considered = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles
+    max_altitude = highest_level_flight(data)
     if max(data.start[2], data.destination[2]) > max_altitude:
         return True
     return bool(
@@ -66,10 +67,10 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
 
 def highest_level_flight(data: ProblemArrays) -> float:
-    """Return the highest altitude of level flight, above which no waypoint may be, m.
+    """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
-    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if
-    both slope limits are the aircraft's own, as in `planner.evaluation.leg_constraints`.
+    Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if both
+    slope limits are those of the aircraft, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
@@ -96,9 +97,10 @@ def highest_level_flight(data: ProblemArrays) -> float:
 
 
 def blocking_missiles(data: ProblemArrays) -> list[int] | None:
-    """Return the indices of a minimal set of missiles that block every path, with ground and ceiling.
+    """Return the indices of a minimal set of missiles that, with ground and ceiling, block every path.
 
-    The list is empty if ground and ceiling alone block every path. Returns None if no blockage is proven.
+    The list is empty if ground and ceiling alone block every path. Returns None if it is not proven that every path is
+    blocked.
     """
     if not is_closed(data):
         return None
@@ -116,7 +118,7 @@ def blocking_missiles(data: ProblemArrays) -> list[int] | None:
 
 
 def _index_mask(indices: Ints, count: int) -> Flags:
-    """Return a mask (count,): True at the given indices."""
+    """Return a mask (count,) that is True at the given indices."""
     flags = np.zeros(count, dtype=np.bool_)
     flags[indices] = True
     return flags
@@ -124,28 +126,22 @@ def _index_mask(indices: Ints, count: int) -> Flags:
 
 @compiled
 def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
-    """Implement `is_closed` for the missiles that are True in `missiles`.
+    """Return the result of `is_closed` for the missiles that are True in `missiles`.
 
     column_size: side of the square columns, m.
     """
-    columns, rows = (
-        max(1, math.ceil((data.east - data.west) / column_size)),
-        max(1, math.ceil((data.north - data.south) / column_size)),
-    )
+    columns = max(1, math.ceil((data.east - data.west) / column_size))
+    rows = max(1, math.ceil((data.north - data.south) / column_size))
     # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
-    range_bottoms, range_tops = (
-        np.empty((columns, rows, MAX_ALTITUDE_RANGES)),
-        np.empty((columns, rows, MAX_ALTITUDE_RANGES)),
-    )
+    range_bottoms = np.empty((columns, rows, MAX_ALTITUDE_RANGES))
+    range_tops = np.empty((columns, rows, MAX_ALTITUDE_RANGES))
     range_counts = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
         for j in range(rows):
             closed_below = _lowest_ground(data, i, j, column_size) + data.clearance
-            range_bottoms[i, j, 0], range_tops[i, j, 0], range_counts[i, j] = (
-                -math.inf,
-                max(closed_below, data.floor),
-                1,
-            )
+            range_bottoms[i, j, 0] = -math.inf
+            range_tops[i, j, 0] = max(closed_below, data.floor)
+            range_counts[i, j] = 1
     for k in range(missiles.size):
         if missiles[k] and data.threats[k].kill_radius > 0.0:
             missile = data.threats[k]
@@ -165,8 +161,11 @@ def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, 
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the height of the lowest pixel under a column and next to it, m; -inf if one has no data."""
-    first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
+    """Return the height of the lowest pixel below a column or next to it, m; -inf if a pixel has no data."""
+    first_column = math.inf
+    first_row = math.inf
+    last_column = -math.inf
+    last_row = -math.inf
     for corner in range(4):
         east, north = data.west + (i + corner % 2) * column_size, data.south + (j + corner // 2) * column_size
         column, row = polymap(data.to_pixel, east, north)
@@ -201,14 +200,10 @@ def _close_sphere(
     east, north: distances of the sphere's centre from the map's south-western corner, m.
     """
     columns, rows = range_counts.shape
-    first_column, last_column = (
-        max(0, math.floor((east - radius) / column_size)),
-        min(columns - 1, math.floor((east + radius) / column_size)),
-    )
-    first_row, last_row = (
-        max(0, math.floor((north - radius) / column_size)),
-        min(rows - 1, math.floor((north + radius) / column_size)),
-    )
+    first_column = max(0, math.floor((east - radius) / column_size))
+    last_column = min(columns - 1, math.floor((east + radius) / column_size))
+    first_row = max(0, math.floor((north - radius) / column_size))
+    last_row = min(rows - 1, math.floor((north + radius) / column_size))
     for i in range(first_column, last_column + 1):
         dx = abs((i + 0.5) * column_size - east) + 0.5 * column_size
         for j in range(first_row, last_row + 1):
@@ -230,9 +225,9 @@ def _close_sphere(
 def _close_range(
     range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
 ) -> None:
-    """Add an altitude range to the closed ranges of column j of a row of columns.
+    """Add an altitude range to the closed ranges of column j in a row of columns.
 
-    A range beyond the maximum number of ranges stays open.
+    If the column already has the maximum number of closed ranges, the range stays open.
     """
     kept_count = 0
     for k in range(range_counts[j]):
@@ -256,9 +251,9 @@ def _close_range(
 def _reaches_destination(
     data: ProblemArrays, column_size: float, range_bottoms: Floats, range_tops: Floats, range_counts: Ints
 ) -> bool:
-    """Return True if open altitudes of adjacent columns connect start and destination.
+    """Return True if open altitudes of neighbouring columns connect start and destination.
 
-    Each open range of a column is above the closed range with the same index.
+    Each open range of a column lies above the closed range with the same index.
     """
     columns, rows, range_limit = range_bottoms.shape
     ends = np.zeros(2, dtype=np.int64)

@@ -49,11 +49,11 @@ class _Task(NamedTuple):
 
 
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
-    """Run the kernels of one part of planning once, so that they are compiled.
+    """Call the kernels of one part of planning once, so that they get compiled.
 
     part: a name in `PARTS`, or `FRONT`.
 
-    Use a small scenario, because the result is discarded.
+    scenario: a small scenario is sufficient, because the result is discarded.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -94,7 +94,7 @@ def _call_routes(task: _Task) -> None:
 
 
 def _call_side_routes(task: _Task) -> None:
-    """Call the kernels that find routes on other sides of the obstacles."""
+    """Call the kernels that find routes on the other sides of the obstacles."""
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
@@ -112,7 +112,7 @@ def _call_paper_scores(task: _Task) -> None:
 
 
 def _call_front(task: _Task) -> None:
-    """Call the kernels that value paths for a front, and those that select rows by hypervolume."""
+    """Call the kernels that compute the values of paths for a front, and those that select rows by hypervolume."""
     data = task.problem.search
     front_values(
         data, make_energy_cost(task.problem.limits.envelope, data.aircraft, data.travel.winds), task.path[None]

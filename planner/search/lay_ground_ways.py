@@ -139,7 +139,7 @@ def add_departure_and_approach(
     final_model: airspeed and slope of the autopilot on a final.
     kept_departure: departure of a plan whose first legs have already been flown.
 
-    They are required by the tables `[launch]` and `[landing]`; without these tables the plan is returned unchanged.
+    The tables `[launch]` and `[landing]` require them. Without these tables the plan is returned unchanged.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -206,7 +206,7 @@ class _Site:
         return slopes[0], slopes[1]
 
     def min_path_length(self, height_change: float, is_descent: bool) -> float:
-        """Return the length (m) of the shortest path that climbs or descends by a height (m).
+        """Return the length (m) of the shortest path on which the aircraft climbs or descends by a height (m).
 
         is_descent: True for a descent.
 
@@ -217,10 +217,10 @@ class _Site:
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_path(self, path: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Return the certificate of a path, (n, 3) m, with a lower required height near two points.
+        """Return the certificate of a path, (n, 3) m, with a reduced required height near two points.
 
-        end_points: the two points, (3,) m; the height is reduced near a point that is itself closer to the ground than
-            required.
+        end_points: the two points, (3,) m. The required height is reduced near a point that is itself closer to the
+            ground than required.
         """
         data = self.problem.certified
         start_buffer, end_buffer = (
@@ -257,7 +257,7 @@ class _Site:
 
 
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
-    """Make the problems that certify departures and approaches, and measure the size of their turns."""
+    """Make the problems that certify departures and approaches, and measure the size of turns in them."""
     scenario = plan.scenario
     algorithm = scenario.planner.algorithm if plan.algorithm == GIVEN_WAYPOINTS else plan.algorithm
     algorithm_limits = limits_for(find_algorithm(algorithm, scenario.name), limits)
@@ -288,9 +288,9 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
 
 
 def _with_map_error(limits: Limits) -> Limits:
-    """Return limits with a height reserved for the error of the elevation file.
+    """Return limits with a height reserve for the error of the elevation file.
 
-    It is independent of the autopilot's altitude error, for which the limits have a margin already.
+    The limits already have a margin for the autopilot's altitude error, which is independent of the error of the file.
     """
     altitude_error = 0.0 if limits.tracking is None else limits.tracking.up
     added_height = math.hypot(altitude_error, _MAP_HEIGHT_SIGMAS * MAP_HEIGHT_SD_M) - altitude_error
@@ -298,12 +298,12 @@ def _with_map_error(limits: Limits) -> Limits:
 
 
 def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[float]:
-    """Interpolate the turn lengths of a tracking error, m, at a ratio of ground speed to airspeed."""
+    """Interpolate the turn lengths (m) of a tracking error at a ratio of ground speed to airspeed."""
     return [float(np.interp(speed_ratio, SPEED_RATIOS, row)) for row in length_table]
 
 
 def _read_only(position: Floats) -> Floats:
-    """Return a read-only copy of a position: a writable array would make the kernels compile again."""
+    """Return a read-only copy of a position, because a writable array would make kernels compile again."""
     copy = np.array(position, dtype=np.float64)
     copy.setflags(write=False)
     return copy
@@ -315,7 +315,7 @@ def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
 
 
 def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances along a course, m, and the terrain altitude at each, m AMSL; NaN if unknown."""
+    """Return distances along a course, m, and the terrain altitude at each of them, m AMSL; NaN if unknown."""
     distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = start[0] + distances * math.sin(course), start[1] + distances * math.cos(course)
     return distances, terrain.height(east, north)
@@ -330,7 +330,7 @@ class _BestRejected:
     def add(self, certificate: Certificate | None) -> None:
         """Count a rejected path, and keep its problem if it has the largest margin so far.
 
-        A path without a problem in its certificate is inside a missile's reach. None is not counted.
+        A rejected path without a problem in its certificate is inside a missile's reach. None is not counted.
         """
         if certificate is None:
             return
@@ -346,7 +346,7 @@ class _BestRejected:
 
 
 def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """Return the shortest accepted departure, or None and the reason why there is none."""
+    """Return the shortest accepted departure, or None and the reason why no departure is accepted."""
     data, first_waypoint = site.problem.certified, site.plan.waypoints[0]
     home_altitude, start_altitude = float(site.home[2]), float(first_waypoint[2])
     takeoff_height = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
@@ -383,11 +383,11 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
 def _make_departure(
     site: _Site, course: float, points: list[MapPoint], takeoff_altitude: float
 ) -> ClimbOut | Certificate | None:
-    """Return the departure over these points, or its certificate if it is rejected.
+    """Return the departure over some points, or its certificate if it is rejected.
 
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
 
-    Return None if the climb would be too steep.
+    Returns None if the climb would be too steep.
     """
     next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
@@ -423,7 +423,7 @@ class _Launch(NamedTuple):
     drifted_ends: tuple[MapPoint, ...]
 
     def fits(self, points: Sequence[MapPoint], turn_lengths: TurnLengths) -> bool:
-        """Return True if what a drifted take-off leaves of the first leg holds the turn at the end of that leg.
+        """Return True if the first leg is long enough for a drifted take-off and the turn at the leg's end.
 
         points: home, end of the first leg, and the points after it.
         """
@@ -431,10 +431,10 @@ class _Launch(NamedTuple):
 
 
 def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude: float) -> tuple[list[_Launch], str]:
-    """Return the launches that are clear of ground, missiles and zones, and the reason if there are none.
+    """Return the launches that are clear of ground, missiles and zones; and a reason if there are none.
 
     takeoff_height: height above home up to which the launch climbs straight ahead, m.
-    altitude: altitude of the climb performance, m AMSL.
+    altitude: altitude for which the climb performance is computed, m AMSL.
     """
     courses = (
         [2.0 * math.pi * number / _LAUNCH_COURSE_COUNT for number in range(_LAUNCH_COURSE_COUNT)]
@@ -484,7 +484,7 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
 
 
 def _drifted_ends(site: _Site, course: float, takeoff_height: float) -> tuple[MapPoint, ...]:
-    """Return the points where a slow take-off is complete in the least and in the most crosswind to be expected.
+    """Return the end points of a slow take-off in the least and in the most crosswind to be expected.
 
     course: launch course, rad.
     takeoff_height: height above home at the end of the take-off, m.
@@ -508,7 +508,7 @@ def _list_departures(
 ) -> Iterator[tuple[float, float, list[MapPoint]]]:
     """Yield the cost (m), launch course and points of departures from home to the plan's first waypoint.
 
-    laps: number of laps flown to gain height.
+    laps: number of laps in which the aircraft gains height.
     """
     first_waypoint, start_course = site.plan.waypoints[0], site.scenario.start_course
     next_course = float(leg_courses(site.plan.waypoints[:2])[0]) if start_course is None else start_course
@@ -520,10 +520,8 @@ def _list_departures(
         tailwind = site.scenario.wind.components_on_course(course, float(site.home[2]))[0]
         for corners in candidate_chains(launch.end, course, end, next_course, site.turn_radius, laps):
             points = [home, launch.end, *corners, end]
-            measures, takeoff_distance = (
-                measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths),
-                math.dist(home, takeoff_end),
-            )
+            measures = measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths)
+            takeoff_distance = math.dist(home, takeoff_end)
             is_long_enough = measures.fits and takeoff_distance + measures.length >= min_length
             if is_long_enough and launch.fits([*points, next_point], site.turn_lengths):
                 yield (
@@ -534,9 +532,9 @@ def _list_departures(
 
 
 def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> list[int]:
-    """Return the numbers of laps to try, in increasing order, to gain or lose height.
+    """Return the numbers of laps to try, in increasing order, for gaining or losing a height.
 
-    height_change: height to climb or descend, m.
+    height_change: height to gain or lose, m.
     is_descent: True for a descent.
     """
     max_laps = math.ceil(
@@ -564,7 +562,7 @@ class _Final(NamedTuple):
 
 
 def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) -> tuple[Descent | None, str]:
-    """Return the first accepted approach, or None and the reason why there is none."""
+    """Return the first accepted approach, or None and the reason why no approach is accepted."""
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
     landing_course = strip.landing_course(site.scenario.wind, field_altitude)
@@ -614,7 +612,7 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
 def _find_finals(
     site: _Site, strip: LandingStrip, course: float, point: Floats, final_model: FinalModel
 ) -> tuple[list[_Final], str]:
-    """Return the clear and flyable finals on a course, shallowest first, and the reason if there are none."""
+    """Return the clear and flyable finals on a course, shallowest first; and a reason if there are none."""
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.components_on_course(course, field_altitude)[0]
     max_slope = GLIDE_SLOPE_FRACTION * math.tan(
@@ -647,7 +645,7 @@ def _find_finals(
 
 
 def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
-    """Return the start of the line-up and the start of the glide, (2, 3) m.
+    """Return the start of the line-up leg and the start of the glide, (2, 3) m.
 
     course, length: course (rad) and length (m) of the final.
     height: height of both points above the landing point, m.
@@ -658,7 +656,7 @@ def _line_up_points(site: _Site, point: Floats, course: float, length: float, he
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
-    """Return a final's margin (m), negative if it is blocked, and a description of its obstacle, or ""."""
+    """Return a final's margin (m), negative if it is blocked, and a text on its obstacle, "" without one."""
     glide_start, point = final.final_waypoints[1], final.point
     distances, terrain_heights = _ground_profile(
         site.terrain, (float(glide_start[0]), float(glide_start[1])), final.course, final.length
@@ -688,15 +686,13 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 
 
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and why not."""
+    """Return the corners (n, 3) of the shortest path from the plan's end to a line-up; or None and the reason."""
     waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course
     course = float(leg_courses(waypoints[-2:])[0]) if destination_course is None else destination_course
-    start, end = (
-        (float(last_waypoint[0]), float(last_waypoint[1])),
-        (float(final.final_waypoints[0, 0]), float(final.final_waypoints[0, 1])),
-    )
+    start = (float(last_waypoint[0]), float(last_waypoint[1]))
+    end = (float(final.final_waypoints[0, 0]), float(final.final_waypoints[0, 1]))
     previous_waypoints = waypoints[-3:-1]
     previous_points = [(float(waypoint[0]), float(waypoint[1])) for waypoint in previous_waypoints]
     glide_start = (float(final.final_waypoints[1, 0]), float(final.final_waypoints[1, 1]))
@@ -748,14 +744,17 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
 def _approach_altitudes(
     site: _Site, points: list[MapPoint], slope_factor: float, start_altitude: float, end_altitude: float
 ) -> Floats:
-    """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
+    """Return the altitudes of a path between two altitudes, (n,) m AMSL.
+
+    The path climbs and descends at a fraction of its slope limits.
+    """
     top_altitude = max(start_altitude, end_altitude)
     climb, dive = (partial(_scale_slope, site, slope_factor, is_descent, top_altitude) for is_descent in (False, True))
     return descent_altitudes(points, start_altitude, climb, dive, end_altitude)
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return a fraction of the climb slope (or the dive slope if `is_descent`) on a course (rad), m per m."""
+    """Return a fraction of the climb slope on a course (rad), or of the dive slope if `is_descent`, m per m."""
     return factor * site.slopes(course, altitude)[is_descent]
 
 

@@ -158,7 +158,7 @@ class Front:
 
 
 def _objective_row(plan: FrontPlan, fourth: str) -> list[float]:
-    """Return a plan's length, exposure, negated clearance, and time or energy, as `fourth` says."""
+    """Return a plan's length, exposure, negated clearance, and time or energy, as `fourth` states."""
     return [plan.length, plan.exposure, -plan.clearance, plan.time if fourth == "time" else plan.energy]
 
 
@@ -177,13 +177,15 @@ def plan_front(
 ) -> Front:
     """Compute up to `count` plans of a front.
 
-    The front is empty if the default planner finds no safe plan.
-    There are fewer plans if no further plan has a noticeable gain over the others.
-    The fourth objective is energy, or time if the scenario's objective is time or the aircraft's power is unknown.
-    default: the completed plan to begin from; None to plan it here, and to finish it like the others.
-    waypoints: number of waypoints of the other plans during the search, including both ends; None for the number of the
-    default plan.
+    The front is empty if the default planner finds no safe plan. It has fewer than `count` plans if no further plan has
+    a noticeable gain over the others. The fourth objective is energy. It is time if the scenario's objective is time,
+    or if the aircraft's power is unknown.
+
+    default: the completed default plan; None to plan it here, and to finish it like the others.
+    waypoints: number of waypoints of the other plans during the search, including both ends; None for the number in the
+        default plan.
     finish: completes a plan, for example with departure and approach; only plans that are then safe enter the front.
+
     The same scenario, limits, count and seed give the same front.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -238,9 +240,10 @@ class FrontTask(NamedTuple):
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Return objectives (n, 4) and violations (n, 5): graded constraints, then exposure to missiles.
+        """Return the objectives (n, 4) and violations (n, 5) of paths.
 
-        Objectives are infinite if a constraint is violated, because computing them takes most of the time.
+        The violations are the graded constraints and then the exposure to missiles. If a constraint is violated, the
+        objectives are infinite, because computing them would take most of the time.
         """
         violations, graded = graded_scores(self.scored, paths)
         all_violations = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
@@ -268,7 +271,7 @@ class FrontTask(NamedTuple):
 
 
 def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
-    """Make the problem of a front, with the margins of the default planner's search."""
+    """Make the problem of a front, with the margins that the search of the default planner keeps."""
     algorithm = find_algorithm(None, scenario.name)
     problem = make_problem(scenario, limits_for(algorithm, limits))
     aircraft = problem.search.aircraft
@@ -282,9 +285,9 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
 
 
 def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
-    """Return the problem with margins between those of the certificate and those of the search.
+    """Return the problem with margins between those of the certificate and those of a search.
 
-    fraction: 0 for the certificate's margins, 1 for the search's.
+    fraction: 0 for the margins of the certificate, 1 for the margins of the search.
     """
     search, certified = problem.search, problem.certified
     field_names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
@@ -295,7 +298,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce the task's margins to those of the default path (w, 3), so that other paths may be as tight."""
+    """Reduce the margins of a task to those of the default path (w, 3), so that other paths may be as tight."""
     for fraction in MARGIN_FRACTIONS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():
@@ -304,9 +307,9 @@ def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
 
 
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
-    """Return the reference point of the hypervolume, beyond which plans are ignored, (4,).
+    """Return the reference point of the hypervolume, (4,); plans beyond it are ignored.
 
-    It is 1.5 times the default plan's length, exposure and time or energy, and the required clearance.
+    It consists of 1.5 times the length, exposure and time or energy of the default plan, and of the required clearance.
     """
     length, exposure, _, fourth = _objective_row(default, task.fourth)
     max_exposure = max(MIN_EXPOSURE_S, MAX_EXPOSURE_RATIO * exposure)
@@ -315,7 +318,7 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
-    """Return a plan with its values; its clearance is exact, not sampled."""
+    """Return a plan with its values; its clearance is exact instead of sampled."""
     row = task.values(np.array(plan.waypoints)[None])[0]
     clearance = least_height(task.problem.certified, plan.waypoints)
     return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
@@ -325,9 +328,10 @@ def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
 
 
 def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
-    """Yield paths (w, 3) with which the search begins, for various preferences.
+    """Yield paths (w, 3) from which the search begins, for various preferences.
 
-    They are the default path (w, 3), and the default path and routes on other sides of the obstacles, shortened.
+    They are the default path (w, 3), and shortened paths. The shortened paths are made of the default path and of
+    routes on other sides of the obstacles.
     """
     yield default
     count = len(default)
@@ -341,7 +345,10 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
 
 
 def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
-    """Return routes (k, 3) on other sides of the obstacles; [] among zones, which routes ignore."""
+    """Return routes (k, 3) on other sides of the obstacles.
+
+    If there are zones, the result is [], because such routes ignore zones.
+    """
     data, frame = task.problem.search, task.frame
     if is_limited(data.airspace):
         return []
@@ -360,7 +367,7 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
 
 
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield variants of the problem: a larger clearance, radars as obstacles, and another cost."""
+    """Yield variants of the problem: with a larger clearance, with radars as obstacles, and with another cost."""
     data, scenario = task.problem.search, task.problem.scenario
     end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
     spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
@@ -387,7 +394,7 @@ def _run_generations(
     stop: StopCondition | None,
     generations: int,
 ) -> tuple[int, str]:
-    """Sample generations from the seeds; return the number of evaluated paths, and why the search ended."""
+    """Sample generations from the seeds; return the number of evaluated paths and why the search ended."""
     paths, reason = [], ""
     for path in seed_paths(task, np.array(default)):
         paths.append(path)
@@ -410,7 +417,7 @@ def _run_generations(
 def make_sampling(
     task: FrontTask, waypoints: int, reference: Floats, size: int, rng: np.random.Generator
 ) -> FrontSampling:
-    """Make the estimation of distribution for paths.
+    """Make the estimation-of-distribution algorithm that samples paths.
 
     waypoints: number of waypoints of a path.
     reference: (4,) reference point of the hypervolume.
@@ -445,7 +452,7 @@ def noise_directions(inner_count: int, scales: Floats) -> Floats:
 
     scales: (3,) largest deviations along, across and up, m.
 
-    They are smooth modes of the whole path, and bumps of a few waypoints.
+    The directions are smooth modes of the whole path, and bumps of a few waypoints.
     """
     modes, deviations = bridge_modes(inner_count)
     waves = (modes * deviations / np.abs(modes[:, 0]).max()).T
@@ -462,7 +469,7 @@ def noise_directions(inner_count: int, scales: Floats) -> Floats:
 
 
 def noticeable_gains(default: FrontPlan, fourth: str) -> Floats:
-    """Return the smallest noticeable gain of each objective over a default plan, (4,)."""
+    """Return the smallest noticeable gain over a default plan in each objective, (4,)."""
     length, exposure, _, fourth_value = _objective_row(default, fourth)
     exposure_gain = NOTICEABLE_EXPOSURE_FRACTION * max(MIN_EXPOSURE_S, exposure)
     return np.array(
@@ -480,8 +487,8 @@ def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
 
     amounts: (m,) noticeable gains.
 
-    The additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002): a row is
-    omitted if an earlier row is worse by no more than the amounts in every objective.
+    This is the additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002). A
+    row is omitted if an earlier row is worse by no more than the amounts in every objective.
 
     >>> distinct_rows(np.array([[1.0, 9.0], [1.1, 8.9], [2.0, 5.0], [9.0, 4.9]]), np.array([0.5, 0.5]))
     [0, 2]
@@ -503,7 +510,7 @@ def _certify_distinct(
 ) -> tuple[list[FrontPlan], int]:
     """Return up to `count` distinct safe plans that cover the front, and the number of unsafe plans.
 
-    default_plan: the completed plan, which is included if no plan is better.
+    default_plan: the completed default plan, which is included if no plan is better.
     template: plan whose fields the plans take over.
     finish: completes a plan.
 
@@ -531,7 +538,7 @@ def _certify_distinct(
 
 
 def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans that no other plan dominates, and that differ noticeably from one another."""
+    """Return the plans that no other plan dominates and that differ noticeably from each other."""
     objectives = np.array([_objective_row(plan, fourth) for plan in plans])
     indices = np.arange(len(objectives))
     # Keep the first of several equal plans.
@@ -542,7 +549,7 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
 
 
 def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
-    """Return the plan of a path (w, 3), with scores and certificate; other fields are the template's."""
+    """Return the plan of a path (w, 3) with scores and certificate; the template gives all other fields."""
     counts, objectives = paper_scores(task.problem.certified, path[None])
     return replace(
         template,

@@ -87,11 +87,12 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the algorithm of the scenario, or the default.
     progress: called with generations done, generations in total, and a short text.
-    stop: called every few hundredths of a second; a returned text ("interrupted") ends the search with the best path
-    found and is recorded in the plan.
-    improved: called with each path (w, 3), not yet certified, that meets the constraints better than all earlier ones.
-    first_safe: end with the first safe path.
-    previous: (w, 3) an older path with the same ends and number of waypoints to start from.
+    stop: called every few hundredths of a second. If it returns a text ("interrupted"), the search ends with the best
+        path so far, and the plan records the text.
+    improved: called with each path (w, 3) that meets the constraints better than all earlier paths; it is not yet
+        certified.
+    first_safe: True to end the search with the first safe path.
+    previous: older path (w, 3) with the same ends and number of waypoints, from which the search starts.
 
     If no feasible path is found, the certificate of the plan states the problems. Raises ScenarioError for options that
     cannot work.
@@ -129,7 +130,7 @@ def plan_path(
 
 
 def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, seed: int) -> Plan:
-    """Return the plan of given waypoints (w, 3), m, with scores and certificate, without a search.
+    """Return the plan of given waypoints (w, 3), m, with scores and certificate; no search takes place.
 
     The limits are those of the scenario's algorithm.
 
@@ -158,7 +159,7 @@ def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, 
 
 
 def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Floats, Certificate]:
-    """Search, and repeat the search with finer grids and more samples while the certificate fails.
+    """Search for a path, and repeat with finer grids and more samples while the certificate fails.
 
     Returns the best path (w, 3) and its certificate.
     """
@@ -194,9 +195,9 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    """Check that a path can be searched; raise ScenarioError for the first reason against it.
+    """Raise ScenarioError for the first reason why no path can be searched.
 
-    Reasons are: more wind than the airspeed (m/s) allows, too many values in a population, a budget below the
+    The reasons are too much wind for the airspeed (m/s), too many values in a population, a budget below the
     population, and a start or destination inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
@@ -234,7 +235,7 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
 
 
 def _prepare_retry(search: Search, attempt: int) -> None:
-    """Pose the search's problem again for another attempt, and evaluate the archived samples again.
+    """Prepare the search's problem for another attempt, and evaluate the samples in the archive again.
 
     With each attempt the clearance buffer grows, and paths may pass missiles more closely.
     """
@@ -281,7 +282,7 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten the best path and the path of the last generation, if any; otherwise move their waypoints.
+    """Shorten the best path, and the path of the last generation; if there is none, move waypoints instead.
 
     last_vector: vector (d,) of that path.
     """

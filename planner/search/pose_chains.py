@@ -48,7 +48,7 @@ MAX_LAPS = 8
 def candidate_chains(
     start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[MapPoint]]:
-    """Yield lists of corners that connect two legs, for paths of a departure or approach.
+    """Yield lists of corners that connect two legs, for the paths of a departure or an approach.
 
     course, end_course: course of the leg before `start`, and of the leg after `end`, rad.
     turn_radius: radius of the tightest turn, m.
@@ -84,7 +84,7 @@ def candidate_chains(
 
 
 def _lap_corners(start: MapPoint, course: float, signed_side: float, laps: int) -> list[MapPoint]:
-    """Return the corners of square laps that start and end at `start` on a course (rad).
+    """Return the corners of square laps that begin and end at `start` on a course (rad).
 
     signed_side: side of the square, m; negative for laps to the left.
     """
@@ -110,7 +110,7 @@ class TurnLengths(NamedTuple):
     after: tuple[float, ...]
 
     def lengths(self, turn: float) -> tuple[float, float]:
-        """Return the lengths before and after the corner of a turn (rad), m."""
+        """Return the lengths that a turn (rad) takes up before and after its corner, m."""
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
         index = int(position)
         fraction = position - index
@@ -121,7 +121,7 @@ class TurnLengths(NamedTuple):
 
 
 def arc_turn_lengths(radius: float) -> TurnLengths:
-    """Return the turn lengths of arcs of a radius (m): the lengths of their tangents.
+    """Return the turn lengths of arcs with a radius (m), which are the lengths of their tangents.
 
     >>> [round(length) for length in arc_turn_lengths(150.0).lengths(math.radians(90.0))]
     [150, 150]
@@ -146,14 +146,14 @@ class PathMeasures(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """True if no turn is too sharp, and each leg is long enough for the turns at its ends."""
+        """True if no turn is too sharp and every leg is long enough for the turns at its ends."""
         return self.max_turn <= MAX_TURN_RAD and self.max_fraction <= MAX_TURN_FRACTION
 
 
 def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathMeasures:
-    """Measure a path up to its first turn that is too sharp, or to its end.
+    """Measure a path up to the first turn that is too sharp, or to the path's end.
 
-    With plain numbers for speed, because tens of thousands of paths are measured.
+    The points are plain numbers, which is faster, because tens of thousands of paths are measured.
 
     >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(150.0)).fits
     True
@@ -172,11 +172,12 @@ def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathM
                 return PathMeasures(length, math.inf, turn, math.inf)
             max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
             length_before, length_after = turn_lengths.lengths(turn)
-            max_fraction, occupied_length = (
-                max(max_fraction, (occupied_length + length_before) / leg_length),
-                length_after,
-            )
-        length, east, north, leg_length = length + next_length, next_east, next_north, next_length
+            max_fraction = max(max_fraction, (occupied_length + length_before) / leg_length)
+            occupied_length = length_after
+        length = length + next_length
+        east = next_east
+        north = next_north
+        leg_length = next_length
     max_fraction = max(max_fraction, occupied_length / leg_length) if leg_length else math.inf
     return PathMeasures(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
 
@@ -208,11 +209,11 @@ def climb_altitudes(
 def descent_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, dive: SlopeOnCourse, end_altitude: float
 ) -> Floats:
-    """Return the altitude at each point of a path that descends late or climbs early, m AMSL, (n,).
+    """Return the altitude at each point of a path that descends as late, or climbs as early, as possible, (n,).
 
     climb, dive: functions that return the slope on a course.
 
-    The first or the last altitude differs from the requested altitude if the path is too short.
+    Altitudes are m AMSL. If the path is too short, the first or the last altitude differs from the requested altitude.
 
     >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]

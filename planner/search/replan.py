@@ -39,13 +39,13 @@ def replan(
     stop: StopCondition | None = None,
     settle: Settle | None = None,
 ) -> Plan:
-    """Plan again from the start of leg `leg` of an old plan, and keep the flown legs before it.
+    """Plan again from the start of leg `leg` of an old plan; keep the legs before it, which are flown.
 
     scenario: includes the threats known now (`world.scenario.with_threats`). The turn at the first new waypoint is
     measured from the course of the last flown leg. The search starts from the rest of the old plan, in addition to its
-    grid routes. The certificate applies to the path ahead; violations and objectives apply to the whole path.
+    grid routes. The certificate is for the path ahead, the violations and objectives are for the whole path.
 
-    settle: completes the path ahead in a scenario that begins with it, before the flown legs are prepended.
+    settle: function that completes the plan of the path ahead, before the flown legs are prepended.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -73,7 +73,7 @@ def replan(
     remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)
 
     def search(changed_scenario: Scenario, changed_limits: Limits) -> Plan:
-        """Plan the path ahead; the search starts from the remaining path if its number of waypoints fits."""
+        """Plan the path ahead; start from the remaining old path if its number of waypoints is suitable."""
         previous_path = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
         return plan_path(
             changed_scenario,
@@ -103,7 +103,7 @@ def replan(
 
 
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
-    """Raise MissionError if the ends of a plan are not those of a scenario.
+    """Raise MissionError if the ends of a plan are not the ends of a scenario.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -128,7 +128,7 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
-    """Raise MissionError if the new plan's first waypoint is in a kill radius or violates a zone."""
+    """Raise MissionError if the first waypoint of the new plan is in a kill radius or violates a zone."""
     threats = scenario.threats
     depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1

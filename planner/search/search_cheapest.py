@@ -55,7 +55,7 @@ _CertifiedPath = tuple[Floats, Certificate]
 
 
 def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
-    """Make the cost that a scenario's plan minimises.
+    """Make the cost that a plan of the scenario minimises.
 
     Raises ScenarioError for energy if the power is unknown.
     """
@@ -68,7 +68,9 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
 
 
 def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights: TravelCost) -> _CertifiedPath:
-    """Return the cheapest path and its certificate; the shortest path if no equally safe path is cheaper.
+    """Return the cheapest path and its certificate.
+
+    The shortest path is returned if no path that is as safe is cheaper.
 
     shortest_path: the shortest path and its certificate.
     weights: weights of length, time and energy in the cost.
@@ -95,15 +97,15 @@ def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights:
 
 
 def _cost_or_inf(evaluation_data: ProblemArrays, path: Floats) -> float:
-    """Return the cost of a path (w, 3), m; inf if a leg cannot be flown against the wind."""
+    """Return the cost of a path (w, 3), m; inf if a leg is not flyable against the wind."""
     return float(path_cost(evaluation_data.travel, evaluation_data.aircraft, np.array(path, dtype=np.float64)))
 
 
 def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
     """Yield paths (w, 3) from which the search starts.
 
-    They are the shortest path, the same path resampled to equal legs, the straight line and, for the encoding "rotated"
-    without limits of the airspace, other routes.
+    They are the shortest path, the shortest path with equal legs, and the straight line. With the encoding "rotated",
+    and without zones and a maximum height, there are also other routes.
 
     Raises SearchEnded if the search must stop.
     """
@@ -133,7 +135,7 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
 def _choose_cheaper(
     search: Search, evaluation_data: ProblemArrays, start: Floats, best_path: _CertifiedPath
 ) -> _CertifiedPath:
-    """Shorten a start path; return the result if it is certified and cheaper, otherwise the best path.
+    """Shorten a start path; return the result if it is certified and cheaper, otherwise the best path so far.
 
     Larger margins are tried until a shortened path is certified.
     """

@@ -44,7 +44,7 @@ ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_
 
 
 def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:
-    """Join violations (n, 4) and objectives (n, 4) into scores (n, 8)."""
+    """Join violations (n, 4) and objectives (n, 4) into a table of scores (n, 8)."""
     return np.concatenate([violations.astype(np.float64), objectives], axis=1)
 
 
@@ -54,17 +54,17 @@ def no_scores() -> Floats:
 
 
 def are_violated(scores: Floats) -> Flags:
-    """Return a mask (...,): True where a path's scores (..., 8) show a violated constraint."""
+    """Return a mask (...,) of the paths whose scores (..., 8) show a violated constraint."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
 def are_safe(scores: Floats) -> Flags:
-    """Return a mask (...,): True where a path's scores (..., 8) show no violation and no missile exposure."""
+    """Return a mask (...,) of the paths whose scores (..., 8) show no violation and no exposure to missiles."""
     return np.asarray(~are_violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
 def best_first(scores: Floats) -> Ints:
-    """Return the rows of scores (n, 8), best first, in the archive's order; the sort is stable."""
+    """Return the rows of scores (n, 8) in the order of the archive, best first; the sort is stable."""
     return np.argsort(ranks(scores, ARCHIVE_LEVELS), kind="stable")
 
 
@@ -96,7 +96,7 @@ CERTIFICATES_PER_PAUSE = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
-    """Return a problem whose search passes missiles with little more than the certificate's margin."""
+    """Return a problem whose search may pass missiles at little more than the certificate's margin."""
     data = problem.search
     margin = data.tracking.across + CERTIFIED_KILL_MARGIN_M + NARROW_KILL_MARGIN_M
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
@@ -118,10 +118,10 @@ class Archive:
         return len(self.scores) > 0 and not are_violated(self.scores[0])
 
     def insert(self, vectors: Floats, scores: Floats) -> None:
-        """Insert new rows in rank order; among equals, older rows stay first.
+        """Insert new rows in the order of their rank; of equal rows, older ones stay first.
 
-        Once any row is feasible, infeasible rows are dropped, because there can be thousands of them to rank. A full
-        archive accepts only rows better than its last.
+        As soon as one row is feasible, infeasible rows are dropped, because there may be thousands of them to rank. A
+        full archive accepts only rows that are better than its last row.
         """
         is_kept = ~are_violated(scores)
         if self.is_feasible():
@@ -195,7 +195,7 @@ class Search:
         self.archive = Archive(np.empty((0, self.encoding.lower.size)), no_scores())
 
     def score(self, vectors: Floats) -> Floats:
-        """Return the scores (n, 8) of vectors (n, d), without effect on the archive or the budget."""
+        """Return the scores (n, 8) of vectors (n, d); the archive and the budget are not changed."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
         data = self.problem.search
         if self.algorithm.graded:
@@ -208,7 +208,7 @@ class Search:
     def evaluate(self, vectors: Floats) -> Floats:
         """Return the scores (n, 8) of vectors (n, d), and insert them into the archive.
 
-        Raises SearchEnded if asked to stop.
+        Raises SearchEnded if the search is asked to stop.
         """
         batch_size, scores = max(1, WAYPOINTS_PER_PAUSE // self.encoding.waypoints), no_scores()
         for batch_start in range(0, len(vectors), batch_size):
@@ -223,8 +223,8 @@ class Search:
     def pause(self) -> None:
         """Raise SearchEnded if the search is asked to stop.
 
-        A search of whole paths that has no result yet continues for some pauses, until it finds its first route. If it
-        finds no route within those pauses, the straight line is its result.
+        A search of whole paths that has no result yet continues for some more pauses, until it finds its first route.
+        If it finds no route in this time, its result is the straight line.
         """
         if not self.should_stop():
             return
@@ -244,13 +244,13 @@ class Search:
         return rotated_vectors(space, encoding, path[None])
 
     def should_stop(self) -> bool:
-        """Return True if the stop condition gives a reason to stop, and record the reason."""
+        """Return True if there is a reason to stop the search, and record the reason."""
         reason = self.stop_condition() if self.stop_condition is not None else ""
         self.end_reason = reason or self.end_reason
         return bool(reason)
 
     def _archive_and_count(self, vectors: Floats, scores: Floats) -> None:
-        """Count evaluated vectors, insert them into the archive, and report a new best path to `improved`."""
+        """Count evaluated vectors, insert them into the archive, and pass a new best path to `improved`."""
         self.evaluations += len(vectors)
         old_best = self.archive.vectors[:1]
         self.archive.insert(vectors, scores)
@@ -262,7 +262,7 @@ class Search:
             self.improved(self.encoding.decode(new_best)[0])
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
-        """Improve a vector (d,) by a pattern search, archive the result, and return the best scores (8,)."""
+        """Improve a vector (d,) by a pattern search, insert the result into the archive; return its scores (8,)."""
         evaluation_limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
         if evaluation_limit < 2:
             return np.asarray(self.evaluate(vector[None])[0])
@@ -284,14 +284,14 @@ class Search:
 
     @property
     def can_shorten(self) -> bool:
-        """True if shortening may move waypoints out of their intervals; False among zones.
+        """True if shortening may move waypoints out of their intervals; False if there are zones.
 
         Shortening ignores zones.
         """
         return self.algorithm.final_shortening and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
-        """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
+        """Shorten a path (w, 3); keep the result, and return True, if it is the shortest finished path."""
         data = self.problem.search
         attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS_M]
         if data.legs_hold_turns:
@@ -328,7 +328,7 @@ class Search:
         return False
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:
-        """Return True if a path violates the slope limits and nothing else."""
+        """Return True if a path violates only the slope limits."""
         keeps_distance = certificate.kill_distance >= self.required_distance
         other_margins = replace(certificate, slope=0.0).margins
         return certificate.slope < 0.0 and keeps_distance and all(margin >= 0.0 for margin in other_margins)
@@ -342,17 +342,17 @@ class Search:
         return self.end_reason != "completed"
 
     def best_is_safe(self) -> bool:
-        """Return True if the archive's best path violates nothing and is exposed to no missile."""
+        """Return True if the best path in the archive violates nothing and is not exposed to missiles."""
         return bool(are_safe(self.archive.scores[0]))
 
     def first_safe_found(self) -> bool:
-        """Return True if the search should end with the first safe path, and one is finished."""
+        """Return True if the search should end with the first safe path and has finished one."""
         if not self.first_safe or (self.shortest is None and not self.archive.is_feasible()):
             return False
         return self.shortest is not None or self.meets_goal(self.best_certified()[1])
 
     def has_safe(self) -> bool:
-        """Return True if a path is known that violates nothing and is exposed to no missile."""
+        """Return True if a path is known that violates nothing and is not exposed to missiles."""
         return self.shortest is not None or (len(self.archive.scores) > 0 and self.best_is_safe())
 
     def _straight_length(self) -> float:
@@ -360,7 +360,7 @@ class Search:
         return math.dist(self.problem.space.start, self.problem.space.destination)
 
     def length_ratio(self) -> float:
-        """Return the length ratio of the best path."""
+        """Return the length ratio of the best path: its length divided by the straight distance."""
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
@@ -368,11 +368,11 @@ class Search:
         return min(ratio, shortened_ratio) if self.best_is_safe() else shortened_ratio
 
     def meets_goal(self, certificate: Certificate) -> bool:
-        """Return True if this certificate meets the goal of the search."""
+        """Return True if a path with this certificate meets the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _evaluation_budget(self) -> float:
-        """Return the allowed number of evaluations; inf if the scenario sets none."""
+        """Return the maximum number of evaluations; inf if the scenario states none."""
         budget = self.problem.scenario.planner.budget
         return math.inf if budget is None else budget
 
@@ -403,7 +403,7 @@ class Search:
             )
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """Return the archive's first path that is certified with the full kill margin, and its certificate.
+        """Return the first path in the archive that is certified with the full kill margin, and its certificate.
 
         Without such a path, return the certified path furthest from missiles, or the first path if none is certified. A
         search that is asked to end examines only the first few paths.
@@ -431,10 +431,10 @@ class Search:
         return result
 
     def best_path(self) -> tuple[Floats, Certificate]:
-        """Return the better of the archive's best path and the shortened path, with its certificate.
+        """Return the better of the archive's best path and the shortened path, and its certificate.
 
-        The shortened path is better if it is shorter, or the only one that meets the goal. If no path meets the goal,
-        the path furthest from missiles is the best.
+        The shortened path is better if it is shorter, or if only it meets the goal. If neither path meets the goal, the
+        path further from missiles is better.
         """
         path, certificate = self.best_certified()
         if self.shortest is None and self.furthest_short is not None and not self.meets_goal(certificate):
@@ -447,9 +447,9 @@ class Search:
         return self.shortest
 
     def _certify_vector(self, vector: Floats, path: Floats) -> Certificate:
-        """Return the certificate of a vector's path from the cache, where it is stored at first.
+        """Return the certificate of a vector's path, from a cache if it has been computed before.
 
-        All attempts have the same certificate.
+        The certificate is the same in all attempts.
         """
         key = vector.tobytes()
         certificate = self.certificates.get(key)

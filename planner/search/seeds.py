@@ -48,7 +48,7 @@ MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
-    """Return True if the straight line is safe; then no path is shorter, and the search is finished."""
+    """Return True if the straight line is safe; the search is then finished, because no path is shorter."""
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
@@ -62,15 +62,15 @@ def try_straight_line(search: Search) -> bool:
 def starting_vectors(
     search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
 ) -> Floats:
-    """Return the start vectors of a search: the seed with the best improved result, and the previous path.
+    """Return the start vectors of a search, (n, d): a seed and the previous path.
 
     previous: older path (w, 3), or None.
-    is_retry: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
-        skipped, and only the best routes are followed.
+    is_retry: True if an earlier attempt has failed. If there are zones, grids that are no finer than another grid are
+        then skipped, and only the best routes are followed.
 
-    The result is (n, d). The marginals of several routes at once describe none of them, so only one seed is used. It is
-    used in its form before the improvement: afterwards it is so close to every limit that hardly any sample around it
-    is feasible.
+    Only one seed is used, the one with the best result after improvement, because the marginals of several routes
+    describe none of them. The seed is used in its form before the improvement: afterwards it is so close to every limit
+    that hardly any sample around it is feasible.
     """
     encoding, space, waypoint_count = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
@@ -101,11 +101,11 @@ def starting_vectors(
 
 
 def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: bool) -> list[GridRoute]:
-    """Return the routes of the grids, ordered by their quickly fitted paths, best first.
+    """Return the routes over the grids, ordered by paths that are quickly fitted to them, best first.
 
     is_retry: as in `starting_vectors`.
 
-    Each fitted path is archived as soon as it is found.
+    Each fitted path is inserted into the archive at once.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -174,7 +174,7 @@ MIN_GAIN_FRACTION = 2e-5
 
 
 def search_other_sides(search: Search) -> None:
-    """Shorten the best path, and routes on other sides of the obstacles."""
+    """Shorten the best path, and routes on the other sides of the obstacles."""
     if not len(search.archive.scores):
         # A search needs a result, even if the grids have no route.
         search.evaluate(search.straight_vectors())
@@ -191,9 +191,9 @@ def search_other_sides(search: Search) -> None:
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3).
+    """Shorten the routes on other sides that some grids propose; return the routes as paths (w, 3).
 
-    Later grids are closed at the places where a shortened path has remained too close to a missile.
+    Where a shortened path remains too close to a missile, later grids are closed.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame = rotated_frame(space.start, space.destination)
@@ -220,10 +220,10 @@ def _max_route_cost(search: Search) -> float:
 
 
 def _close_narrow_places(search: Search, step: float, kill_radius: float) -> ProblemArrays:
-    """Return the data of a search with its narrow places closed to the routes of a grid or lattice.
+    """Return the data of a search in which narrow places are closed to the routes of a grid or lattice.
 
-    step: its step, m; places within a step of another are not closed again.
-    kill_radius: radius of a closed sphere, m, with which routes avoid it by a step, so that none steps over it.
+    step: step of the grid or lattice, m; a place within a step of a closed place is not closed again.
+    kill_radius: radius of the sphere that closes a place, m. It is large enough that no route steps over the sphere.
     """
     data, places = search.problem.search, list[Floats]()
     for place in search.narrow_places:
@@ -235,7 +235,7 @@ def _close_narrow_places(search: Search, step: float, kill_radius: float) -> Pro
 def _try_ceiling_routes(search: Search) -> list[Floats]:
     """Shorten routes at the altitude of the ceiling; return the routes as paths (w, 3).
 
-    There is one route for each step and depth; it keeps off places where a shortened path has remained too close to a
+    There is one route for each step and depth. It avoids the places where a shortened path has remained too close to a
     missile.
     """
     frame = rotated_frame(search.problem.space.start, search.problem.space.destination)
@@ -257,7 +257,7 @@ def _try_ceiling_routes(search: Search) -> list[Floats]:
 
 
 def _shorten_with_narrow_margins(search: Search, paths: list[Floats]) -> None:
-    """Shorten paths (w, 3) under narrow margins, for a search without a path that is safe with the usual ones."""
+    """Shorten paths (w, 3) with narrow margins, if no path is safe with the usual margins."""
     usual_problem = search.problem
     search.problem = with_narrow_margins(usual_problem)
     try:
@@ -271,7 +271,7 @@ def _shorten_with_narrow_margins(search: Search, paths: list[Floats]) -> None:
 
 
 def shorten_best(search: Search) -> None:
-    """Shorten the archive's best path; then resample it equally and shorten it again while that helps."""
+    """Shorten the archive's best path; then repeat with equal legs while this makes the path shorter."""
     search.shorten(search.encoding.decode(search.archive.vectors[:1])[0])
     for _ in range(MAX_REPEATS):
         if search.shortest is None or search.must_end():
@@ -306,9 +306,9 @@ FOLLOWED_MARGINS_M = (2.0, 5.0, 2.0)
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
-    """Return True if no safe path, or only a long one, advances along the straight line.
+    """Return True if a safe path is missing or long among the paths that advance along the straight line.
 
-    A path may then have to turn back.
+    A better path may then have to turn back.
     """
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
@@ -320,16 +320,14 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Search along a route that may turn back.
 
-    best: best path so far and its certificate.
+    best: best path so far, with its certificate.
 
-    Returns the better of the path found and the path of `best`, with its certificate.
+    Returns the better of the new path and `best`, with its certificate.
     """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
-    lattices, remaining_states = (
-        [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS],
-        MAX_EXPANDED,
-    )
+    lattices = [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS]
+    remaining_states = MAX_EXPANDED
     for index, step_fraction in enumerate(LATTICE_STEP_FRACTIONS):
         # If memory limits the step, a smaller step gives the same lattice again.
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
@@ -356,9 +354,9 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
 
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Shorten the best path without regard to its certificate; search for a safe path along the result.
+    """Shorten the best path without regard to its certificate, and search for a safe path along the result.
 
-    Returns the path found with its certificate if it is safe and shorter than `best`; otherwise returns `best`.
+    Returns the new path with its certificate if it is safe and shorter than `best`; otherwise returns `best`.
     """
     if not search.can_shorten:
         return best
@@ -375,7 +373,7 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
 
 
 def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
-    """Search along a route (k, 3); return the best path, its certificate, and True if it was shortened."""
+    """Search along a route (k, 3); return the best path, its certificate, and True if the path was shortened."""
     waypoints = search.encoding.waypoints
     piece_ends, _ = sample_route(route, waypoints - 1)
     encoding = route_encoding(search.problem.space, piece_ends[:, :2])
@@ -401,7 +399,7 @@ def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certific
 
 
 def _improve_and_shorten(search: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
-    """Improve the path of a vector (d,), then shorten the path and the routes (k, 3), which may be better."""
+    """Improve the path of a vector (d,); then shorten this path and some routes (k, 3), which may be better."""
     search.evaluate(vector[None])
     for _ in range(FIRST_SEARCH_COUNT):
         if search.must_end() or search.first_safe_found():

@@ -19,12 +19,12 @@ class SharedBudget:
     """
 
     def __init__(self, search: Search) -> None:
-        """Start with the full budget."""
+        """Start with the whole budget."""
         self._search, self._plans = search, list[Plan]()
         self._end_reason = "completed"
 
     def __call__(self, scenario: Scenario, limits: Limits) -> Plan:
-        """Return the plan of a new search, or of the last search if the budget does not allow another search."""
+        """Return the plan of a new search, or the last plan if the budget does not allow another search."""
         settings = scenario.planner
         if settings.budget is None:
             return self._record_plan(self._search(scenario, limits))
@@ -38,8 +38,8 @@ class SharedBudget:
     def with_total_evaluations(self, plan: Plan) -> Plan:
         """Return the final plan with the evaluations of all searches.
 
-        A plan that is not safe gets the end reason of the first search that did not complete, as a complete search
-        might have found a safe plan.
+        A plan that is not safe gets the end reason of the first incomplete search, because a complete search might have
+        found a safe plan.
         """
         end_reason = plan.ended if plan.safe or plan.ended != "completed" else self._end_reason
         return replace(plan, evaluations=self._count_evaluations(), ended=end_reason)
@@ -49,7 +49,7 @@ class SharedBudget:
         return sum(plan.evaluations for plan in self._plans)
 
     def _record_plan(self, plan: Plan) -> Plan:
-        """Store a plan, and why its search ended if all earlier searches completed. Return the plan."""
+        """Store a plan and return it; if all earlier searches completed, also store why its search ended."""
         self._plans.append(plan)
         if self._end_reason == "completed":
             self._end_reason = plan.ended

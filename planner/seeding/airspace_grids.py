@@ -69,7 +69,7 @@ class _ClosedHeights(NamedTuple):
 def _fill_column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:
-    """Fill the `COLUMN` record of a grid position."""
+    """Fill the `COLUMN` record of a grid position: its ground and its range of allowed altitudes."""
     east, north = to_world_position(frame, along, across)
     column.lowest, column.highest = math.inf, -math.inf
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -92,7 +92,7 @@ def _fill_column(
 
 @inner
 def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
-    """Return the range of altitudes that zones close to a horizontal step, m AMSL.
+    """Return the range of altitudes at which zones block a horizontal step, m AMSL.
 
     lateral: tracking error to add to the zones' margins, m.
     """
@@ -121,11 +121,11 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
-    """Return the slopes that a grid uses for each lateral step: tangents of climb and dive, (sideways, 2).
+    """Return the slopes that a grid allows for each lateral step: tangents of climb and dive, (sideways, 2).
 
-    step: length of a step along, m.
+    step: length of a step along the line, m.
     amsl: altitude of the slope limits, m.
-    fraction: fraction of the limits.
+    fraction: fraction of the limits that may be used.
     """
     slopes, a, b = np.zeros((2 * MAX_SIDE + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
@@ -133,10 +133,8 @@ def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: fl
     for side in range(-MAX_SIDE, MAX_SIDE + 1):
         b[0], b[1] = to_world_position(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        slopes[side + MAX_SIDE, 0], slopes[side + MAX_SIDE, 1] = (
-            fraction * math.tan(climb),
-            fraction * math.tan(dive),
-        )
+        slopes[side + MAX_SIDE, 0] = fraction * math.tan(climb)
+        slopes[side + MAX_SIDE, 1] = fraction * math.tan(dive)
     return slopes
 
 
@@ -151,7 +149,7 @@ def _set_layer_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill the costs (per m) of a stage's cells for a range across; inf for a cell that no path may enter.
+    """Fill the cost per m of a stage's cells in a range across; inf for a cell that no path may enter.
 
     along: position of the stage, m.
     extra: (across,) additional cost per m.
@@ -198,15 +196,14 @@ def _relax_airspace_stage(
     previous_parents: Codes,
     parents: Codes,
 ) -> None:
-    """Compute the costs of the routes to a stage's cells from those of the previous stage; store parents.
+    """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
 
-    columns: `COLUMN` records (across,). cost, next_cost: (across, layers), of the previous stage and of this one.
+    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and of this stage.
 
-    Changes of course are counted along the cheapest route to a cell only, so the result is not exactly the optimum.
+    A change of course is measured from the cheapest route to a cell only, so the result is not exactly the optimum.
     """
     step, width, zones, spacing = frame.length / grid.stages, grid.across.size, data.airspace.zones, grid.layer_spacing
-    # No tracking error at a fixed end.
-    lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
+    lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)  # No tracking error at a fixed end.
     turn_cost, slope_fraction = (TURN_COST * step, GENTLE_SLOPE_FRACTION) if grid.gentle else (0.0, 1.0)
     slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), slope_fraction)
     for y in range(width):
@@ -280,10 +277,12 @@ def cheapest_airspace_route(
     bound: float,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, float]:
-    """Return points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost.
+    """Return the points of the cheapest route over a grid, and its cost.
 
-    extra: (stages + 1, across) added to the cost per m.
-    bound: upper limit on the cost.
+    The points are along, across and up, (stages + 1, 3).
+
+    extra: (stages + 1, across) additional cost per m.
+    bound: upper limit on the cost of the route.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
 
     Without a route, the points are (0, 3) and the cost is inf.
@@ -299,7 +298,7 @@ def cheapest_airspace_route(
 
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
-    """Return a new search before its first stage."""
+    """Return a new search for the cheapest route, before its first stage."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     centre_index = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, width), dtype=COLUMN)
@@ -329,7 +328,7 @@ def continue_airspace_route(
     search: AirspaceSearch,
     max_stages: int,
 ) -> AirspaceSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue, and return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return it."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
     obstacles, columns, cells, cost, next_cost, cell_costs, centre_index, reached_stage = search
     last_stage, goal_distances = min(stages, reached_stage + max_stages), np.empty(width)
@@ -375,8 +374,14 @@ def continue_airspace_route(
 def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:
-    """Return points (stages + 1, 3) of the route found, and its cost; (0, 3) points and inf if none."""
-    stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.centre_index
+    """Return the points of the route that a search found, and its cost.
+
+    The points are along, across and up, (stages + 1, 3). Without a route, the points are (0, 3) and the cost is inf.
+    """
+    stages = grid.stages
+    step = frame.length / grid.stages
+    columns = search.columns
+    y = search.centre_index
     z = _nearest_layer(grid, columns[stages, y], data.destination[2])
     total = search.cost[y, z]
     if total == math.inf:
@@ -384,11 +389,9 @@ def end_airspace_route(
     points = np.empty((stages + 1, 3))
     for stage in range(stages, -1, -1):
         first_height = columns[stage, y].lowest if grid.follows else grid.floor
-        points[stage, 0], points[stage, 1], points[stage, 2] = (
-            stage * step,
-            grid.across[y],
-            first_height + z * grid.layer_spacing,
-        )
+        points[stage, 0] = stage * step
+        points[stage, 1] = grid.across[y]
+        points[stage, 2] = first_height + z * grid.layer_spacing
         if stage > 0:
             parent = search.cells[stage, y, z]
             y, z = parent // grid.layers, parent % grid.layers
@@ -397,7 +400,7 @@ def end_airspace_route(
 
 @inner
 def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
-    """Return the index of the layer nearest to a height, m."""
+    """Return the index of the layer that is nearest to a height, m."""
     first_height = column.lowest if grid.follows else grid.floor
     return min(grid.layers - 1, max(0, round((height - first_height) / grid.layer_spacing)))
 
@@ -420,9 +423,9 @@ MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """Return a grid with at most a number of stages; fewer if the grid would be too large.
+    """Return a grid with at most a number of stages; fewer stages if the grid would be too large.
 
-    span: limits across, m.
+    span: lowest and highest position across, m.
     """
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level_point))))
@@ -461,12 +464,12 @@ def airspace_routes(
 ) -> Iterator[GridRoute]:
     """Yield routes over grids, for a problem with zones or a maximum height.
 
-    grids: number of stages, which `STAGE_FACTOR` multiplies, and number of different routes of each grid.
+    grids: for each grid, its number of stages (multiplied by `STAGE_FACTOR`) and its number of different routes.
     pause: as in `cheapest_airspace_route`.
-    finer_only: True to skip grids that `MAX_CELLS` makes no finer than an earlier grid.
+    finer_only: True to skip a grid that is no finer than an earlier grid, because `MAX_CELLS` limits it.
 
-    Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, and first,
-    because narrow gaps can require steep or curved routes.
+    Grids are gentle (see `AirspaceGrid`), because their routes are easier to fly. Before that, the first grid is
+    searched without this restriction, because narrow gaps may require steep or curved routes.
     """
     expected_cost, max_stages = EXPECTED_COST_RATIO * math.dist(data.start, data.destination), 0
     for index, (stages, route_count) in enumerate(grids):
@@ -503,9 +506,9 @@ def _find_route(
     expected_cost: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid at a distance from earlier routes, or None if there is none.
+    """Return the cheapest route over a grid that keeps away from earlier routes; None if there is none.
 
-    expected_cost: cost bound to try first.
+    expected_cost: upper limit on the cost with which the search is tried first.
     """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):

@@ -19,12 +19,12 @@ MAX_SPREAD_FRACTION = 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
-    """Return the modes of the kernel min(s, t) - s t of a Brownian bridge at equal steps.
+    """Return the modes of the kernel min(s, t) - s t of a Brownian bridge with equal steps.
 
     inner: number n of inner points.
 
-    Returns the eigenvectors, (n, n), and their standard deviations, (n,), relative to that of the first mode. They have
-    a closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines.
+    Returns the eigenvectors, (n, n), and their standard deviations relative to the first mode, (n,). The inverse of the
+    kernel is the second difference, so the eigenvectors are sines.
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
@@ -33,7 +33,7 @@ def bridge_modes(inner: int) -> tuple[Floats, Floats]:
 
 
 def bridge_basis(inner: int) -> Floats:
-    """Return an orthogonal basis (3 n, 3 n) of vectors of the rotated encoding, for n inner waypoints.
+    """Return an orthogonal basis (3 n, 3 n) for vectors of n inner waypoints in the rotated encoding.
 
     It consists of bridge modes across and up, and of unit vectors along.
     """
@@ -48,9 +48,9 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """Return the first population (n, d), which consists of the starts and of smooth paths around them.
+    """Return the first population (n, d): the starts, and smooth paths around them.
 
-    starts: vectors (s, d) to start from; without starts, the paths are drawn around the straight line.
+    starts: vectors (s, d) to start from; without starts, the smooth paths are drawn around the straight line.
     """
     inner_count = encoding.waypoints - 2
     modes, deviations = bridge_modes(inner_count)

@@ -62,7 +62,7 @@ class FlownCorners(NamedTuple):
 
 @inner
 def no_corners(count: int, margin: float) -> FlownCorners:
-    """Return the `FlownCorners` of a path without corners near the ground.
+    """Return the `FlownCorners` of a path that has no corners near the ground.
 
     margin: additional margin, m.
     """
@@ -76,10 +76,11 @@ def no_corners(count: int, margin: float) -> FlownCorners:
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
 ) -> FlownCorners:
-    """Find a path's corners that are flown close to the ground, or almost as steeply as possible.
+    """Find a path's corners that are flown close to the ground, or almost as steeply as allowed.
 
     path: (w, 3) m.
-    corners, lags: simulated turns at the waypoints, and altitude errors of the legs.
+    corners: simulated turns at the waypoints.
+    lags: altitude errors on the legs.
     margin: height added to the required clearance, m.
     """
     count = path.shape[0]
@@ -118,9 +119,9 @@ def corners_near_ground(
 
 @inner
 def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown: FlownCorners) -> None:
-    """Fill the radii and slope limits of the arcs whose slopes are close to their limits.
+    """Fill the radii and the slope limits of the arcs whose slopes are close to their limits.
 
-    The limits are the lower of those on the two courses of a corner.
+    A slope limit is the lower of the limits on the two courses of the corner.
     """
     level_start, level_end = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
@@ -129,11 +130,9 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
         climb, dive = math.inf, math.inf
         level_start[2] = path[i, 2]
         for leg in (i - 1, i):
-            level_end[0], level_end[1], level_end[2] = (
-                path[leg + 1, 0] - path[leg, 0],
-                path[leg + 1, 1] - path[leg, 1],
-                path[i, 2],
-            )
+            level_end[0] = path[leg + 1, 0] - path[leg, 0]
+            level_end[1] = path[leg + 1, 1] - path[leg, 1]
+            level_end[2] = path[i, 2]
             climb_limit, dive_limit = slope_limits(data, level_start, level_end)
             climb, dive = min(climb, math.tan(climb_limit)), min(dive, math.tan(dive_limit))
         flown.slopes[i, 0], flown.slopes[i, 1] = climb, dive
@@ -151,7 +150,7 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
 def spare_arc_length(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float, sign: float, max_slope: float
 ) -> float:
-    """Return the length of a corner's arc beyond the length that its climb or descent needs, m.
+    """Return the length by which a corner's arc exceeds the length that its climb or descent needs, m.
 
     sign: 1 for a climb, -1 for a descent.
     max_slope: tangent of the maximum slope.
@@ -159,12 +158,10 @@ def spare_arc_length(
     Slopes are those of `aircraft.path_limits.arc_slope`. The length is negative if the arc is too short.
     """
     length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
-    ux, uy, vx, vy = (
-        waypoint[0] - previous[0],
-        waypoint[1] - previous[1],
-        next_waypoint[0] - waypoint[0],
-        next_waypoint[1] - waypoint[1],
-    )
+    ux = waypoint[0] - previous[0]
+    uy = waypoint[1] - previous[1]
+    vx = next_waypoint[0] - waypoint[0]
+    vy = next_waypoint[1] - waypoint[1]
     turn = min(MAX_TURN_RAD, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
     altitude_change = (
         radius
@@ -188,7 +185,7 @@ def _horizontal_length(start: Floats, end: Floats) -> float:
 
 @inner
 def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point: Floats) -> float:
-    """Return the height of a point (3,) above the lowest allowed altitude there, m; NaN off the terrain."""
+    """Return the height of a point (3,) above the lowest allowed altitude below it, m; NaN off the terrain."""
     column, row = polymap(data.to_pixel, point[0], point[1])
     ground: float = pixel_height(data.heights, column, row)
     return point[2] - ground - clearance_at(limits.required, point[0], point[1])
@@ -209,15 +206,13 @@ def corner_point(
     radius: radius of the turn, m.
     sample: number of the sample.
 
-    Heights are those of the legs, or of the arc between its tangent points, and not lowered.
+    The height of a sample is that of the leg, or of the arc between its tangent points.
     """
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_out, (next_waypoint[1] - waypoint[1]) / length_out
-    slope_in, slope_out = (
-        (waypoint[2] - previous_waypoint[2]) / length_in,
-        (next_waypoint[2] - waypoint[2]) / length_out,
-    )
+    slope_in = (waypoint[2] - previous_waypoint[2]) / length_in
+    slope_out = (next_waypoint[2] - waypoint[2]) / length_out
     cross = ux * vy - uy * vx
     turn = min(MAX_TURN_RAD, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:
@@ -239,10 +234,8 @@ def corner_point(
     tangent, side = radius * math.tan(0.5 * turn), 1.0 if cross >= 0.0 else -1.0
     # The middles of the chords are this far from the centre; the arc is further.
     chord_radius = radius * math.cos(0.5 * ARC_STEP)
-    along, offset = (
-        chord_radius * math.sin(fraction * turn) - tangent,
-        side * (radius - chord_radius * math.cos(fraction * turn)),
-    )
+    along = chord_radius * math.sin(fraction * turn) - tangent
+    offset = side * (radius - chord_radius * math.cos(fraction * turn))
     out[0], out[1] = waypoint[0] + ux * along - uy * offset, waypoint[1] + uy * along + ux * offset
     out[2] = waypoint[2] - tangent * slope_in + fraction * tangent * (slope_in + slope_out)
 
@@ -251,10 +244,12 @@ def corner_point(
 def corner_derivatives(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, gradient: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of a value at a corner's sample by the corner's waypoints.
+    """Fill `slopes` (3, 3) with the derivatives of a value at a corner's sample.
 
-    corner: waypoints, (3, 3).
-    gradient: (3,) derivatives of the value with respect to the sample's position.
+    The derivatives are with respect to the coordinates of the corner's three waypoints.
+
+    corner: waypoints of the corner, (3, 3).
+    gradient: (3,) derivatives of the value with respect to the position of the sample.
     point: scratch memory, (3,).
     """
     for row in range(3):
@@ -270,7 +265,7 @@ def corner_derivatives(
 
 @inner
 def spare_length_derivatives(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length` by a corner's waypoints, (3, 3)."""
+    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length` with respect to a corner's waypoints."""
     for row in range(3):
         for axis in range(3):
             coordinate, slopes[row, axis] = corner[row, axis], 0.0
@@ -283,9 +278,9 @@ def spare_length_derivatives(corner: Floats, radius: float, sign: float, max_slo
 
 @inner
 def height_derivatives(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
-    """Fill `out` (3,) with the derivatives of the height above ground at a point.
+    """Fill `out` (3,) with the derivatives of the height above ground with respect to a point's position.
 
-    Horizontal derivatives are 0 if the ground nearby is unknown.
+    The horizontal derivatives are 0 if the ground nearby is unknown.
     """
     heights, to_pixel = data.heights, data.to_pixel
     column, row = polymap(to_pixel, x + GROUND_STEP_M, y)

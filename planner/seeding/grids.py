@@ -74,7 +74,7 @@ class _PixelSteps(NamedTuple):
 
 @inner
 def to_world_position(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:
-    """Convert a point (along, across) of the rotated frame to map coordinates; return east and north, m."""
+    """Convert a position (along, across) in the rotated frame to east and north, m."""
     return (
         frame.east + frame.cosine * along - frame.sine * across,
         frame.north + frame.sine * along + frame.cosine * across,
@@ -90,9 +90,9 @@ def _min_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:
-    """Return the lowest allowed altitude in a cell, m: the highest of 3 x 3 ground samples plus clearance.
+    """Return the lowest allowed altitude in a cell, m: the highest of some ground samples plus the clearance.
 
-    steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
+    steps: steps between the 3 x 3 samples; with a step of 0 along the frame only the middle sample is taken.
 
     The result is inf outside the map or without data.
     """
@@ -117,9 +117,9 @@ def _min_height(
 
 @inner
 def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, length: float) -> _PixelSteps:
-    """Return the raster steps that correspond to steps along and across the frame.
+    """Return steps along and across the frame, converted to raster columns and rows.
 
-    along: position in the frame at which the steps are computed, m.
+    along: position in the frame at which the steps are converted, m.
     length: length of the steps in the frame, m.
     """
     east, north = to_world_position(frame, along, 0.0)
@@ -133,7 +133,7 @@ def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, length:
 
 @compiled
 def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0) -> Records:
-    """Return `OBSTACLE` records of the missiles for a grid with the given step between stages (m).
+    """Return `OBSTACLE` records of the missiles for a grid with a given step between stages (m).
 
     shrink: see `Grid`.
     """
@@ -159,7 +159,7 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
 def _add_kill_cost(
     obstacles: Records, along: float, grid: Grid, first_across: int, last_across: int, cell_costs: Floats
 ) -> None:
-    """Add the cost of kill spheres, which increases inwards, to cells of a stage.
+    """Add the cost of kill spheres to cells of a stage; the cost increases towards the centre of a sphere.
 
     along: position of the stage, m.
     first_across, last_across: range of the cells across, both included.
@@ -199,7 +199,7 @@ def set_cell_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill the costs (per m) of cells of a stage.
+    """Fill the costs per m of cells of a stage.
 
     extra: (stages + 1, across) additional cost per m.
     first_across, last_across: range of the cells across, both included.
@@ -236,9 +236,9 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 @inner
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
-    """Return the steepest climb and descent of a step in layers: `STEP_LAYERS` records (sideways, layers).
+    """Return the steepest climb and descent of a step, in layers: `STEP_LAYERS` records (sideways, layers).
 
-    They depend on the course of the step, and on the layer in which the step begins.
+    They depend on the course of the step and on the layer at its beginning.
     """
     layer_spacing = layers[1] - layers[0] if layers.size > 1 else 1.0
     step_layers = np.zeros((2 * MAX_SIDE + 1, layers.size), dtype=STEP_LAYERS)
@@ -272,9 +272,9 @@ def relax_cells(
     count: int,
     length: float,
 ) -> None:
-    """Offer routes through adjacent cells to as many cells of the next stage; keep cheaper routes.
+    """Offer routes through successive cells to as many cells of the next stage; keep the cheaper routes.
 
-    cost, next_cost: costs of the routes to the cells of both stages.
+    cost, next_cost: costs of the routes to the cells of this stage and of the next stage.
     cell_costs: cost per m of the cells.
     parents: cells from which the cheapest routes come.
     first_source, first_target, first_cell_cost: indices of the first cells, and of the first cell cost, in flat arrays.
@@ -303,22 +303,20 @@ def relax_stage(
     layer_spacing: float,
     ratio: float,
 ) -> None:
-    """Compute the costs of the routes to a stage's cells from those of the previous stage; store parents.
+    """Compute the costs of the cheapest routes to the cells of a stage, and store their parents.
 
     cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage.
     parents: (layers, across) cells of the previous stage from which the cheapest routes come.
     spans: `SPAN` records (layers,) of the cells with a finite cost in the previous stage.
-    step: length of a step along, m.
+    step: length of a step along the line, m.
     layer_spacing: m.
     ratio: spacing across as a fraction of a step.
     """
     layer_count, width = cost.shape
-    flat_cost, flat_next_cost, flat_parents, flat_cell_costs = (
-        cost.ravel(),
-        next_cost.ravel(),
-        parents.ravel(),
-        cell_costs.ravel(),
-    )
+    flat_cost = cost.ravel()
+    flat_next_cost = next_cost.ravel()
+    flat_parents = parents.ravel()
+    flat_cell_costs = cell_costs.ravel()
     for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
         if first > last:
@@ -349,7 +347,7 @@ def relax_stage(
 def fill_goal_distances(
     columns: int, goal_index: int, remaining_stages: int, step: float, ratio: float, out: Floats
 ) -> None:
-    """Fill `out` with the shortest horizontal distance from each position across to the destination, m.
+    """Fill `out` with the shortest horizontal distance to the destination from each position across, m.
 
     goal_index: index across of the destination.
 
@@ -376,7 +374,7 @@ def prune_cells(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Set the cost of cells without a route to the destination within the bound to inf; fill the spans.
+    """Set the costs of cells from which the destination is not reached within the bound to inf; fill the spans.
 
     spans: `SPAN` records (layers,) to fill with the remaining cells.
     goal_distances: (across,) horizontal distance to the destination, m.
@@ -431,9 +429,9 @@ def cheapest_route(
     bound: float,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, float]:
-    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost.
+    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and the route's cost.
 
-    extra: (stages + 1, across), added to the cost per m.
+    extra: (stages + 1, across) additional cost per m.
     bound: upper limit on the cost; more expensive routes are not searched.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
 
@@ -450,7 +448,7 @@ def cheapest_route(
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
-    """Return a new search before its first stage."""
+    """Return a new search for the cheapest route, before its first stage."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     centre_index, start_layer = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
@@ -485,7 +483,7 @@ def continue_route(
     search: GridSearch,
     max_stages: int,
 ) -> GridSearch:
-    """Continue a search by up to `max_stages` stages, or until no route can continue, and return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue; return it."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
@@ -536,7 +534,7 @@ def continue_route(
 
 @compiled
 def end_route(search: GridSearch) -> tuple[Records, float]:
-    """Return `ROUTE_CELL` records (stages + 1,) of the route found, and its cost.
+    """Return `ROUTE_CELL` records (stages + 1,) of the route that a search found, and its cost.
 
     Without a route, there are no records and the cost is inf.
     """
@@ -554,7 +552,7 @@ def end_route(search: GridSearch) -> tuple[Records, float]:
 def trace_back(parents: Codes, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records of the route from the start to a cell of the last stage.
 
-    parents: (stages + 1, layers, across).
+    parents: parent of each cell, (stages + 1, layers, across).
     """
     width = parents.shape[2]
     cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)
@@ -594,10 +592,10 @@ class GridRoute:
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """Return a grid with square cells in the plane, and with a layer at the start's altitude.
+    """Return a grid with square cells on the map, and with one layer at the altitude of the start.
 
-    span: limits across, m.
-    stages: number of stages, which is reduced if the grid would be too large.
+    span: lowest and highest position across, m.
+    stages: number of stages; fewer if the grid would be too large.
     """
     min_height, max_height = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level_point = np.array([*data.destination[:2], data.start[2]])
@@ -629,11 +627,11 @@ def grid_route(
     expected_cost: float = math.inf,
     pause: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid, or None if terrain and ceiling block every route.
+    """Return the cheapest route over a grid; None if terrain and ceiling block every route.
 
-    earlier_routes: earlier routes, near which the cost is higher, so that the next route takes another side.
-    expected_cost: cost bound to try first, such as the cost on a coarser grid; a search without a bound follows if it
-        fails.
+    earlier_routes: earlier routes; the cost is higher near them, so that the next route takes another side.
+    expected_cost: upper limit on the cost with which the search is tried first, such as the cost on a coarser grid. If
+        it fails, a search without a limit follows.
     pause: as in `cheapest_route`.
     """
     if grid.layers.size == 0:
@@ -673,7 +671,7 @@ def grid_routes(
 ) -> Iterator[GridRoute]:
     """Yield the routes of each grid, cheapest first.
 
-    grids: number of stages and number of different routes of each grid.
+    grids: for each grid, its number of stages and its number of different routes.
     pause: as in `cheapest_route`.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)

@@ -79,7 +79,7 @@ class Lattice(NamedTuple):
 
 @inner
 def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats) -> None:
-    """Fill the world position (3,) of a lattice point and layer."""
+    """Fill `out` (3,) with the world position of a lattice point in a layer."""
     out[0], out[1] = to_world_position(
         frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
     )
@@ -130,11 +130,11 @@ def _expand_state(
     max_turn: int,
     open_states: list[tuple[float, int]],
 ) -> None:
-    """Expand a state: push each successor that it reaches more cheaply than before to the open list.
+    """Expand a state: push the successors that it reaches at a lower cost than before to the open list.
 
-    max_turn: in units of 45 degrees.
+    max_turn: largest turn per step, in units of 45 degrees.
 
-    A successor is pushed with its cost plus its distance to the goal.
+    The priority of a successor is its cost plus its distance to the goal.
     """
     layer_limits, course, cell = table.layer_limits, state % 8, state // 8
     layer, position = cell % lattice.layers, cell // lattice.layers
@@ -149,10 +149,8 @@ def _expand_state(
         next_along, next_across = along + _STEPS[next_course, 0], across + _STEPS[next_course, 1]
         if not (0 <= next_along < lattice.along and 0 <= next_across < lattice.across):
             continue
-        lowest_layer, highest_layer = (
-            max(0, layer - layer_limits[next_course, 1]),
-            min(lattice.layers - 1, layer + layer_limits[next_course, 0]),
-        )
+        lowest_layer = max(0, layer - layer_limits[next_course, 1])
+        highest_layer = min(lattice.layers - 1, layer + layer_limits[next_course, 0])
         for next_layer in range(lowest_layer, highest_layer + 1):
             next_state = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + next_course
             _set_position(frame, lattice, next_along, next_across, next_layer, end)
@@ -207,7 +205,7 @@ def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Latt
 
 @compiled
 def _start_states(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable) -> Codes:
-    """Mark the states of the start as reached, and return them, (k,)."""
+    """Mark the states at the start as reached, and return them, (k,)."""
     first_state = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     start_course = _nearest_course(frame, data.start_course)
     states = np.arange(first_state, first_state + 8) if start_course < 0 else np.array([first_state + start_course])
@@ -225,7 +223,7 @@ def continue_lattice_search(
     search: LatticeSearch,
     max_expansions: int,
 ) -> LatticeSearch:
-    """Continue a search by up to `max_expansions` expansions, and return it.
+    """Continue a search by up to `max_expansions` expansions; return it.
 
     max_turn: largest turn per step, in units of 45 degrees.
 
@@ -271,7 +269,7 @@ def _is_inside(data: ProblemArrays, point: Floats) -> bool:
 
 @compiled
 def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
-    """Return `LATTICE_CELL` records of the route from the start to a state."""
+    """Return `LATTICE_CELL` records of the route from the start to a given state."""
     count, state = 0, goal_state
     while state >= 0:
         count, state = count + 1, parents[state] - 1
@@ -289,9 +287,9 @@ def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
 
 @compiled
 def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
-    """Simplify a route (k, 3) to few points (j, 3) by greedy line of sight.
+    """Reduce a route (k, 3) to few points (j, 3), by a greedy choice of long legs.
 
-    From each remaining point the leg goes to the furthest point that it reaches without a violation.
+    From each remaining point, the leg leads to the furthest point that it can reach without a violation.
     """
     limits = precompute_limits(data)
     out = np.empty(points.shape)
@@ -329,7 +327,10 @@ STATES_PER_PAUSE = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
-    """Return the length of a leg between two right-angled turns to the same side, m, including settling."""
+    """Return the length that a leg needs between two right-angled turns to the same side, m.
+
+    It includes the length for settling between the turns.
+    """
     if not data.legs_hold_turns:
         return MIN_STEP_M
     side = MAX_STEP_M
@@ -341,10 +342,10 @@ def turning_step(data: ProblemArrays) -> float:
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
-    """Return a lattice over the whole map, with points at both ends.
+    """Return a lattice over the whole map that has points at both ends.
 
-    step: maximum spacing of the points, m; it is increased if the lattice would have more than `MAX_LATTICE_STATES`
-        states.
+    step: maximum spacing of the points, m. It is increased if the lattice would otherwise have more than
+        `MAX_LATTICE_STATES` states.
     """
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
     min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
@@ -387,7 +388,7 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Return `LATTICE_CELL` records of the cheapest route, and the number of expanded states.
+    """Return `LATTICE_CELL` records of the cheapest route over a lattice, and the number of expanded states.
 
     max_turn: largest turn per step, in units of 45 degrees.
     max_states: maximum number of expanded states.
@@ -439,11 +440,11 @@ def ceiling_route(
     """Return world points (k, 3) of a route at the altitude of the ceiling; (0, 3) without a route.
 
     step: spacing of the lattice, m.
-    depth: depth to which the route may enter missiles' spheres, m.
+    depth: depth to which the route may enter the missiles' spheres, m.
     pause: see `lattice_route`.
 
-    Spheres on the ground are smallest at the ceiling. The route climbs to the ceiling at its start and leaves it at its
-    destination, however steeply, because a lattice of one layer is searched in milliseconds.
+    The spheres of missiles on the ground are narrowest at the ceiling. Only one layer is searched, which takes
+    milliseconds. The climb to the ceiling at the start and the descent at the destination may therefore be too steep.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):

@@ -99,11 +99,13 @@ def search_patterns(
 ) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding; return vectors (k, d) and the number of evaluations.
 
-    vector: (d,).
+    vector: the path, (d,).
     evaluations: maximum number of evaluations.
-    must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; True ends the search with its present result.
+    must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; if it returns True, the search ends with its
+        present result.
 
-    The vectors are the best feasible vector, if any, and the vector with the lowest merit, if that is another one.
+    The vectors are the best feasible vector, if there is one, and the vector with the lowest merit, if it is not the
+    same.
     """
     frames = require_frames(encoding)
     inner_count = encoding.waypoints - 2
@@ -130,7 +132,7 @@ def search_patterns(
 
 
 def merits(scores: Floats) -> Floats:
-    """Return the merit of each row of scores (n, 8), which a search minimises, (n,).
+    """Return the merit of each row of scores (n, 8), (n,); a search minimises the merit.
 
     The columns of the scores are those of `planner.plan.Violation` and then of `planner.plan.Objective`.
     """
@@ -145,7 +147,7 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
-    """Return triangular moves of waypoints, (k, 3 inner_count), and the axis of each, (k,).
+    """Return moves of waypoints in the shape of triangles, (k, 3 inner_count), and their axes, (k,).
 
     The half-widths of the triangles are 1, 2, 4, ... waypoints.
     """
@@ -169,7 +171,7 @@ def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
 
 @inner
 def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:
-    """Make a candidate path with start and destination set, and scratch memory to score it."""
+    """Make a candidate path with its ends set, and scratch memory to score the path."""
     path = np.empty((waypoints, 3))
     copy_into(path[0], data.start)
     copy_into(path[-1], data.destination)
@@ -186,10 +188,11 @@ def _evaluate_merit(
     best_merit: float,
     feasible_merit: float,
 ) -> tuple[float, bool]:
-    """Return the length ratio plus priced violations, and True if the path is feasible.
+    """Return the merit of a vector (length ratio plus priced violations), and True if its path is feasible.
 
-    Each part of the evaluation only adds to the merit. The evaluation therefore ends as soon as the merit reaches
-    `best_merit`, and `feasible_merit` if the path is still feasible; the returned merit is then a lower bound.
+    Each part of the evaluation only adds to the merit. Therefore the evaluation ends as soon as the merit reaches
+    `best_merit`. If the path is feasible so far, it must also reach `feasible_merit`. The returned merit is then a
+    lower bound.
     """
     path, waypoints, scratch = candidate.path, vector.reshape((vector.size // 3, 3)), candidate.scratch
     for i in range(waypoints.shape[0]):
@@ -217,7 +220,7 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
-    """Return the merit of scores, and True if nothing is violated.
+    """Return the merit of scores, and True if they show no violation.
 
     The merit is the length ratio plus prices of violations.
     """
@@ -238,7 +241,7 @@ def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, boo
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
     """Return a new search that starts at a vector (d,).
 
-    steps: (k,) initial steps of the moves; the search changes this array.
+    steps: (k,) initial size of each move; the search changes this array.
     """
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
     best_merit, is_feasible = _evaluate_merit(data, limits, frames, start, candidate, math.inf, math.inf)
@@ -263,9 +266,9 @@ def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, st
 def _fill_trial(
     box: _Box, moves: Floats, k: int, steps: Floats, round_start: Floats, vector: Floats, trial: Floats
 ) -> None:
-    """Fill a trial vector (d,) with the vector after move k, clipped to the box.
+    """Fill a trial vector (d,) with a vector after its move k, clipped to the box.
 
-    For the number after the last move, the displacement of the whole round is repeated instead.
+    If k is the number after the last move, the displacement of the whole round is repeated instead.
     """
     for d in range(vector.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]
@@ -283,18 +286,16 @@ def _continue_search(
     pause_count: int,
     max_evaluations: int,
 ) -> _State:
-    """Continue a search until `pause_count` evaluations, or to its end at `max_evaluations`.
+    """Continue a search up to `pause_count` evaluations, or to its end at `max_evaluations`.
 
-    moves, initial_steps: moves (k, d), and their initial steps (k,).
+    moves, initial_steps: moves, (k, d), and their initial sizes, (k,).
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (
         state
     )
-    limits, candidate, trial = (
-        precompute_limits(data),
-        _make_candidate(data, best_vector.size // 3 + 2),
-        best_vector.copy(),
-    )
+    limits = precompute_limits(data)
+    candidate = _make_candidate(data, best_vector.size // 3 + 2)
+    trial = best_vector.copy()
     while evaluations < max_evaluations:
         if move == 0:
             has_moved = False

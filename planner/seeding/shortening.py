@@ -52,7 +52,7 @@ MIN_MOVE_M = 0.05
 def _newton_step(
     path: Floats, min_corner: Floats, max_corner: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
-    """Fill `step` (n,) with the Newton step of a path within its box; return its largest component, m."""
+    """Fill `step` (n,) with a Newton step of a path within its box; return its largest component, m."""
     size = step.size
     for row in range(size):
         model.band[row, 0] += HESSIAN_DAMPING_PER_M
@@ -97,7 +97,7 @@ class Shortening(NamedTuple):
 def begin_shortening(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> Shortening:
-    """Return a new shortening of a path (w, 3) m, before its first round.
+    """Return the state of a new shortening of a path (w, 3) m, before its first round.
 
     samples: number of ground samples on each leg.
     extra_margin: additional margin to spheres and ground, m.
@@ -122,7 +122,7 @@ class _DescentScratch(NamedTuple):
 def continue_shortening(
     data: ProblemArrays, shortening: Shortening, extra_margin: float, max_rounds: int
 ) -> Shortening:
-    """Continue a shortening by up to `max_rounds` rounds, and return it."""
+    """Continue a shortening by up to `max_rounds` rounds; return its state."""
     path, active, multipliers, round_number, models, corners_too = shortening
     limits, size = precompute_limits(data), 3 * (path.shape[0] - 2)
     descent = _DescentScratch(
@@ -159,24 +159,20 @@ def _descend(
     penalty: float,
     descent: _DescentScratch,
 ) -> int:
-    """Minimise the merit of a path (w, 3) in place; return the number of models evaluated.
+    """Minimise the augmented Lagrangian of a path (w, 3) in place; return the number of models evaluated.
 
     values: filled with the final values of the constraints.
     """
-    min_corner, max_corner, model, step, trial = (
-        descent.min_corner,
-        descent.max_corner,
-        descent.model,
-        descent.step,
-        descent.trial,
-    )
+    min_corner = descent.min_corner
+    max_corner = descent.max_corner
+    model = descent.model
+    step = descent.step
+    trial = descent.trial
     merit, models = lagrangian(data, limits, active, path, multipliers, values, penalty, model), 1
     for _ in range(STEPS_PER_ROUND):
-        max_move, step_fraction, is_better = (
-            _newton_step(path, min_corner, max_corner, model, descent.factor, step),
-            1.0,
-            False,
-        )
+        max_move = _newton_step(path, min_corner, max_corner, model, descent.factor, step)
+        step_fraction = 1.0
+        is_better = False
         for _ in range(HALVINGS_PER_STEP):
             for row in range(step.size):
                 axis = row % 3
@@ -223,10 +219,10 @@ def shorten_path(
     corners_too: bool = False,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
-    """Shorten a path (w, 3), or reduce its violations; return it and the number of models evaluated.
+    """Shorten a path (w, 3), or reduce its violations; return the path and the number of models evaluated.
 
     extra_margin: additional margin to spheres and ground, m.
-    corners_too: True to constrain the height and slope of corners as flown, too, which is slower.
+    corners_too: True to also constrain the height and slope of corners as they are flown, which is slower.
     pause: called after some milliseconds of work; an exception raised there stops it.
 
     A model counts as one evaluation. Zones and the maximum height above ground are ignored.

@@ -95,12 +95,12 @@ class ActiveConstraints(NamedTuple):
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> ActiveConstraints:
-    """Return the active constraints near a path (w, 3).
+    """Return the constraints that are active near a path (w, 3).
 
     samples: number of ground samples on each leg.
     extra_margin: additional margin to spheres and ground, m.
-    corners_too: True to constrain the height and slope of flown corners, too; legs then keep twice the additional
-        margin in addition to their turns.
+    corners_too: True to also constrain the height and slope of flown corners. Each leg is then longer than its turns by
+        at least twice the additional margin.
     """
     limits = precompute_limits(data)
     count = path.shape[0] - 1
@@ -109,7 +109,10 @@ def active_constraints(
     measure_corners(data, limits.wind, path, legs, corners)
     if data.tracking.has_error:
         compute_height_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
-    extra_heights, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
+    extra_heights = np.zeros(count)
+    climb = np.zeros(count)
+    dive = np.zeros(count)
+    roll = np.zeros(count)
     for i in range(count):
         max_climb, max_dive = slope_limits(data, path[i], path[i + 1])
         climb[i], dive[i] = math.tan(max_climb), math.tan(max_dive)
@@ -135,9 +138,9 @@ def active_constraints(
 def _fill_turn_lengths(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:
-    """Fill the lengths of the legs before and after each waypoint that its turn takes up, (w,) each.
+    """Fill the length of legs that the turn at each waypoint takes up, before and after it, (w,) each.
 
-    The lengths (m) are divided by the tangent of half the turn.
+    Each length (m) is divided by the tangent of half the turn.
     """
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
@@ -152,10 +155,8 @@ def _fill_turn_lengths(
             vx, vy = ux * math.cos(turn) - uy * sine, uy * math.cos(turn) + ux * sine
         measure_corner(data.aircraft, data.tracking, limits.wind, True, ux, uy, vx, vy, path[i, 2], corners[0])
         half_turn_tangent = math.tan(0.5 * min(turn, MAX_TURN_RAD))
-        before[i], after[i] = (
-            min(MAX_TURN_LENGTH_M, corners[0].before) / half_turn_tangent,
-            min(MAX_TURN_LENGTH_M, corners[0].after) / half_turn_tangent,
-        )
+        before[i] = min(MAX_TURN_LENGTH_M, corners[0].before) / half_turn_tangent
+        after[i] = min(MAX_TURN_LENGTH_M, corners[0].after) / half_turn_tangent
         if data.fly_over:
             before[i], after[i] = 0.0, min(MAX_TURN_LENGTH_M, turn_length(True, corners, 0)) / half_turn_tangent
 
@@ -164,7 +165,10 @@ def _fill_turn_lengths(
 def _find_near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:
-    """Return pairs of a leg and a missile near it, (p, 2), and the required centre distances, m, (p,)."""
+    """Return pairs of a leg and a missile near it, (p, 2), and the distance required in each pair, m, (p,).
+
+    Distances are measured from the centre of a sphere.
+    """
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
@@ -204,15 +208,13 @@ def constraint_count(active: ActiveConstraints) -> int:
 def carry_multipliers(
     previous_active: ActiveConstraints, multipliers: Floats, next_active: ActiveConstraints
 ) -> Floats:
-    """Return the multipliers of the next active constraints, taken from those of the previous round.
+    """Return the multipliers for a new set of active constraints, taken from the previous set.
 
-    A new pair of leg and missile gets the multiplier 0.
+    A pair of leg and missile that is new gets the multiplier 0.
     """
-    new_multipliers, pair_count, previous_pair_count = (
-        np.zeros(constraint_count(next_active)),
-        next_active.pairs.shape[0],
-        previous_active.pairs.shape[0],
-    )
+    new_multipliers = np.zeros(constraint_count(next_active))
+    pair_count = next_active.pairs.shape[0]
+    previous_pair_count = previous_active.pairs.shape[0]
     copy_into(new_multipliers[pair_count:], multipliers[previous_pair_count:])
     k = 0
     for p in range(pair_count):
@@ -263,7 +265,7 @@ class LagrangianModel(NamedTuple):
 def _add_constraint(
     value: float, first_waypoint: int, waypoint_count: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:
-    """Add a constraint on consecutive waypoints to the model, and return its contribution to the merit.
+    """Add a constraint on consecutive waypoints to the model; return its contribution to the merit.
 
     The derivatives of the constraint with respect to these waypoints are in `model.slopes`.
     """
@@ -313,7 +315,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:
 
 @inner
 def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:
-    """Add the path's cost to the model, if the cost is not only length, and return the cost, m."""
+    """Add the path's cost to the model, if it is not only the length; return the cost, m."""
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
@@ -338,9 +340,9 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Add the distances of legs from missiles to the model; return their contribution to the merit.
+    """Add the distances between legs and missiles to the model; return their contribution to the merit.
 
-    They are the first constraints. The parameters are those of `lagrangian`.
+    These are the first constraints. The parameters are those of `lagrangian`.
     """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
@@ -373,13 +375,16 @@ def _add_ground(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add a ground-clearance constraint for each sample of a leg; return their contribution to the merit.
+    """Add a clearance constraint for each ground sample of a leg; return their contribution to the merit.
 
     first_number: number of the first of these constraints.
 
     The value of a constraint is the height above the required clearance, m.
     """
-    merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
+    merit = 0.0
+    slopes = model.slopes
+    heights = data.heights
+    to_pixel = data.to_pixel
     for i in range(path.shape[0] - 1):
         for k in range(active.samples):
             fraction = (k + 1.0) / (active.samples + 1.0)
@@ -411,13 +416,16 @@ def _add_corners(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the heights of flown corners and lengths of steep arcs; return their contribution to the merit.
+    """Add the heights of flown corners and the lengths of steep arcs; return their contribution to the merit.
 
     first_number: number of the first of these constraints.
 
-    The heights are above the required height (m), the lengths beyond the length that the arc needs (m).
+    A height is measured above the required height (m), a length beyond the length that the arc needs (m).
     """
-    merit, point, ground_gradient, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
+    merit = 0.0
+    point = np.empty(3)
+    ground_gradient = np.empty(3)
+    corner = np.empty((3, 3))
     for i in range(1, path.shape[0] - 1):
         radius = flown.radii[i]
         for k in range(3):
@@ -458,11 +466,11 @@ def _add_slopes(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the slope margins and minimum lengths of legs; return their contribution to the merit.
+    """Add the slope margins and the minimum lengths of legs; return their contribution to the merit.
 
     first_number: number of the first of these constraints.
 
-    Slope margins are expressed as m of height, lengths as m above the minimum.
+    A slope margin is expressed as a height (m), a length as the excess over the minimum (m).
     """
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
@@ -472,11 +480,9 @@ def _add_slopes(
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
             second_slopes = slopes[1]
-            second_slopes[0], second_slopes[1], second_slopes[2] = (
-                tangent * dx / horizontal_length,
-                tangent * dy / horizontal_length,
-                sign,
-            )
+            second_slopes[0] = tangent * dx / horizontal_length
+            second_slopes[1] = tangent * dy / horizontal_length
+            second_slopes[2] = sign
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
             number = first_number + 3 * i + kind
@@ -498,7 +504,7 @@ def _add_turns(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add turn margins and the lengths of legs between turns; return their contribution to the merit.
+    """Add the turn margins and the lengths of legs between turns; return their contribution to the merit.
 
     first_number: number of the first of these constraints.
     """
@@ -548,9 +554,10 @@ def _add_turns(
 
 @inner
 def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
-    """Add a multiple of a turn's derivatives to `slopes` (3, 3), the derivatives by three waypoints.
+    """Add a multiple of a turn's derivatives to `slopes` (3, 3), the derivatives for three waypoints.
 
-    before_derivatives, after_derivatives: derivatives of the turn with respect to the legs before and after it, (2,).
+    before_derivatives, after_derivatives: derivatives of the turn with respect to the leg before it and to the leg
+        after it, (2,).
     """
     for axis in range(2):
         slopes[0, axis] -= factor * before_derivatives[axis]
@@ -569,7 +576,7 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Return the augmented Lagrangian of a path (w, 3), m: length or cost plus the terms of constraints.
+    """Return the augmented Lagrangian of a path (w, 3): its length or cost, m, plus terms of the constraints.
 
     multipliers: multipliers of the constraints.
     values: filled with the values of the constraints.

@@ -73,18 +73,17 @@ def _relax_stage_back(
     layer_spacing: float,
     ratio: float,
 ) -> None:
-    """Compute the costs to the destination from a stage's cells from those of the next stage.
+    """Compute the costs from the cells of a stage to the destination, from those of the next stage.
 
-    goal_costs, previous_goal_costs: (layers, across) costs from the cells of the next stage and of this stage.
+    goal_costs, previous_goal_costs: (layers, across) costs to the destination from the cells of the next stage, and of
+        this stage.
     spans: `SPAN` records (layers,) of this stage's cells that are within the bound.
     """
     layer_count, width = goal_costs.shape
-    flat_goal_costs, flat_previous, flat_successors, flat_cell_costs = (
-        goal_costs.ravel(),
-        previous_goal_costs.ravel(),
-        successors.ravel(),
-        cell_costs.ravel(),
-    )
+    flat_goal_costs = goal_costs.ravel()
+    flat_previous = previous_goal_costs.ravel()
+    flat_successors = successors.ravel()
+    flat_cell_costs = cell_costs.ravel()
     for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
         if first > last:
@@ -113,7 +112,7 @@ def _relax_stage_back(
 
 @inner
 def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Records, bound: float) -> None:
-    """Set `goal_costs` to inf for the cells of a stage through which no route is within the bound.
+    """Set `goal_costs` to inf for the cells of a stage that are on no route within the bound.
 
     start_costs, goal_costs: (layers, across) costs from the start and to the destination.
     """
@@ -148,7 +147,7 @@ CELLS_PER_PAUSE = 100_000
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
 ) -> GridCosts:
-    """Return the costs of the cheapest partial routes over a grid, from the start and to the destination.
+    """Return the costs of the cheapest routes over a grid from the start to each cell, and on to the destination.
 
     bound: upper limit on the cost of a whole route.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
@@ -163,7 +162,7 @@ def grid_costs(
 
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
-    """Return a new search before its first stage."""
+    """Return a new search for these costs, before its first stage."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     shape = (stages + 1, layer_count, width)
@@ -189,17 +188,15 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, max_stages: int
 ) -> SideSearch:
-    """Continue a search by up to `max_stages` stages, or end it if no route can continue, and return it."""
+    """Continue a search by up to `max_stages` stages, or end it if no route can continue; return it."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, done = search
     start_costs, parents, goal_costs, successors = costs
-    height_differences, goal_distances, extra = (
-        grid.layers - grid.layers[goal],
-        np.empty(width),
-        np.zeros((stages + 1, width)),
-    )
+    height_differences = grid.layers - grid.layers[goal]
+    goal_distances = np.empty(width)
+    extra = np.zeros((stages + 1, width))
     end_number = min(2 * stages, done + max_stages)
     for step_number in range(done, end_number):
         stage = step_number + 1
@@ -250,7 +247,7 @@ def continue_grid_costs(
 def passing_side(lateral_offset: float, vertical_offset: float) -> int:
     """Return the side on which a point passes an obstacle.
 
-    lateral_offset, vertical_offset: offsets of the point to the left of the obstacle's centre and above it, m.
+    lateral_offset, vertical_offset: offset of the point to the left of the obstacle's centre, and above the centre, m.
     """
     if abs(lateral_offset) >= abs(vertical_offset):
         return LEFT if lateral_offset >= 0.0 else RIGHT
@@ -261,8 +258,8 @@ def passing_side(lateral_offset: float, vertical_offset: float) -> int:
 def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: float) -> Records:
     """Return the cheapest route past each `OBSTACLE` on each side, as `PASSING` records (obstacles, 4).
 
-    The sides are those of `passing_side`. A route passes an obstacle at the stage nearest to the obstacle's centre; an
-    obstacle beyond the ends of the grid has no routes, which is a cost of inf.
+    The sides are those of `passing_side`. A route passes an obstacle at the stage that is nearest to the obstacle's
+    centre. An obstacle beyond the ends of the grid is not passed, and has the cost inf.
     """
     passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
     for k in range(obstacles.shape[0]):
@@ -278,13 +275,16 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
                     continue
                 passing = passings[k, passing_side(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
                 if cost < passing.cost:
-                    passing.cost, passing.stage, passing.layer, passing.across = cost, stage, z, y
+                    passing.cost = cost
+                    passing.stage = stage
+                    passing.layer = z
+                    passing.across = y
     return passings
 
 
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:
-    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a given cell."""
     last_stage, width = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last_stage + 1, dtype=ROUTE_CELL)
     previous_cells = trace_back(costs.parents[: stage + 1], layer, across)
@@ -304,21 +304,19 @@ SAME_ROUTE_DISTANCE_M = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return the side on which a route passes each obstacle, (k,); -1 beyond the route's ends.
+    """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle beyond the route's ends.
 
     points: (s, 3) along, across, up, m.
 
-    Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
-    are assumed not to be, although a route over a sphere on the ground can be moved to either side.
+    Two routes with the same sides can be deformed into each other without touching an obstacle. Routes with different
+    sides are treated as different, although a route over a sphere on the ground could be moved to either side of it.
     """
     step = points[1, 0] - points[0, 0]
     stages = np.rint(obstacles["along"] / step).astype(np.int64)
     is_beyond_end = (stages <= 0) | (stages >= len(points) - 1)
     nearest_points = points[np.clip(stages, 0, len(points) - 1)]
-    lateral_offsets, vertical_offsets = (
-        nearest_points[:, 1] - obstacles["across"],
-        nearest_points[:, 2] - obstacles["up"],
-    )
+    lateral_offsets = nearest_points[:, 1] - obstacles["across"]
+    vertical_offsets = nearest_points[:, 2] - obstacles["up"]
     horizontal_sides = np.where(lateral_offsets >= 0.0, LEFT, RIGHT)
     sides = np.where(
         np.abs(lateral_offsets) >= np.abs(vertical_offsets),
@@ -371,7 +369,7 @@ def side_routes(
 
 
 def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats:
-    """Return the points (k, 3) of a path (w, 3) nearest to the missile spheres that it is too close to, deepest first.
+    """Return the points of a path (w, 3) at which it is too close to missile spheres, deepest first, (k, 3).
 
     distance: required distance from the spheres, m.
 
@@ -388,7 +386,10 @@ def closest_places(data: ProblemArrays, path: Floats, distance: float) -> Floats
 
 
 def close_places(data: ProblemArrays, places: Floats, radius: float) -> ProblemArrays:
-    """Return data in which missile spheres of a radius (m) around places (k, 3) close them to grids and lattices."""
+    """Return data with additional missile spheres that close places (k, 3) to grids and lattices.
+
+    radius: radius of the spheres, m.
+    """
     closed = np.zeros(len(places), dtype=data.threats.dtype)
     closed["east"], closed["north"], closed["up"] = places.T
     closed["kill_radius"] = closed["kill_scale"] = radius
@@ -408,11 +409,13 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """Return a grid with smaller kill spheres, and with ground from a smaller area around each cell.
+    """Return a grid with smaller kill spheres, and with lower ground in each cell.
+
+    The ground of a cell is taken from a smaller area around it.
 
     shrink, spread, ratio: see `Grid`.
 
-    Its highest layer is the ceiling, where spheres on the ground are smallest.
+    The highest layer is at the ceiling, where the spheres of missiles on the ground are narrowest.
     """
     square_grid = make_grid(data, frame, span, stages)
     step = ratio * frame.length / square_grid.stages

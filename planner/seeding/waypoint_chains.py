@@ -74,12 +74,12 @@ def waypoint_chains(
     pause: Callable[[], None] = lambda: None,
     max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
-    """Return the best path through each candidate of each waypoint.
+    """Return the best path through each candidate position of each waypoint.
 
     candidates: (w, k, 3) m; only the first candidate of each end is used.
-    bound: upper limit on the cost of a path, m; pruning by it saves time.
+    bound: upper limit on the cost of a path, m; paths above it are dropped, which saves time.
     pause: called after every `LEGS_PER_PAUSE` legs; an exception raised there stops the work.
-    max_legs: if more legs have to be evaluated, no path is returned.
+    max_legs: maximum number of legs to evaluate; if it is not sufficient, no path is returned.
     """
     count, width, _ = candidates.shape
     legs = np.zeros((count - 1, width, width))
@@ -103,9 +103,9 @@ def waypoint_chains(
 def _advance_sweeps(
     data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, max_legs: int
 ) -> bool:
-    """Continue both sweeps until `max_legs` legs have been evaluated; return True if both are done.
+    """Continue both sweeps until `max_legs` legs are evaluated; return True if both are complete.
 
-    legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative.
+    legs: (w - 1, k, k) costs of legs, filled when needed; a negative number is minus a lower bound.
     cursor: a `_CURSOR` record (1,), at which the sweeps continue.
     """
     count, width, _ = candidates.shape
@@ -151,16 +151,14 @@ def _advance_sweeps(
 
 @compiled
 def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
-    """Return the cost of the best path through each candidate, with its turn there; inf above the bound."""
+    """Return the cost of the best path through each candidate, including its turn there; inf above the bound."""
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
     cost = sweeps.forward + sweeps.backward
     for i in range(1, candidates.shape[0] - 1):
         for k in range(candidates.shape[1]):
             if cost[i, k] < np.inf:
-                previous_waypoint, next_waypoint = (
-                    candidates[i - 1, sweeps.before[i, k]],
-                    candidates[i + 1, sweeps.after[i, k]],
-                )
+                previous_waypoint = candidates[i - 1, sweeps.before[i, k]]
+                next_waypoint = candidates[i + 1, sweeps.after[i, k]]
                 cost[i, k] += _corner_cost(data, limits, previous_waypoint, candidates[i, k], next_waypoint, corners)
                 cost[i, k] = cost[i, k] if cost[i, k] <= bound else np.inf
     return cost
@@ -182,7 +180,7 @@ def _extend_paths(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:
-    """Extend partial paths to candidate k of waypoint i; return the number of legs evaluated.
+    """Extend partial paths to candidate k of waypoint i; return the number of legs that were evaluated.
 
     step: 1 for paths from the start, -1 for paths from the destination.
     cost, link: (w, k) cost and neighbouring candidate of each partial path.
@@ -253,16 +251,14 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a turn beyond the limit, and of legs that are too short for it, m of path.
+    """Return the cost of a turn beyond the limit, and of legs that are too short for the turn, m of path.
 
-    corners: scratch, one record.
+    corners: scratch memory, one record.
     """
-    ux, uy, vx, vy = (
-        waypoint[0] - previous_waypoint[0],
-        waypoint[1] - previous_waypoint[1],
-        next_waypoint[0] - waypoint[0],
-        next_waypoint[1] - waypoint[1],
-    )
+    ux = waypoint[0] - previous_waypoint[0]
+    uy = waypoint[1] - previous_waypoint[1]
+    vx = next_waypoint[0] - waypoint[0]
+    vy = next_waypoint[1] - waypoint[1]
     first_length, second_length = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
     if first_length == 0.0 or second_length == 0.0:
         return TURN_COST
@@ -291,7 +287,7 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:
-    """Return a mask (n,): True where a point is on the map, above the clearance and outside kill spheres.
+    """Return a mask of the points that are on the map, above the clearance and outside kill spheres, (n,).
 
     points: (n, 3) m.
 

@@ -31,9 +31,9 @@ COST_ROUNDING_M = 1e-3
 
 @inner
 def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, max_cost: float) -> float:
-    """Return the length of a leg plus the costs of its violations, m of path.
+    """Return the length of a leg plus the cost of its violations, m of path.
 
-    If the cost exceeds `max_cost`, the evaluation ends and returns a lower bound that exceeds `max_cost`.
+    Once the cost exceeds `max_cost`, the evaluation ends; the result is then a lower bound.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     horizontal_length = math.sqrt(dx * dx + dy * dy)
@@ -98,7 +98,7 @@ def _max_depth_below_leg(
     start_altitude: float,
     end_altitude: float,
 ) -> float:
-    """Return the largest distance of the aircraft below a long leg, m; negative if it is always above.
+    """Return the largest distance of the aircraft below a long leg, m; negative if it stays above the leg.
 
     east, north: unit course of the leg.
     """
@@ -111,7 +111,7 @@ def _max_depth_below_leg(
 
 @compiled
 def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
-    """Choose one of the candidates (w, c, 3) of each waypoint to minimise the sum of leg costs.
+    """Choose one candidate (w, c, 3) for each waypoint, so that the sum of the leg costs is smallest.
 
     Return the chosen candidates (w,) and the number of legs evaluated.
     """
@@ -182,7 +182,7 @@ def fit_waypoints(
 ) -> Floats:
     """Return waypoints along a route, one per interval of the rotated frame, (w, 3) m.
 
-    route: (s, 3) along, across, up in the frame, m.
+    route: (s, 3) along, across and up in the frame, m.
     """
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     interval = edges[1] - edges[0]
@@ -193,9 +193,9 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
-    """Choose waypoints among candidate points and move them locally; return them with both ends, (w, 3).
+    """Choose waypoints among candidate points, move them locally, and return them with both ends, (w, 3).
 
-    points: (w - 2, k, 3) candidates of each inner waypoint, in its frame, m.
+    points: (w - 2, k, 3) candidates of each inner waypoint, in the frame of the waypoint, m.
 
     The returned waypoints are world positions, m.
     """
@@ -212,9 +212,9 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
 def move_all_waypoints(
     data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float
 ) -> tuple[Floats, int]:
-    """Shorten a path of the rotated encoding by moves of all its waypoints at once.
+    """Shorten a path of the rotated encoding by moving all its waypoints at once.
 
-    vector: (d,).
+    vector: the path, (d,).
     scale: initial moves relative to `FIRST_MOVES`.
 
     Single legs are evaluated, turns are not. Returns the new vector and the equivalent number of path evaluations.
@@ -257,7 +257,7 @@ def _move_waypoints(
 
 
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
-    """Return the best candidate of each waypoint (w, 3), in its frame, and the number of legs evaluated.
+    """Return the best candidate of each waypoint in the waypoint's frame, (w, 3), and the number of legs evaluated.
 
     The ends are fixed.
     """

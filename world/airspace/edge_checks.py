@@ -19,7 +19,7 @@ MAX_CROSSINGS = 50_000
 
 
 def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = True) -> None:
-    """Raise ValueError for an outline with too many corners, or with too many edges at the same place.
+    """Raise ValueError for an outline with too many corners, or with too many edges in one place.
 
     closed: True for rings; False for lines, in which the last corner is not joined to the first.
 
@@ -39,9 +39,9 @@ def check_edges(rings: Sequence[Sequence[Sequence[float]]], *, closed: bool = Tr
 
 
 def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, *, closed: bool = True) -> int:
-    """Return the number of pairs of edges that cross or touch; stop counting above ``max_count``.
+    """Return the number of pairs of edges that cross or touch; counting stops above ``max_count``.
 
-    Two successive edges of a ring, which share a corner, are not counted.
+    Successive edges of a ring, which share a corner, are not counted.
 
     >>> count_crossings([[(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0)]], 9)  # a bow tie
     1
@@ -59,7 +59,7 @@ def count_crossings(rings: Sequence[Sequence[Sequence[float]]], max_count: int, 
 
 
 def _make_edges(rings: Sequence[Sequence[Sequence[float]]], closed: bool) -> tuple[Any, Any]:
-    """Return the edges of rings as lines, and for each edge the index of the next edge of the same ring."""
+    """Return the edges of rings as lines, and for each edge the index of the next edge in its ring."""
     corners: list[Floats] = [np.asarray(ring, dtype=np.float64).reshape(-1, 2) for ring in rings]
     starts, ends = np.concatenate(corners), np.concatenate([np.roll(ring, -1, axis=0) for ring in corners])
     sizes = np.cumsum([0, *map(len, corners)])

@@ -22,7 +22,7 @@ _WGS84_CODE = 4326
 
 
 def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield each feature's location in the file, and the feature as GeoJSON in longitude and latitude.
+    """Yield the location of each feature in a file, and the feature as GeoJSON in longitude and latitude.
 
     Raises ScenarioError for a file that cannot be read as a GeoPackage, and for an invalid geometry.
     """
@@ -49,7 +49,7 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
 
 
 def _crs_definition(database: sqlite3.Connection, system: int) -> str:
-    """Return a table's coordinate reference system for PROJ; "" for longitude and latitude on WGS84."""
+    """Return the coordinate reference system of a table, as PROJ reads it; "" for WGS84 degrees."""
     system_row = database.execute(
         "select organization, organization_coordsys_id, definition from gpkg_spatial_ref_sys where srs_id = ?", [system]
     ).fetchone()
@@ -64,7 +64,7 @@ def _crs_definition(database: sqlite3.Connection, system: int) -> str:
 def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
     """Return the columns whose values are text or numbers.
 
-    The zone's name, from whichever column holds it, is added with the key "name", as in the other file formats.
+    The zone's name is added with the key "name", as in the other file formats, whatever its column is called.
     """
     plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
     name = next((value for key, value in plain.items() if key.lower() in ("name", "identifier", "title")), None)
@@ -98,7 +98,7 @@ def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
 
 
 def _tuples_to_lists(geometry: dict[str, Any]) -> dict[str, Any]:
-    """Convert the tuples in a geometry from shapely to lists, as in JSON."""
+    """Convert the tuples in a geometry of shapely to lists, as JSON has them."""
 
     def to_lists(value: Any) -> Any:
         return [to_lists(element) for element in value] if isinstance(value, tuple | list) else value

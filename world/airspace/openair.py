@@ -55,7 +55,9 @@ class _Block:
 
 
 def is_openair(text: str) -> bool:
-    r"""Return True if a text's first command begins an airspace, or is a name written before AC by mistake.
+    r"""Return True if a text begins an airspace in the OpenAir format.
+
+    Its first command is AC, or AN by mistake before AC.
 
     >>> is_openair("* Slovenia\nAC D\nAN CTR"), is_openair("QGC WPL 110")
     (True, False)
@@ -65,10 +67,11 @@ def is_openair(text: str) -> bool:
 
 
 def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
-    r"""Yield each zone's location in the file and its [[zones]] entries, or why it restricts no flight.
+    r"""Yield the location of each airspace in a file, and its [[zones]] entries or why it restricts no flight.
 
-    Every airspace is an exclusion, except classes E, F, G and unclassified without a type that requires more. An arc is
-    drawn with chords within `ARC_BEND` of it. Raises ScenarioError for a line that cannot be read.
+    Every airspace is an exclusion, with one exception: airspace of class E, F or G or without a class, unless its type
+    is more restrictive. An arc is approximated by chords within `ARC_BEND` of it. Raises ScenarioError for a line that
+    cannot be read.
 
     >>> text = "AC D\nAN CTR\nAL GND\nAH 2500ft AMSL\nV X=46:00:00N 014:00:00E\nDC 5"
     >>> [(where, entries["radius_m"], entries["ceiling_amsl_m"]) for where, entries in openair_zones(text, "a file")]
@@ -117,7 +120,7 @@ def _clean_line(line: str) -> str:
 
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
-    """Return an airspace's location in its file, and its zone's entries or the reason why it is skipped.
+    """Return the location of an airspace in its file, and its [[zones]] entries or why it is skipped.
 
     Raises ScenarioError if the airspace does not have exactly one shape.
     """
@@ -144,7 +147,7 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
-    """Return the outline of an airway: its segments, extended by half its width on all sides."""
+    """Return the outline of an airway, which extends by half its width on both sides of its segments."""
     if len(block.airway) < 2 or not block.width > 0.0:
         raise ScenarioError(
             f"{source}: DY: an airway needs at least two points, and a width (V W=) before them", file=source
@@ -164,7 +167,7 @@ def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
 
 
 def _read_times(block: _Block, text: str) -> None:
-    """Add a period in which the airspace is active; NONE means that a NOTAM states it."""
+    """Add a period in which the airspace is active; NONE means that a NOTAM states the period."""
     if text.upper() == "NONE":
         block.times.append(BY_NOTAM)
         return
@@ -174,7 +177,7 @@ def _read_times(block: _Block, text: str) -> None:
 
 
 def _limit_reader(key: str) -> Callable[[_Block, str], None]:
-    """Return the function for AL or AH, which sets the limit with this key in openAIP's form."""
+    """Return the function that reads AL or AH and stores the limit under a key, in openAIP's form."""
 
     def read(block: _Block, text: str) -> None:
         if key in block.limits:
@@ -186,7 +189,7 @@ def _limit_reader(key: str) -> Callable[[_Block, str], None]:
 
 
 def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
-    """Convert the text of a limit to openAIP's form; return None for the ground or an unlimited height.
+    """Convert the text of a limit to openAIP's form; return None for the ground or no limit.
 
     key: "lowerLimit" or "upperLimit".
     """
@@ -205,7 +208,7 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
 
 
 def _read_variable(block: _Block, text: str) -> None:
-    """Set the centre of arcs and circles, the direction of arcs, or the width of an airway (V)."""
+    """Set a variable (V): the centre or direction of arcs and circles, or the width of an airway."""
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
         block.centre = _parse_position(value)
@@ -228,7 +231,7 @@ def _read_circle(block: _Block, text: str) -> None:
 
 
 def _read_arc_by_bearings(block: _Block, text: str) -> None:
-    """Add an arc about the block's centre, with a radius and two bearings (DA)."""
+    """Add an arc about the block's centre, given by its radius and two bearings (DA)."""
     parts = text.split(",")
     if len(parts) != 3:
         raise ValueError("expected radius, first and last bearing: 5, 270, 290")
@@ -240,7 +243,7 @@ def _read_arc_by_bearings(block: _Block, text: str) -> None:
 
 
 def _read_arc_by_points(block: _Block, text: str) -> None:
-    """Add an arc about the block's centre, between two points (DB)."""
+    """Add an arc about the block's centre, given by its two end points (DB)."""
     ends = [_parse_position(match[0]) for match in _COORDINATE.finditer(text)]
     if len(ends) != 2:
         raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
@@ -264,7 +267,7 @@ def _add_corners(corners: list[_Position], added_corners: list[_Position]) -> No
 
 
 def _text_reader(name: str) -> Callable[[_Block, str], None]:
-    """Return the function for AN or AY, which stores the text in this field of the airspace."""
+    """Return the function that reads AN or AY and stores the text in a field of the airspace."""
 
     def read(block: _Block, text: str) -> None:
         setattr(block, name, text if name == "name" else text.upper())
@@ -338,7 +341,7 @@ def _required_centre(block: _Block) -> _Position:
 
 
 def _bearing_and_distance(centre: _Position, position: _Position) -> tuple[float, float]:
-    """Return the bearing, degrees, and distance, m, of a position from a centre."""
+    """Return the bearing (degrees) and the distance (m) from a centre to a position."""
     east, north = to_map(GeoOrigin(*centre), *position)
     return math.degrees(math.atan2(east, north)), math.hypot(east, north)
 
@@ -346,7 +349,7 @@ def _bearing_and_distance(centre: _Position, position: _Position) -> tuple[float
 def _arc_positions(
     centre: _Position, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
 ) -> list[_Position]:
-    """Return positions along an arc, including both ends, for chords within `ARC_BEND` of it.
+    """Return positions along an arc, both ends included, with chords within `ARC_BEND` of the arc.
 
     radii: radius at the first and at the last bearing, m; the radius changes linearly between them.
     first_bearing, last_bearing: degrees; equal bearings mean a full circle.

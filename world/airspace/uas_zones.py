@@ -31,7 +31,7 @@ _FoundZone = tuple[str, dict[str, Any] | str]
 
 
 def is_ed269(data: Mapping[str, Any]) -> bool:
-    """Return True if JSON data is ED-269: its first feature has a list of volumes.
+    """Return True if JSON data is in ED-269 format: its first feature has a list of volumes.
 
     >>> is_ed269({"features": [{"geometry": [{"horizontalProjection": {}}]}]}), is_ed269({"features": []})
     (True, False)
@@ -42,7 +42,7 @@ def is_ed269(data: Mapping[str, Any]) -> bool:
 
 
 def is_ed318(feature: Any) -> bool:
-    """Return True if a GeoJSON feature is ED-318: it has a variant and a type of restriction.
+    """Return True if a GeoJSON feature is in ED-318 format: it has a variant and a type of restriction.
 
     >>> is_ed318({"properties": {"type": "PROHIBITED", "variant": "COMMON"}}), is_ed318({"properties": None})
     (True, False)
@@ -52,13 +52,13 @@ def is_ed318(feature: Any) -> bool:
 
 
 def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the properties of a zone, merged with its own table `UASZone` if it has one."""
+    """Return the properties of a zone; its own table `UASZone`, if any, is merged into them."""
     zone = properties.get("UASZone")
     return {**properties, **zone} if isinstance(zone, dict) else properties
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
-    """Yield each volume's location in the file and its [[zones]] entries, or why it restricts no flight.
+    """Yield the location of each volume in a file, and its [[zones]] entries or why it restricts no flight.
 
     Raises ScenarioError for an invalid volume.
     """
@@ -86,7 +86,7 @@ def _feature_list(data: Mapping[str, Any]) -> Any:
 
 
 def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
-    """Convert a volume of ED-269 to the entries of a [[zones]] table, without a name."""
+    """Convert a volume of ED-269 to the entries of a [[zones]] table; the name is not included."""
     shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
     if not isinstance(shape, dict):
         raise _value_error(source, "", "horizontalProjection", "expected a polygon or a circle")
@@ -136,7 +136,7 @@ def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: s
 
 
 def _flatten_geometries(geometry: Any) -> Iterator[Any]:
-    """Yield a geometry, or the geometries of a collection, which may contain collections."""
+    """Yield a geometry, or the geometries in a collection and in the collections that it contains."""
     parts = geometry.get("geometries") if isinstance(geometry, dict) else None
     if isinstance(parts, list):
         for part in parts:
@@ -223,7 +223,7 @@ def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _one_line_name(value: Any) -> str:
-    """Return a name in one line; of several texts, the first English text, or else the first text."""
+    """Return a name in one line; if there are several texts, the first English text, else the first."""
     if isinstance(value, list):
         texts = [
             text_entry
@@ -242,7 +242,7 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone is active, as in a [[zones]] table; empty if it is always active."""
+    """Return the periods in which a zone is active, as [[zones]] texts; empty for an always active zone."""
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):
@@ -267,7 +267,7 @@ def _period_texts(applicability: Any, source: str) -> list[str]:
 def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
     """Return a date and time in UTC, or None for an empty value.
 
-    extreme_offset: offset that is added to a time that states no offset from UTC.
+    extreme_offset: offset that is added to a time without a UTC offset.
     """
     if value is None or value == "":
         return None
@@ -278,9 +278,9 @@ def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
 def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: Mapping[str, Any]) -> Period:
     """Convert one entry of a schedule to a period.
 
-    start, end: limits of the schedule.
+    start, end: first and last time of the schedule.
 
-    Sunrise, sunset and hours without a UTC offset are replaced by the whole day.
+    An entry with sunrise, sunset or hours without a UTC offset becomes the whole day.
     """
     stated_days = schedule_entry.get("day") or []
     day_names = [_upper_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
@@ -299,7 +299,7 @@ def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: 
 
 
 def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
-    """Return a time as minutes after 00:00 UTC of the stated day, or None if it has no UTC offset.
+    """Return a time as minutes after 00:00 UTC of the stated day; None if it has no UTC offset.
 
     rounds_up: True to round a part of a minute up.
 

@@ -57,11 +57,11 @@ _FAA_NOT_APPLICABLE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert a zone's properties to entries of a [[zones]] table, by default of an exclusion.
+    """Convert a zone's properties to the entries of a [[zones]] table; by default it is an exclusion.
 
-    A flight level or a height above the ellipsoid bounds an exclusion with a margin on the safe side:
-    `FLIGHT_LEVEL_ERROR`, and the range of the geoid. Raises ScenarioError for an invalid limit, for either of these two
-    on an inclusion, and for an unknown property that looks like a key of a scenario file.
+    A flight level, or a height above the ellipsoid, limits an exclusion with a margin on the safe side. The margin is
+    `FLIGHT_LEVEL_ERROR`, or the range of the geoid. An inclusion with such a limit is an error. Raises ScenarioError
+    for an invalid limit, and for an unknown property that looks like a key of a scenario file.
 
     >>> zone_entries({"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0}, "ceiling_agl_m": 90.0}, "a file")
     {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
@@ -83,12 +83,12 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert the limits of an authority's zone as `zone_entries` does, and mark the entries `PUBLISHED`.
+    """Convert the limits of an authority's zone as `zone_entries` does, and mark them as `PUBLISHED`.
 
-    Some limits in authorities' files leave an empty vertical band.  A lower limit above the upper limit (both AMSL, or
-    both above ground) is swapped with it, and the zone marked `UPSIDE_DOWN`.  An upper limit of 0 or below may mean no
-    limit or the lower limit: the zone extends to all heights.  An upper limit equal to the lower limit is ignored.
-    Zones of the last two kinds are marked `NO_BAND`.
+    Some limits in authorities' files leave no vertical band. A lower limit above the upper limit (both AMSL, or both
+    above ground) is swapped with it, and the zone is marked `UPSIDE_DOWN`. An upper limit of 0 or below may mean no
+    limit or the lower limit, so the zone extends to all heights. An upper limit equal to the lower limit is ignored.
+    The last two kinds of zones are marked `NO_BAND`.
 
     >>> high, low = ({"value": feet, "unit": "FT", "referenceDatum": "MSL"} for feet in (1000, 500))
     >>> published_entries({"lowerLimit": high, "upperLimit": low}, "a file")["ceiling_amsl_m"]
@@ -115,7 +115,7 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return a limit in m, after True for a height above ground or False for an altitude; None if invalid."""
+    """Return True for a height above ground or False for an altitude, and the limit in m; None if invalid."""
     if not isinstance(limit, dict):
         return None
     try:
@@ -143,7 +143,7 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
     """Convert a limit in openAIP's form to an entry of a [[zones]] table.
 
-    A floor at the ground gives no entry. Raises ScenarioError for an invalid limit.
+    A floor at the ground needs no entry. Raises ScenarioError for an invalid limit.
     """
     if not isinstance(value, dict):
         allowed = "expected a table of value, unit and referenceDatum"

@@ -31,7 +31,7 @@ Found = tuple[str, dict[str, Any] | str]
 
 
 def geojson_zones(text: str, source: str) -> Iterator[Found]:
-    """Yield the zones of a GeoJSON file, which includes ED-318, or of ED-269 JSON.
+    """Yield the zones of a GeoJSON file (including ED-318), or of a JSON file in ED-269 format.
 
     A multipolygon is one zone of several parts.  Raises ScenarioError for any other text, and for a geometry that is
     not a zone.
@@ -170,11 +170,11 @@ _NUMERIC_KEYS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m
 
 
 def kml_zones(text: str, source: str) -> Iterator[Found]:
-    """Yield each zone's location in a KML file and its [[zones]] entries.
+    """Yield the location of each zone in a KML file, and its [[zones]] entries.
 
-    An extruded polygon is a zone up to its height, with the datum of `altitudeMode`; a polygon clamped to the ground
-    has no ceiling.  ExtendedData states kind, floors, ceilings and radii by the keys of a scenario file.  Raises
-    ScenarioError for text that is not KML, and for a placemark that is not a zone.
+    An extruded polygon is a zone up to its height, with the datum that `altitudeMode` states. A polygon that is clamped
+    to the ground has no ceiling. ExtendedData states kind, floors, ceilings and radii with the keys of a scenario file.
+    Raises ScenarioError for text that is not KML, and for a placemark that is not a zone.
 
     >>> ring = "<coordinates>8,46 8.01,46 8.01,46.01</coordinates>"
     >>> ring = f"<outerBoundaryIs><LinearRing>{ring}</LinearRing></outerBoundaryIs>"
@@ -331,9 +331,9 @@ class FileZones:
 
 
 def is_zone_file(path: Path) -> bool:
-    """Return True if a file contains zones, judged by its suffix; for .txt by its first line.
+    """Return True if a file contains zones, judged by its suffix.
 
-    The first line must be an OpenAir command.
+    A .txt file contains zones if its first line is an OpenAir command.
     """
     suffix = path.suffix.lower()
     if suffix != ".txt":

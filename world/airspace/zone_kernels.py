@@ -106,13 +106,16 @@ def _make_edges(rings: list[Ring]) -> Records:
 
 
 def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float, bool]:
-    """Return the height of a level, m, and True if it is above ground; the default if there is no level."""
+    """Return the height of a level, m, and True if it is a height above ground.
+
+    Without a level the height is the default.
+    """
     return (default_height, False) if level is None else (level.height, level.datum == "ground")
 
 
 @inlined
 def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
-    """Return the horizontal distance between the bounding box of zone z and a box, m; 0 if they meet."""
+    """Return the horizontal distance between a box and the bounding box of zone z, m; 0 if they overlap."""
     zone = records.zones[z]
     east_gap = max(0.0, zone.west - east, west - zone.east)
     north_gap = max(0.0, zone.south - north, south - zone.north)
@@ -135,7 +138,7 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:
 def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
     """Return the distance from a position to the outline of zone z, m, and the index of the nearest edge.
 
-    The horizontal distance is negative inside. The index is -1 for a cylinder, which has no edges.
+    The distance is horizontal, and negative inside the zone. The index is -1 for a cylinder, which has no edges.
     """
     zone = records.zones[z]
     if zone.round:
@@ -171,14 +174,14 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
 
 @compiled_inline
 def height_outside_band(zone: Record, up: float, ground: float) -> float:
-    """Return the height by which an altitude is below a zone's floor or above its ceiling, m.
+    """Return the distance of an altitude below a zone's floor or above its ceiling, m.
 
     zone: a record of `ZONE`.
     up: altitude, m AMSL.
     ground: altitude of the ground below, m AMSL; if it is NaN (unknown), the result is NaN for a zone with levels above
         ground.
 
-    The result is negative between floor and ceiling: minus the distance to the nearer of the two.
+    Between floor and ceiling the result is minus the distance to the nearer of the two.
     """
     floor: float = zone.floor + ground if zone.floor_above_ground else zone.floor
     ceiling: float = zone.ceiling + ground if zone.ceiling_above_ground else zone.ceiling
@@ -191,13 +194,13 @@ def height_outside_band(zone: Record, up: float, ground: float) -> float:
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the length of a part of the segment a-b inside zone z, as a fraction of the segment.
+    """Return the fraction of the segment a-b that lies in a part of the segment and inside zone z.
 
-    begin_fraction, end_fraction: limits of the part; 0 and 1 for the whole segment.
+    begin_fraction, end_fraction: limits of the part, as fractions of the segment; 0 and 1 for the whole segment.
 
-    Exact: entries and exits alternate, so the fraction inside is the sum of the exit fractions minus the sum of the
-    entry fractions, each clipped to the part. A segment along an edge is outside if it is to the right of the edge, and
-    inside if it is to the left.
+    The result is exact. Entries and exits alternate, so the fraction inside is the sum of the exit fractions minus the
+    sum of the entry fractions, all clipped to the part. A segment along an edge is outside if it is to the right of the
+    edge, and inside if it is to the left.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay
@@ -254,8 +257,8 @@ def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: flo
     """Return the horizontal distance from the segment a-b to zone z, m, and the segment's nearest point.
 
     The nearest point is a fraction of the segment. If the segment meets the shape, the distance is 0, and the point is
-    inside the shape or on its outline; `edge_distance` gives the depth. Exact: two straight pieces that do not cross
-    are nearest at an end of one of them.
+    inside the shape or on its outline; `edge_distance` gives the depth. The result is exact, because two straight lines
+    that do not cross are nearest at an end of one of them.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay

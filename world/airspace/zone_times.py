@@ -58,7 +58,7 @@ class Period:
 
 
 def parse_period(text: str) -> Period | None:
-    """Parse the period in a line of text; return None for `BY_NOTAM`.
+    """Parse the period in a line of text; return None for the text `BY_NOTAM`.
 
     Raises ValueError for an invalid period.
 
@@ -143,7 +143,7 @@ def parse_span(text: str) -> tuple[datetime, datetime]:
 def is_active(times: Sequence[str], start: datetime, end: datetime) -> bool:
     """Return True if a zone may be active at any time from `start` to `end`, both included.
 
-    times: periods as `parse_period` reads them; without any, or with BY NOTAM, a zone is always active.
+    times: periods as `parse_period` reads them. A zone without periods, or with BY NOTAM, is always active.
 
     >>> start, end = parse_span("2026-05-02T06:30Z")  # a Saturday
     >>> is_active(["../.. SAT 07:00/20:00"], start, end), is_active(["../.. SUN"], start, end)

@@ -81,13 +81,14 @@ class Zone:
 
 
 def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
-    """Make a polygon from its outlines and holes, in any order and direction.
+    """Make a polygon from its outlines and holes, which may be in any order and direction.
 
     rings: corners (east, north) m of each ring.
 
-    A point is inside if an odd number of rings contain it. A corner that repeats the previous corner, or closes a ring,
-    is omitted. Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for rings that
-    cross each other, for a polygon of no area, and for too many corners or edges (`check_edges`).
+    A point is inside if an odd number of rings contain it. A corner is omitted if it repeats the previous corner, or
+    the first corner at the end of a ring. Raises ValueError for a ring of fewer than three corners, for a ring that
+    crosses itself, for rings that cross each other, for a polygon of no area, and for too many corners or edges
+    (`check_edges`).
 
     >>> make_polygon([[(0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (90.0, 0.0), (0.0, 0.0)]]).rings
     (((90.0, 0.0), (90.0, 90.0), (0.0, 90.0), (0.0, 0.0)),)
@@ -124,7 +125,7 @@ def _do_rings_cross(first: shapely.Polygon, second: shapely.Polygon) -> bool:
 
 
 def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
-    """Return a ring without repeated corners.  Raises ValueError for fewer than three different corners."""
+    """Return a ring without repeated corners. Raises ValueError for fewer than three different corners."""
     if not all(math.isfinite(value) for corner in ring for value in corner):
         raise ValueError("a corner is not a number")
     corners = [(float(east), float(north)) for east, north in ring]
@@ -137,7 +138,7 @@ def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
 
 
 def _orient_ring(ring: Ring, depth: int) -> Ring:
-    """Return a ring with its corners anticlockwise, or clockwise if the ring bounds a hole.
+    """Return a ring with anticlockwise corners, or with clockwise corners if it bounds a hole.
 
     depth: number of other rings that contain the ring; odd for a hole.
     """
@@ -163,7 +164,7 @@ def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
 
 
 def is_hole(ring: Ring) -> bool:
-    """Return True if a ring of a `Polygon` bounds a hole, which means that it runs clockwise.
+    """Return True if a ring of a `Polygon` bounds a hole; such a ring is clockwise.
 
     >>> is_hole(((0.0, 0.0), (0.0, 90.0), (90.0, 90.0)))
     True
@@ -172,7 +173,7 @@ def is_hole(ring: Ring) -> bool:
 
 
 def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
-    """Return the outline of a band of constant width along a line, with half circles at its ends, m.
+    """Return the outline of a band of constant width along a line, with semicircular ends, m.
 
     Raises ValueError for a line that crosses itself too often.
 
@@ -195,15 +196,16 @@ REPAIR_MARGIN_DEG = 1e-6
 def repair_rings(
     rings: Sequence[Sequence[Sequence[float]]], max_crossings: int = MAX_CROSSINGS
 ) -> tuple[list[list[list[float]]], int] | None:
-    """Repair rings that cross; return the rings of the enclosed area and the number of edge crossings.
+    """Repair rings that cross.
 
     rings: rings of [latitude, longitude], the outline first.
     max_crossings: maximum number of crossings.
 
-    A ring that is not inside another ring is a part of the area, not a hole; a ring of fewer than three different
-    corners is dropped. The area grows by `REPAIR_MARGIN_DEG` on all sides. Returns no rings for an outline that
-    encloses no area, and None if there is nothing to repair. Raises ValueError for more crossings than
-    ``max_crossings``, and for too many corners or edges (`check_edges`).
+    Returns the rings of the enclosed area, and the number of edge crossings. Returns no rings for an outline that
+    encloses no area, and None if there is nothing to repair. A ring that is not inside another ring is a part of the
+    area, not a hole. A ring of fewer than three different corners is left out. The area is extended by
+    `REPAIR_MARGIN_DEG` on all sides. Raises ValueError for more crossings than ``max_crossings``, and for too many
+    corners or edges (`check_edges`).
 
     >>> made, crossings = repair_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
     >>> len(made), crossings  # both halves of a bow tie, joined in the middle
@@ -236,7 +238,7 @@ def repair_rings(
 
 
 def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
-    """Return the area that rings enclose, each repaired separately.
+    """Return the area that rings enclose; each ring is repaired separately.
 
     A ring inside an odd number of other rings is a hole in them. A ring inside another ring may extend beyond it by
     `REPAIR_MARGIN_DEG`; of two identical rings neither is inside the other. A ring that crosses another ring, touches
@@ -266,7 +268,7 @@ def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
 
 
 def are_holes_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
-    """Return True if all holes are within the outline, or if a ring is invalid (see `make_polygon`).
+    """Return True if all holes are inside the outline, or if a ring is invalid (see `make_polygon`).
 
     rings: the outline first, then its holes.
 

@@ -28,8 +28,8 @@ MAX_MAP_CORNERS = 2_000_000
 def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
     """Convert a ring of corners (latitude, longitude), degrees, to corners (east, north), m.
 
-    Between two corners a ring is straight in degrees, as in GeoJSON (RFC 7946, 3.1.1) and in the fences of autopilots;
-    where that is not straight on the map, corners are inserted.  The longitude takes the shorter direction.
+    Between two corners a ring is straight in degrees, as in GeoJSON (RFC 7946, 3.1.1) and in the fences of autopilots.
+    Corners are inserted where such an edge is not straight on the map. The longitude takes the shorter direction.
     Raises ValueError for edges so long that they need too many corners.
 
     >>> origin = GeoOrigin(46.0, 8.0)
@@ -62,7 +62,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 
 
 def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
-    """Return a count of corners increased by the corners of a shape.
+    """Return a count of corners plus the number of corners of a shape.
 
     Raises ValueError above `MAX_MAP_CORNERS`.
 
@@ -112,12 +112,14 @@ _DEGREE_LENGTH_M = 111_000.0
 
 
 def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
-    """Return the inclusions of a file, and its exclusions within `MAX_ZONE_DISTANCE` of the area.
+    """Return the zones of a file that are relevant for an area.
+
+    They are all inclusions, and the exclusions within `MAX_ZONE_DISTANCE` of the area.
 
     source: name of the file in messages.
     bounds: (2, 2) m, west and east, south and north of the area.
 
-    Raises ScenarioError for an invalid shape among the omitted zones; `make_zones` checks the others.
+    Raises ScenarioError if an omitted zone has an invalid shape; `make_zones` checks the other zones.
     """
     zones_nearby = []
     for k, table in enumerate(tables):
@@ -134,7 +136,7 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
 def _check_rings(table: ZoneTable) -> None:
     """Raise ValueError if the rings in degrees of a zone are not a valid polygon.
 
-    The rings are not projected on the map.
+    The rings are checked in degrees, without projection on the map.
     """
     rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if rings and rings[0]:
@@ -204,8 +206,7 @@ def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | 
 
     point: (3,) m.
 
-    If the ground height is not known, the position is taken to be between a floor and a ceiling that are heights above
-    ground.
+    If the ground height is unknown, the position is assumed to be within limits that are heights above ground.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
@@ -288,7 +289,7 @@ def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Fl
     """Return the altitude of a floor or a ceiling above each point of the ground, m AMSL, (n,).
 
     ground: altitudes of the ground, m AMSL, (n,).
-    default: altitude if the level is None, m AMSL.
+    default: altitude for a level of None, m AMSL.
 
     >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
@@ -299,9 +300,12 @@ def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Fl
 
 
 def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, default_ceiling: float) -> list[Floats]:
-    """Return the walls of a zone, one array (k, 2, 3) per ring: lower and upper end at each corner, m.
+    """Return the walls of a zone: one array (k, 2, 3) m for each ring.
 
-    default_floor, default_ceiling: altitudes for an unknown ground and for a zone without a ceiling, m AMSL.
+    The array has the lower and the upper end of the wall at each of the k corners.
+
+    default_floor: altitude of unknown ground, m AMSL.
+    default_ceiling: ceiling of a zone without a ceiling, m AMSL.
 
     A floor below the ground is raised to the ground.
 

@@ -79,7 +79,7 @@ class Forecast:
         return float(max(north, east)) * _KM_PER_DEGREE
 
     def step_at(self, departure: datetime) -> tuple[datetime, datetime]:
-        """Return the times of the forecast before and after a departure within its times."""
+        """Return the forecast's times just before and after a departure."""
         after = int(np.clip(np.searchsorted(self.times, departure.timestamp(), side="right"), 1, len(self.times) - 1))
         return (
             datetime.fromtimestamp(float(self.times[max(0, after - 1)]), UTC),
@@ -87,13 +87,13 @@ class Forecast:
         )
 
     def end_of_steps(self, departure: datetime) -> datetime:
-        """Return the last time after a departure before a step longer than `LONGEST_STEP`."""
+        """Return the last time after a departure that is reached without a step longer than `LONGEST_STEP`."""
         times = self.times[self.times >= departure.timestamp()]
         long_steps = np.flatnonzero(np.diff(times) > LONGEST_STEP.total_seconds())
         return self.last_time if not len(long_steps) else datetime.fromtimestamp(float(times[long_steps[0]]), UTC)
 
     def field_from(self, departure: datetime, member: int = 0) -> WindField:
-        """Return the wind of one member with times in seconds after the departure."""
+        """Return the wind of one member; its times are in seconds after the departure."""
         field = WindField(
             self.times - departure.timestamp(),
             self.latitudes,
@@ -104,7 +104,7 @@ class Forecast:
         return field.between(0.0, LONGEST_FLIGHT_S)
 
     def facts(self, departure: datetime) -> "ForecastFacts":
-        """Return what the first lines of an answer say of the forecast."""
+        """Return the facts on the forecast that the first lines of an answer state."""
         return ForecastFacts(
             source=self.source,
             issued=self.issued,
@@ -151,7 +151,7 @@ class ForecastFacts:
 
     @property
     def age(self) -> timedelta | None:
-        """Age of the forecast at the departure; None if its time of issue is not stated."""
+        """Age of the forecast at the departure; None if the time of issue is unknown."""
         return None if self.issued is None else self.departure - self.issued
 
     @property

@@ -39,7 +39,10 @@ _TIMEOUT_S = 1800.0
 
 
 def read_in_process(path: Path, box: Box, ground_amsl: float) -> Forecast:
-    """Read a GRIB file as `world.forecast.read_forecast.read_forecast` does.  Raises ForecastError."""
+    """Read a GRIB file in another process, like `world.forecast.read_forecast.read_forecast`.
+
+    Raises ForecastError.
+    """
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])

@@ -28,11 +28,11 @@ class LevelGroup:
 def merge_levels(groups: Sequence[LevelGroup], ground: Floats | None, ground_amsl: float) -> tuple[Floats, Floats]:
     """Return the altitudes (t, y, x, k) and the winds (m, t, y, x, k, 2) of all levels, in ascending order.
 
-    Levels on a pressure surface below the lowest level above ground are inside the ground: they take the wind and the
-    altitude of that lowest level.
+    A pressure level that is below the lowest level above ground is inside the ground. It gets the wind and the altitude
+    of this lowest level.
 
-    ground: (y, x) ground of the forecast's model, m AMSL; None for one ground everywhere.
-    ground_amsl: that ground, m AMSL.
+    ground: (y, x) altitude of the ground in the forecast's model, m AMSL; None for the same altitude everywhere.
+    ground_amsl: this single altitude, m AMSL.
     """
     ground_level = np.array(ground_amsl) if ground is None else ground
     altitudes, velocities = [], []

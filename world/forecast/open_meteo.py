@@ -39,11 +39,11 @@ class _Place(NamedTuple):
 
 
 def read_open_meteo(path: Path, ground_amsl: float) -> Forecast:
-    """Read a forecast of one place, or of several places on a regular grid.
+    """Read a forecast of Open-Meteo for one place, or for several places on a regular grid.
 
     ground_amsl: ground at the mission's start, m AMSL, for a file without `elevation`.
 
-    Raises ForecastError, in one line, for a file that lacks what is needed.
+    Raises ForecastError, in one line, for a file without the required variables.
     """
     try:
         content = json.loads(read_small_file(path, MAX_BYTES, "forecast", ForecastError))
@@ -134,9 +134,11 @@ def _read_place(path: Path, entry: dict[str, Any], ground_amsl: float) -> _Place
 
 
 def _find_level(path: Path, hourly: dict[str, Any], match: re.Match[str]) -> tuple[str, str, str]:
-    """Return the names of a level's speed, direction and geopotential height, which is "" for a height above ground.
+    """Return the names of a level's speed, direction and geopotential height.
 
-    match: match of the speed's name.
+    The last name is "" for a level at a height above ground.
+
+    match: match of the name of the speed.
     """
     name, level = match.group(), f"{match.group(1)}{match.group(2)}"
     direction = next((text for text in (f"wind_direction_{level}", f"winddirection_{level}") if text in hourly), None)
@@ -154,7 +156,7 @@ def _is_null(values: Any) -> bool:
 
 
 def _count_complete_times(columns: Sequence[Any], count: int) -> int:
-    """Return the number of times up to the last time at which no value of the columns is null.
+    """Return the number of times up to the last time at which all columns have a value.
 
     A model that ends before the requested days has null at all later times.
     """
@@ -167,7 +169,7 @@ def _count_complete_times(columns: Sequence[Any], count: int) -> int:
 def _number(
     path: Path, entry: dict[str, Any], name: str, low: float, high: float, default: float | None = None
 ) -> float:
-    """Return a number of an entry."""
+    """Return a number from an entry. Raises ForecastError outside its limits."""
     value = entry.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise _fault(path, name, f"{str(value)[:40]}: allowed {low:g}..{high:g}")
@@ -196,7 +198,7 @@ def _read_times(path: Path, hourly: dict[str, Any], units: dict[str, Any], entry
 def _column(
     path: Path, hourly: dict[str, Any], units: dict[str, Any], name: str, count: int, factors: Mapping[str, float]
 ) -> Floats:
-    """Return the values of one hourly variable in the first of the units of `factors`, (t,)."""
+    """Return the values of one hourly variable, (t,), in the first unit of `factors`."""
     factor = unit_factor(units.get(name), factors)
     if factor is None:
         raise _fault(path, f"hourly_units.{name}", f"{units.get(name)!r}: allowed {', '.join(sorted(factors))}")

@@ -57,11 +57,11 @@ _GROUND_NAMES = {"orog", "orography", "zsfc", "surface_altitude", "hsurf", "topo
 
 
 def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
-    """Read the part of a forecast that determines the wind in a box.
+    """Read the part of a forecast that is needed for the wind in a box.
 
     ground_amsl: ground at the mission's start, m AMSL, for heights above ground in a file without the model's ground.
 
-    Raises ForecastError, in one line, for a file that is missing, damaged, or lacks what is needed, and
+    Raises ForecastError, in one line, for a file that is missing or damaged, or that lacks a required variable. Raises
     MissingExtraError if xarray or cfgrib is not installed.
     """
     if not path.is_file():
@@ -72,7 +72,7 @@ def read_forecast(path: Path, box: Box, ground_amsl: float) -> Forecast:
 
 @functools.lru_cache(maxsize=4)
 def _read_cached(path: Path, version: tuple[int, int], box: Box, ground_amsl: float) -> Forecast:
-    """Read a forecast; the version of the file is part of the cache's key."""
+    """Read a forecast; the version of the file is a part of the cache's key."""
     try:
         with path.open("rb") as file:
             start = file.read(64)
@@ -106,10 +106,10 @@ def read_grib(path: Path, box: Box, ground_amsl: float) -> Forecast:
 
 
 def _call_library(path: Path, function: Callable[[], Any]) -> Any:
-    """Return what a function of a library returns, without its warnings.
+    """Call a function of a library, without its warnings, and return its result.
 
-    Raises ForecastError for a damaged file, with the first line of the library's reason: each library raises errors of
-    its own for it.
+    Libraries raise errors of many kinds for a damaged file. Each of them is raised as a ForecastError with the first
+    line of its text.
     """
     hook = sys.unraisablehook
     # Objects of files that are not open fail when they are closed: Python would print that.
@@ -141,7 +141,7 @@ class _ForecastReader:
         self.ground: Floats | None = None
 
     def fail(self, field: str, allowed: str) -> ForecastError:
-        """Return the error for a variable of the file, with what is allowed."""
+        """Return the error for a variable of the file, with the allowed values."""
         return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
 
     def read(self, datasets: Sequence[Any]) -> Forecast:
@@ -175,7 +175,7 @@ class _ForecastReader:
     # Times.
 
     def _decode_times(self, dataset: Any) -> Any:
-        """Return a dataset with its times as datetime64."""
+        """Return a dataset in which all times are datetime64."""
         import xarray
 
         for name, variable in dataset.variables.items():
@@ -188,7 +188,10 @@ class _ForecastReader:
         return decoded
 
     def _valid_times(self, array: Any) -> tuple[str | None, Floats]:
-        """Return the dimension of a variable's times (None for a single time), and the times in s since 1970."""
+        """Return the time dimension of a variable, and its times in s since 1970.
+
+        The dimension is None for a variable with a single time.
+        """
         times = _time_coordinates(array)
         for name in ("valid_time", *array.dims, "time", *times):
             coordinate = times.get(str(name))
@@ -203,7 +206,10 @@ class _ForecastReader:
         raise self.fail("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
 
     def _find_issue(self, decoded: Sequence[Any]) -> datetime | None:
-        """Return the time of issue that a file states, or None; an analysis of several times has none."""
+        """Return the time of issue that a file states, or None.
+
+        An analysis of several times has no time of issue.
+        """
         for dataset in decoded:
             for name, variable in dataset.variables.items():
                 is_issue = variable.attrs.get("standard_name") == "forecast_reference_time"
@@ -218,7 +224,7 @@ class _ForecastReader:
     # Axes.
 
     def _set_axes(self, arrays: Sequence[Any]) -> None:
-        """Set latitudes and longitudes from the first variable, and the times that all variables have."""
+        """Set latitudes and longitudes from the first variable, and the times that are common to all variables."""
         times = [self._valid_times(array)[1] for array in arrays]
         common = functools.reduce(np.intersect1d, times)
         if not len(common):
@@ -227,7 +233,7 @@ class _ForecastReader:
         self.latitudes, self.longitudes = self._axes(arrays[0])
 
     def _horizontal(self, array: Any) -> tuple[Any, Any]:
-        """Return the coordinates of latitude and longitude of a variable."""
+        """Return the latitude and longitude coordinates of a variable."""
         found = []
         for standard_name, names in (("latitude", ("lat", "latitude")), ("longitude", ("lon", "longitude"))):
             for name, coordinate in array.coords.items():
@@ -239,7 +245,7 @@ class _ForecastReader:
         return found[0], found[1]
 
     def _axes(self, array: Any) -> tuple[Floats, Floats]:
-        """Return the ascending latitudes and longitudes of the nodes around the box, deg."""
+        """Return the latitudes and longitudes of the nodes around the box, in ascending order, deg."""
         latitude, longitude = self._horizontal(array)
         if latitude.ndim == 2:
             return self._regular_axes(latitude.values, longitude.values)
@@ -290,7 +296,7 @@ class _ForecastReader:
     # Winds.
 
     def _read_ground(self, datasets: Sequence[Any]) -> Floats | None:
-        """Return the ground of the forecast's model, (y, x) m AMSL; None if the file does not state it."""
+        """Return the altitude of the ground in the forecast's model, (y, x) m AMSL; None if not stated."""
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
                 is_surface = array.attrs.get("GRIB_typeOfLevel") == "surface" and _is_height(name, array)
@@ -307,7 +313,7 @@ class _ForecastReader:
         return None
 
     def _height_factor(self, array: Any) -> float:
-        """Return the factor from the values of a height or a geopotential to m."""
+        """Return the factor that converts a height or a geopotential to m."""
         units = array.attrs.get("units")
         factor = unit_factor(units, HEIGHT_UNITS)
         if factor is None and str(units).replace(" ", "") in GEOPOTENTIAL_UNITS:
@@ -317,7 +323,7 @@ class _ForecastReader:
         return factor
 
     def _wind_pairs(self, dataset: Any) -> Iterator[tuple[Any, Any]]:
-        """Yield the pairs of an eastward and a northward wind of a dataset."""
+        """Yield the pairs of variables of a dataset that are an eastward and a northward wind."""
         east = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _U_NAME, _EAST_NAMES)}
         north = {str(n): a for n, a in dataset.data_vars.items() if _is_component(n, a, _V_NAME, _NORTH_NAMES)}
         for name, array in east.items():
@@ -334,9 +340,10 @@ class _ForecastReader:
             raise self.fail(next(iter(north)), "its eastward wind is missing")
 
     def _level_of(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
-        """Return the kind of a variable's levels, their dimension (None for one level), and their values.
+        """Return the kind of a variable's levels, their dimension, and their values.
 
-        The values are hPa, m above ground or m AMSL.  Return None for a variable without levels.
+        The dimension is None for a single level. The values are hPa, m above ground or m AMSL. Return None for a
+        variable without levels.
         """
         for coordinate_name, coordinate in array.coords.items():
             kind = self._level_kind(str(coordinate_name), coordinate)
@@ -355,7 +362,7 @@ class _ForecastReader:
 
     @staticmethod
     def _level_kind(name: str, coordinate: Any) -> LevelKind | None:
-        """Return the kind of level that a coordinate states, or None for another coordinate."""
+        """Return the kind of level that a coordinate states, or None if it states no level."""
         standard_name, lower = str(coordinate.attrs.get("standard_name", "")), name.lower()
         units = coordinate.attrs.get("units")
         texts = " ".join((lower, standard_name, str(coordinate.attrs.get("long_name", "")))).lower()
@@ -373,7 +380,7 @@ class _ForecastReader:
         return None
 
     def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
-        """Return the wind of one pair of variables, with the altitudes or heights of its levels."""
+        """Return the wind of one pair of variables, and the altitudes or heights of its levels."""
         level = self._level_of(east, east.name)
         if level is None:
             raise self.fail(str(east.name), "its level is not stated: pressure, height above ground or altitude")
@@ -416,12 +423,15 @@ class _ForecastReader:
 
     @staticmethod
     def _is_grid_relative(array: Any) -> bool:
-        """Return True if the components of a wind follow the axes of the grid instead of east and north."""
+        """Return True if the components of a wind are along the axes of the grid, not along east and north."""
         attributes = array.attrs
         return attributes.get("standard_name") == "x_wind" or attributes.get("GRIB_uvRelativeToGrid") == 1
 
     def _geopotential(self, datasets: Sequence[Any], wind: Any, dim: str | None) -> Floats:
-        """Return the altitudes of a wind's pressure levels from the geopotential height, (t, y, x, k) m AMSL."""
+        """Return the altitudes of a wind's pressure levels, (t, y, x, k) m AMSL.
+
+        They are read from the geopotential height.
+        """
         level_kind = self._level_of(wind, wind.name)
         for dataset in datasets:
             for name, array in dataset.data_vars.items():
@@ -488,13 +498,13 @@ class _ForecastReader:
 
 
 def _names_of(name: Any, array: Any) -> set[str]:
-    """Return the names that identify a variable, in lower case."""
+    """Return the names by which a variable may be identified, in lower case."""
     stated = (name, array.attrs.get("standard_name"), array.attrs.get("GRIB_shortName"))
     return {str(text).lower() for text in stated if text is not None}
 
 
 def _time_coordinates(array: Any) -> dict[str, Any]:
-    """Return the coordinates of a variable that are times, by name, without its time of issue."""
+    """Return the coordinates of a variable that are times, by name; the time of issue is left out."""
     return {
         str(name): coordinate
         for name, coordinate in array.coords.items()
@@ -504,7 +514,7 @@ def _time_coordinates(array: Any) -> dict[str, Any]:
 
 
 def _is_component(name: Any, array: Any, pattern: re.Pattern[str], standard_names: tuple[str, ...]) -> bool:
-    """Return True if a variable is a component of the wind, by its standard name or, without one, by its name."""
+    """Return True if a variable is a component of the wind, by its standard name or else by its name."""
     standard_name = str(array.attrs.get("standard_name", ""))
     is_other_quantity = standard_name not in ("", "unknown") and "wind" not in standard_name
     return standard_name in standard_names or (pattern.match(str(name)) is not None and not is_other_quantity)
@@ -516,7 +526,7 @@ def _is_height(name: Any, array: Any) -> bool:
 
 
 def _partner_key(name: str, letter: str) -> str:
-    """Return the name of a component without the part that names its axis.
+    """Return the name of a wind component without the part that states its axis.
 
     >>> _partner_key("u10", "u") == _partner_key("v10", "v")
     True

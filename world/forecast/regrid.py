@@ -8,16 +8,18 @@ from world.arrays import Floats, Ints
 
 
 def _near_longitudes(longitudes: Floats, west: float, east: float) -> Floats:
-    """Return longitudes within half a turn of the middle between two longitudes, deg."""
+    """Return longitudes shifted to within half a turn of the middle of two longitudes, deg."""
     center = 0.5 * (west + east)
     near: Floats = center + (longitudes.astype(np.float64) - center + 180.0) % 360.0 - 180.0
     return near
 
 
 def regular_axes(latitudes: Floats, longitudes: Floats, box: Any) -> tuple[Floats, Floats] | None:
-    """Return latitudes and longitudes of a regular grid around a box, with the distance of the grid's own nodes.
+    """Return the latitudes and longitudes of a regular grid around a box.
 
-    latitudes, longitudes: (r, c) deg, of the nodes.
+    The distance of its nodes is that of the given grid.
+
+    latitudes, longitudes: nodes of the given grid, (r, c) deg.
     box: south, west, north and east.
 
     Return None if the box is not inside the grid.
@@ -33,7 +35,7 @@ def regular_axes(latitudes: Floats, longitudes: Floats, box: Any) -> tuple[Float
 
 
 def near_nodes(latitudes: Floats, longitudes: Floats, rows: Floats, columns: Floats) -> tuple[Ints, Ints]:
-    """Return the indices of the rows and of the columns of a grid that has nodes around a regular grid.
+    """Return the indices of the rows and columns of a grid that surround a regular grid.
 
     latitudes, longitudes: (r, c) deg, of the nodes.
     rows, columns: (y,), (x,) deg, of the regular grid.
@@ -52,7 +54,7 @@ def regrid(values: Floats, latitudes: Floats, longitudes: Floats, rows: Floats, 
     latitudes, longitudes: (r, c) deg.
     rows, columns: (y,), (x,) deg.
 
-    Return (m, t, y, x, k); NaN outside the nodes.
+    Return (m, t, y, x, k) values, NaN outside the grid of nodes.
     """
     from scipy.interpolate import LinearNDInterpolator
 
@@ -66,7 +68,7 @@ def regrid(values: Floats, latitudes: Floats, longitudes: Floats, rows: Floats, 
 
 
 def rotate_to_north(velocities: Floats, latitudes: Floats, longitudes: Floats, rows: Floats, columns: Floats) -> None:
-    """Rotate winds along the axes of a projected grid to east and north, in place.
+    """Rotate winds from the axes of a projected grid to east and north, in place.
 
     velocities: (m, t, y, x, k, 2) m/s on the regular grid, along the projected grid's columns and rows.
     latitudes, longitudes: (r, c) deg, of the projected grid's nodes.

@@ -53,12 +53,12 @@ def map_box(origin: GeoOrigin, bounds: Floats) -> Box:
 
 
 def departure_of(at: str) -> datetime:
-    """Return the time of take-off, the start of a scenario's time of flight."""
+    """Return the time of take-off, which is the start of a scenario's time of flight."""
     return parse_span(at)[0].astimezone(UTC)
 
 
 def scenario_forecast(table: "WindTable", origin: GeoOrigin, bounds: Floats, start_ground: float) -> Forecast:
-    """Read the forecast that a [wind] table names, around the bounds of a scenario's map.
+    """Read the forecast that a [wind] table names, for the area of a scenario.
 
     start_ground: ground at the mission's start, m AMSL.
 
@@ -83,13 +83,13 @@ class ForecastSite(NamedTuple):
 def forecast_wind(
     table: "WindTable", forecast: Forecast, at: str, site: ForecastSite, member: int
 ) -> tuple[Wind, "WindTable"]:
-    """Return the wind of a flight in a forecast, and the [wind] table with the wind's mean profile.
+    """Return the wind of a flight in a forecast, and the [wind] table with the mean profile of this wind.
 
     at: time of flight, whose start is the take-off.
     member: member of the ensemble.
 
-    Raises ForecastError if the take-off is outside the forecast's times, an end of the mission outside its box or its
-    levels, or the mean wind stronger than a scenario's wind may be.
+    Raises ForecastError if the take-off is outside the forecast's times, or if an end of the mission is outside its box
+    or its levels. Also raises ForecastError if the mean wind is stronger than a scenario allows.
     """
     file, departure = str(table.forecast), departure_of(at)
     if not forecast.first_time <= departure <= forecast.last_time:
@@ -143,7 +143,7 @@ def forecast_wind(
 
 
 def check_coverage(wind: Wind, file: str, latitudes: Floats, longitudes: Floats, altitudes: Floats) -> None:
-    """Raise ForecastError if places of a mission are outside the box or the levels of the wind's forecast.
+    """Raise ForecastError if a position of a mission is outside the box or the levels of the forecast.
 
     file: file of the forecast, for the message.
     latitudes, longitudes: (n,) deg.

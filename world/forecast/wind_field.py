@@ -59,10 +59,10 @@ class WindField:
         return hash(self.packed().tobytes())
 
     def packed(self) -> Floats:
-        """Return the field as one array of numbers, for `interpolate_field`.
+        """Return the field as one array of numbers, which `interpolate_field` reads.
 
-        The four counts (t, y, x, k) are followed by the times, the latitudes and the longitudes, and by altitude, east
-        and north of each node.
+        The array contains the four counts (t, y, x, k), then the times, the latitudes and the longitudes, and then the
+        altitude, east wind and north wind of each node.
         """
         nodes = np.concatenate([self.altitudes[..., np.newaxis], self.velocities], axis=-1)
         axes = (self.times, self.latitudes, self.longitudes)
@@ -70,7 +70,7 @@ class WindField:
 
     @classmethod
     def unpacked(cls, numbers: Floats, count: int) -> "WindField":
-        """Return the field from its packed form.
+        """Return the field that `packed` stored in an array of numbers.
 
         count: expected length of the packed form.
 
@@ -92,9 +92,9 @@ class WindField:
     def interpolate(
         self, seconds: ArrayLike, latitudes: ArrayLike, longitudes: ArrayLike, altitudes: ArrayLike
     ) -> Floats:
-        """Return the wind at n points, m/s, east and north, and the altitude at which it applies, m AMSL, (n, 3).
+        """Return the wind at n points, m/s, east and north, and the altitude at which it applies, (n, 3).
 
-        That altitude is the point's altitude, limited to the field's levels there.
+        The altitude (m AMSL) is that of the point, limited to the levels of the field at the point.
 
         seconds: (n,) s, or one value, as all arguments.
         latitudes, longitudes: deg.
@@ -111,7 +111,7 @@ class WindField:
         return self.interpolate(seconds, latitudes, longitudes, altitudes)[:, :2]
 
     def between(self, start: float, end: float) -> "WindField":
-        """Return the part of the field that determines the wind from `start` to `end` (s)."""
+        """Return the part of the field that is needed for the wind from `start` to `end` (s)."""
         times: Sequence[float] = self.times.tolist()
         first = max(0, bisect.bisect_right(times, start) - 1)
         last = min(len(times), bisect.bisect_left(times, end) + 1)
@@ -266,7 +266,10 @@ class MeanProfile:
 
 
 def without_levels_above(field: WindField, amsl: float) -> WindField:
-    """Return a field without its levels above an altitude (m AMSL) everywhere, except the lowest of them."""
+    """Return a field without the levels that are above an altitude (m AMSL) everywhere.
+
+    The lowest of these levels is kept.
+    """
     lowest = field.altitudes.min(axis=(0, 1, 2))
     count = min(len(lowest), int((lowest <= amsl).sum()) + 1)
     return replace(
@@ -277,9 +280,9 @@ def without_levels_above(field: WindField, amsl: float) -> WindField:
 
 
 def fit_profile_line(heights: Floats, samples: Floats) -> MeanProfile:
-    """Return the mean profile through winds at heights above the reference altitude.
+    """Return the straight mean profile through winds at several heights.
 
-    heights: (h,) m.
+    heights: (h,) m above the reference altitude.
     samples: (h, 2) m/s, east and north.
 
     Each component is a least-squares line over height. Speed and direction are rounded to 1e-5 m/s and 1e-5 degrees.
@@ -303,13 +306,13 @@ def fit_mean_profile(
     reference_amsl: float,
     altitudes: tuple[float, float],
 ) -> MeanProfile:
-    """Return the mean profile of a field at a time (s) and place (deg).
+    """Return the mean profile of a wind field at a time (s) and a place (deg).
 
     reference_amsl: altitude of the profile's speed, m AMSL.
     altitudes: lowest and highest altitude of the mission, between which the profile is fitted, m AMSL.
 
-    The gradient is limited so that the speed is at least 0 at all nodes: the flight adds the deviation of the field
-    from the profile, and the speed of a profile is never below 0.
+    The gradient is limited so that the line of the profile has a speed of at least 0 at all nodes. A flight never uses
+    a profile speed below 0, and adds the deviation of the field from the profile.
     """
     points = np.linspace(*altitudes, _PROFILE_POINTS)
     ones = np.ones(points.size)
@@ -331,7 +334,7 @@ def limit_gradient(gradient: float, speed: float, heights: Floats) -> float:
 
 
 def subtract_profile(field: WindField, profile: MeanProfile, reference_amsl: float) -> WindField | None:
-    """Return the deviation of a field from its mean profile; None for a wind that is the same everywhere."""
+    """Return the deviation of a wind field from its mean profile; None if the wind is the same everywhere."""
     deviations = field.velocities - profile.velocities_at(field.altitudes - reference_amsl)
     if profile.gradient == 0.0 and float(np.abs(deviations).max()) < UNIFORM_TOLERANCE_MPS:
         return None

@@ -47,9 +47,9 @@ _LOWEST_FENCE_FLOOR_M = -100.0
 def describe_failed_arming_checks(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
-    """Describe each check before arming that the settings fail, unless the settings switch the checks off.
+    """Describe each pre-arm check that the settings fail; yield nothing if the settings disable the checks.
 
-    values: all values by name, with defaults.
+    values: value of every parameter by name; the default where no file states one.
     """
     # 4.7 has ARMING_SKIPCHK for ARMING_CHECK.
     if values["ARMING_CHECK"] == 0.0 or values["ARMING_SKIPCHK"] != 0.0 or values["ARMING_REQUIRE"] == 0.0:
@@ -71,7 +71,10 @@ def describe_failed_arming_checks(
 def _describe_mission_faults(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
-    """Describe missing items and forbidden marks (`AP_Arming::mission_checks`, `AP_Arming_Plane::mission_checks`)."""
+    """Describe mission items that arming requires but the mission lacks, and items that it forbids.
+
+    Follows `AP_Arming::mission_checks` and `AP_Arming_Plane::mission_checks`.
+    """
     if parameters.by_origin("file").get("RTL_AUTOLAND") == 0.0:
         for mark in _MARKS_OF_AUTOLAND:
             if mark in mission.commands:
@@ -87,7 +90,10 @@ def _describe_mission_faults(
 
 
 def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe trims beyond their range (`AP_Arming::servo_checks`, `rc_calibration_checks`)."""
+    """Describe servo outputs and radio channels whose trim is outside their minimum and maximum.
+
+    Follows `AP_Arming::servo_checks` and `rc_calibration_checks`.
+    """
     outputs = [f"SERVO{output}" for output in range(1, _OUTPUT_COUNT + 1) if values[f"SERVO{output}_FUNCTION"] > 0.0]
     channels = [f"RC{channel}" for channel in range(1, RADIO_CHANNEL_COUNT + 1)]
     for name in (*outputs, *channels):
@@ -98,10 +104,10 @@ def _describe_pulse_faults(values: Mapping[str, float]) -> Iterator[str]:
 
 
 def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe a radio failsafe at idle throttle, and timeouts in the wrong order.
+    """Describe a throttle failsafe that would trigger at idle throttle, and failsafe timeouts in the wrong order.
 
-    At idle `Plane::rc_failsafe_active` sees no radio up to THR_FS_VALUE, or from there with a reversed channel, and
-    `AP_Arming::manual_transmitter_checks` fails.
+    `Plane::rc_failsafe_active` takes a throttle pulse at or below THR_FS_VALUE (at or above it for a reversed channel)
+    as a lost radio. `AP_Arming::manual_transmitter_checks` fails if the pulse at idle is such a pulse.
     """
     channel, value = f"RC{values['RCMAP_THROTTLE']:g}", values["THR_FS_VALUE"]
     is_reversed = values.get(f"{channel}_REVERSED", 0.0) > 0.0
@@ -121,7 +127,11 @@ def _describe_radio_failsafe_faults(parameters: ArduPilotParameters, values: Map
 def _describe_battery_faults(
     values: Mapping[str, float], monitor: str, full_voltage: float, *, has_current: bool
 ) -> Iterator[str]:
-    """Describe thresholds of a monitor that a full battery does not meet (`AP_BattMonitor_Backend::arming_checks`)."""
+    """Describe failsafe thresholds of one battery monitor that prevent arming.
+
+    A threshold prevents arming if a full battery does not meet it, or if it is below the critical threshold. Follows
+    `AP_BattMonitor_Backend::arming_checks`.
+    """
     for unit in ("VOLT", "MAH"):
         low, critical = (values[f"{monitor}_{level}_{unit}"] for level in ("LOW", "CRT"))
         if 0.0 < low < critical:
@@ -141,7 +151,10 @@ def _describe_battery_faults(
 def _describe_fence_faults(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
-    """Describe a fence without limits, with unusable limits, or not around home (`AC_Fence::pre_arm_check`)."""
+    """Describe a fence that prevents arming: it has no limits, its limits are unusable, or home violates it.
+
+    Follows `AC_Fence::pre_arm_check`.
+    """
     kinds = int(parameters.fence_type)
     has_mission_fence = bool(kinds & _MISSION_FENCE_BIT and mission.has_fence)
     if parameters.fence_enable > 0.0 and not (kinds & OWN_FENCE_BITS or has_mission_fence):

@@ -122,9 +122,10 @@ class ArduPlane(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults.
+        """Return the autopilot with parameters from the user's file, the aircraft's file, and the defaults.
 
-        Its release is the stated one, or the release that wrote the file, or the newest.
+        The simulated release is the first known of: the release that the table states, the release that wrote the file,
+        the newest release.
         """
         version, notes = choose_release(table.arduplane_version, table.params)
         return cls(ArduPilotParameters.load(aircraft, table.params, version, notes))
@@ -133,7 +134,7 @@ class ArduPlane(Autopilot):
     def restore(cls, stored: StoredAutopilot) -> Self:
         """Return the autopilot with the parameters and the release that a log stores.
 
-        A log that states no release was flown by the control law of 4.6.
+        A log without a release was flown with the control law of 4.6.
         """
         version = stored.version or "4.6"
         if stored.parameters is None:
@@ -154,7 +155,7 @@ class ArduPlane(Autopilot):
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return ArduPlane with the log's parameters, for a log of any ArduPlane release."""
+        """Return ArduPlane with the parameters of a flight log, which any ArduPlane release may have written."""
         if not program.startswith("ArduP"):
             return None
         law_parameters, notes = ArduPilotParameters.of_log(parameters, source, simulated_release(program))
@@ -169,11 +170,11 @@ class ArduPlane(Autopilot):
 
     @property
     def control_law(self) -> ControlLaw:
-        """ArduPlane's controllers with these parameters."""
+        """Control law of ArduPlane with these parameters."""
         return ControlLaw(arduplane_tick, arduplane_loop, ARDUPLANE, self._initialise, _transfer_state)
 
     def _initialise(self, guidance: Record, record: Record) -> None:
-        """Copy the parameters into the controllers' record."""
+        """Copy the parameters into the control law's record."""
         record.parameters = self.parameters.record()
 
     def describe(self, aircraft: str) -> str:
@@ -192,7 +193,7 @@ class ArduPlane(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Checks by ArduPlane's list of commands, from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*."""
+        """Rules of mission commands, and checks from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*."""
         parameters = self.parameters
         return MissionChecks(
             dialect="ardupilot",
@@ -206,13 +207,13 @@ class ArduPlane(Autopilot):
 
     @property
     def _stated_values(self) -> dict[str, float]:
-        """Values of all parameters of the set, by name."""
+        """Value of each parameter of the set, by name."""
         return {name: value for name, value, _ in self.parameters.values}
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
-        """Describe settings that change the flight of a mission but are not simulated.
+        """Describe settings that would change the flight of a mission, but are not simulated.
 
-        by_program: True for a flight of ArduPlane's own program, in which more settings have an effect.
+        by_program: True for a flight with the ArduPlane program, in which more settings have an effect.
         """
         parameters, values = self.parameters, self._stated_values
         texts = [
@@ -244,17 +245,18 @@ class ArduPlane(Autopilot):
     def _turn_distance(self, turn: float, amsl: float) -> float:
         """Return the distance before a waypoint at which ArduPlane turns, m.
 
-        It is WP_RADIUS for a right angle, a fraction of WP_RADIUS for a smaller turn, and more in thin air.
+        The distance is WP_RADIUS for a right angle and proportionally less for a smaller turn. It increases in thin
+        air.
         """
         factor = float(eas_to_tas_ratio(amsl))
         return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds, throttle and climb rates from AIRSPEED_*, MIN_GROUNDSPEED, THR_MAX and TECS_*_MAX.
+        """Rules of airspeed, throttle and climb rate from AIRSPEED_*, MIN_GROUNDSPEED, THR_MAX and TECS_*_MAX.
 
-        A commanded speed outside the limits changes nothing: commanded to fly at 17 m/s with AIRSPEED_MIN 18, ArduPlane
-        4.6 flew on at its 25 m/s.
+        ArduPlane ignores a commanded speed outside its limits. With AIRSPEED_MIN 18, ArduPlane 4.6 continued at 25 m/s
+        after a command to fly at 17 m/s.
         """
         parameters = self.parameters
         limits = SpeedLimits(parameters.airspeed_min, parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
@@ -290,13 +292,13 @@ class ArduPlane(Autopilot):
     def _landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
         """Return the true airspeed on the landing glide, m/s, by TECS_LAND_ARSPD and LAND_WIND_COMP.
 
-        ``cruise`` is ignored: without TECS_LAND_ARSPD, AIRSPEED_CRUISE and AIRSPEED_MIN decide.
+        ``cruise`` is not used. Without TECS_LAND_ARSPD the airspeed follows from AIRSPEED_CRUISE and AIRSPEED_MIN.
         """
         return landing_airspeed(self.parameters, tail_wind) * self.speeds.true_airspeed_factor(amsl)
 
     @property
     def returns(self) -> ReturnBehaviour:
-        """Behaviour in an RTL from the parameters."""
+        """Behaviour of ArduPlane in an RTL, from its parameters."""
         return ReturnBehaviour(
             self._return_rules,
             self._rtl_parameters,
@@ -341,7 +343,7 @@ class ArduPlane(Autopilot):
         )
 
     def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
-        """Return the events that can end a mission in AUTO, with ArduPlane's reaction to each."""
+        """Return the events that can end a mission in AUTO, each with ArduPlane's reaction."""
         return failsafe_causes(
             self.parameters,
             has_fence=mission.has_fence,
@@ -350,28 +352,34 @@ class ArduPlane(Autopilot):
         )
 
     def _unsimulated_return_text(self, mission: ReturnMission) -> str:
-        """Return "terrain" if RTLs follow the terrain, otherwise ""."""
+        """Return "terrain" if an RTL follows the terrain, which is not simulated; otherwise ""."""
         return "terrain" if self.parameters.rtl_follows_terrain else ""
 
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
-        """Return ("return path",) if RTL_AUTOLAND 4 follows a mission's return path, otherwise ()."""
+        """Return ("return path",) if an RTL follows a return path of the mission, which is not judged; otherwise ().
+
+        An RTL follows the mission's return path if RTL_AUTOLAND is 4.
+        """
         has_path = not mission.commands.isdisjoint((Command.DO_RETURN_PATH_START, Command.DO_LAND_START))
         return ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
 
     @property
     def _return_trials(self) -> ReturnTrials:
-        """Heights of RTL_ALTITUDE, and climbs before the turn by RTL_CLIMB_MIN or FLIGHT_OPTIONS."""
+        """Parameter changes to try for a safer RTL: RTL_ALTITUDE, then a climb before the turn.
+
+        RTL_CLIMB_MIN or FLIGHT_OPTIONS makes ArduPlane climb before it turns.
+        """
         options = float(int(self.parameters.flight_options) | CLIMB_BEFORE_TURN)
         climbs = [{"RTL_CLIMB_MIN": climb} for climb in _TRIED_CLIMBS_M]
         altitude = {"RTL_ALTITUDE": max(0.0, self.parameters.rtl_altitude)}
         return ReturnTrials((altitude,), (*climbs, {"FLIGHT_OPTIONS": options}), "RTL_ALTITUDE, climb")
 
     def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
-        """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX that a scenario's RTL settings require.
+        """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX for a scenario's RTL settings.
 
-        RTL_AUTOLAND is 1 unless a file states it: with 0 ArduPlane does not arm if the mission has a landing.  On a
-        field that is lower than home the flare would climb (`flight.autopilots.arduplane.ground_law`): there
-        TECS_LAND_PMAX holds the nose down unless a file states it.
+        RTL_AUTOLAND is 1 unless a file states a value, because ArduPlane with 0 does not arm for a mission with a
+        landing. TECS_LAND_PMAX is set for a field below home unless a file states a value. Without it, the aircraft
+        would climb in the flare (`flight.autopilots.arduplane.ground_law`).
 
         >>> default = ArduPlane(ArduPilotParameters.defaults())
         >>> default.returns.parameters_of(RtlSettings(180.0, lands=True, field_depth=50.0))
@@ -388,13 +396,13 @@ class ArduPlane(Autopilot):
         return values
 
     def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the landing glide by LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
+        """Return the landing glide that ArduPlane flies, by LAND_FLARE_*, LAND_WIND_COMP and TECS_LAND_*."""
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
     @property
     def _return_rules(self) -> ReturnRules:
-        """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_* and TECS and slope limits.
+        """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_* and the slope limits.
 
         >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
         >>> made.returns.rules.height, made.returns.rules.initial_climb, made.returns.rules.rally_limit
@@ -419,7 +427,7 @@ class ArduPlane(Autopilot):
 
     @property
     def loiters(self) -> LoiterRules:
-        """Rules of loiters from WP_LOITER_RAD, the air's density, and `LOITER_ALTITUDE_TOLERANCE_M`.
+        """Rules of loiters from WP_LOITER_RAD, the air density, and `LOITER_ALTITUDE_TOLERANCE_M`.
 
         >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiters
         >>> rules.radius, round(rules.radius_scale(1300.0), 3)
@@ -442,7 +450,7 @@ class ArduPlane(Autopilot):
 
     @property
     def deviations(self) -> Deviations:
-        """Deviations from the legs, and the altitude gained in updrafts while ArduPlane holds its airspeed."""
+        """Deviations from the legs, and the altitude that ArduPlane gains in updrafts while it holds its airspeed."""
         return Deviations(
             tracking_error=partial(tracking_error, self.parameters),
             gust_rise=height_in_updrafts,
@@ -453,7 +461,7 @@ class ArduPlane(Autopilot):
 
     @property
     def _max_pitch(self) -> float:
-        """Largest pitch that TECS demands, without PTCH_TRIM_DEG, rad."""
+        """Largest pitch that TECS demands, rad; PTCH_TRIM_DEG is not included."""
         return min(self._pitch_limits.values())
 
     @property
@@ -480,12 +488,12 @@ class ArduPlane(Autopilot):
         return (Candidate(name, 1.0, max_tried, "deg", others=tuple(others)),) if is_raised else ()
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
-        """Return the simulated ArduPlane with the given parameters changed, also for a program."""
+        """Return a copy with the given parameters changed; also for an autopilot that runs the ArduPlane program."""
         return ArduPlane(self.parameters.changed(origin, **values))
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
-    """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
+    """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter."""
     record.memory = previous_record.memory
     for name in _LEG_FIELDS:
         setattr(record.memory, name, 0)
@@ -512,14 +520,14 @@ class ArduPlaneFromGround:
 
     @property
     def control_law(self) -> ControlLaw:
-        """Control law from the ground."""
+        """Control law of a flight that starts or ends on the ground."""
         return ControlLaw(
             ground_tick, ground_loop, ARDUPLANE_GROUND, self._initialise, released_throttle=self.released_throttle
         )
 
     @property
     def motor_start(self) -> float:
-        """Time of the motor start, s after the release; inf if it never starts."""
+        """Time of the motor start, s after the release; inf if the motor never starts."""
         take_off = self.ground_phases.take_off
         if take_off is None:
             return -math.inf
@@ -527,7 +535,7 @@ class ArduPlaneFromGround:
 
     @property
     def released_throttle(self) -> float:
-        """Throttle at the end of the rail, 0..1."""
+        """Throttle (0..1) when the aircraft leaves the rail."""
         parameters = self.parameters
         # Without a slew limit the throttle opens at once (not 0 times infinity); it is closed if the motor starts
         # later.
@@ -538,7 +546,7 @@ class ArduPlaneFromGround:
         )
 
     def _initialise(self, guidance: Record, record: Record) -> None:
-        """Copy the parameters, the contacts, the take-off and the landing into the controllers' record."""
+        """Copy parameters, ground contacts, take-off and landing into the control law's record."""
         record.parameters = self.parameters.record()
         record.stage_parameters = record.parameters
         ground = record.ground
@@ -559,15 +567,11 @@ class ArduPlaneFromGround:
         parameters, launch = self.parameters, take_off.launch
         ground.stage, ground.is_on_runway = TAKING_OFF, launch.method == "runway"
         ground.motor_start = self.motor_start
-        ground.throttle_slew, ground.takeoff_throttle = (
-            takeoff_slew(parameters),
-            parameters.takeoff_throttle or parameters.throttle_max,
-        )
-        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = (
-            take_off.home_altitude,
-            take_off.end_altitude,
-            take_off.home[2],
-        )
+        ground.throttle_slew = takeoff_slew(parameters)
+        ground.takeoff_throttle = parameters.takeoff_throttle or parameters.throttle_max
+        ground.home_up = take_off.home_altitude
+        ground.takeoff_end_altitude = take_off.end_altitude
+        ground.launch_up = take_off.home[2]
         ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when the aircraft moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration
@@ -576,10 +580,11 @@ class ArduPlaneFromGround:
         )
 
     def _climb_pitch(self, take_off: TakeOff) -> float:
-        """Return the climb pitch, rad: the item's pitch, or the maximum pitch if the motor runs before the launch.
+        """Return the climb pitch of a take-off, rad: the item's pitch, or the maximum pitch.
 
-        TECS runs with the motor, and the launch winds its integrator up to the maximum pitch: two flights of ArduPlane
-        4.6.3.  In five flights in which the launch acceleration started the motor it was the item's pitch.
+        If the motor runs before the launch, TECS runs too, and the launch winds its integrator up to the maximum pitch.
+        This was seen in two flights of ArduPlane 4.6.3. In five flights in which the launch acceleration started the
+        motor, ArduPlane climbed with the item's pitch.
         """
         if self.motor_start > -math.inf or take_off.acceleration <= 0.0:
             return take_off.pitch
@@ -634,11 +639,11 @@ _MAX_BYTE_RADIUS_M = 255.0
 
 
 def read_loiter_radius(loiter: Loiter) -> float:
-    """Return the radius that ArduPlane reads from a loiter's item, m; 0 if it flies WP_LOITER_RAD instead.
+    """Return the radius that ArduPlane reads from a loiter item, m; 0 if it uses WP_LOITER_RAD instead.
 
-    ArduPlane reads the radius of loiters by turns, to an altitude, and without end.  In a loiter by time, even of zero
-    time, it flies WP_LOITER_RAD, and reads only the direction from the item: `Plane::verify_loiter_time` passes no
-    radius of the item to `Plane::update_loiter`.
+    ArduPlane reads the radius of three kinds of loiter: by turns, to an altitude, and without end. In a loiter by time
+    it flies WP_LOITER_RAD, even if the time is zero. It then reads only the direction from the item, because
+    `Plane::verify_loiter_time` does not pass the item's radius to `Plane::update_loiter`.
 
     >>> [read_loiter_radius(Loiter(radius, turns=3)) for radius in (-250.7, 307.0, 1.0)]
     [250.0, 300.0, 0.0]
@@ -660,10 +665,11 @@ def read_loiter_radius(loiter: Loiter) -> float:
 
 
 def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStart | None:
-    """Return the landing sequence that a simulated RTL joins after its loiter, or flies straight to; None without one.
+    """Return the landing sequence that a simulated RTL flies to; None if the RTL has none.
 
-    A landing is not simulated: an RTL whose landing sequence begins with the landing ends at its loiter.  Without an
-    engine an RTL ends at its loiter, or at the start of the sequence.
+    The RTL joins the sequence after its loiter, or flies straight to it. The landing itself is not simulated, so an RTL
+    whose sequence begins with the landing ends at its loiter. After an engine failure, an RTL ends at its loiter or at
+    the start of the sequence.
     """
     landing = target.landing
     if engine_out:
@@ -672,7 +678,7 @@ def _simulated_landing(target: ReturnTarget, *, engine_out: bool) -> LandingStar
 
 
 def _radius_growth(up: float) -> float:
-    """Return the ratio of a loiter's radius at an altitude (m AMSL) to the radius at sea level.
+    """Return the ratio of the loiter radius flown at an altitude (m AMSL) to the radius at sea level.
 
     The ratio is the square of the ratio of true to equivalent airspeed.
     """
@@ -682,7 +688,7 @@ def _radius_growth(up: float) -> float:
 def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
     """Return a note if ArduPlane clears its mission when it starts (`AP_Mission::init`).
 
-    The mission that is uploaded afterwards is flown.
+    The note says that a mission uploaded after the start is flown.
 
     >>> default = ArduPilotParameters.defaults()
     >>> [len(_mission_notes(default.changed(MIS_OPTIONS=bits))) for bits in (0, 1, 8)]
@@ -699,8 +705,8 @@ def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
 def _bank_limit_note(bank: float) -> str:
     """Return a note that a bank limit for loiters (deg) is not simulated; "" if ArduPlane has no limit.
 
-    With a limit, `AP_L1_Control::loiter_radius` lets a loiter grow with altitude only if the bank cannot hold its
-    radius.
+    With a limit, `AP_L1_Control::loiter_radius` increases the radius with altitude only if the radius cannot be flown
+    at this bank.
     """
     if bank <= 0.0:
         return ""

@@ -34,7 +34,7 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """Return the events that can end a mission in AUTO, with ArduPlane's reaction to each, in a fixed order.
+    """Return the events that can end a mission in AUTO, each with ArduPlane's reaction, in a fixed order.
 
     has_fence: True if the mission carries a fence.
     has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
@@ -68,7 +68,7 @@ def failsafe_causes(
 
 
 def _remote_control_causes(parameters: ArduPilotParameters) -> list[Cause]:
-    """Return the short failsafe of a lost remote control if it leaves AUTO, and the long failsafe."""
+    """Return the failsafes of a lost remote control: the short one if it leaves AUTO, and the long one."""
     long_action, short_action = int(parameters.long_failsafe), int(parameters.short_failsafe)
     # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
     if parameters.throttle_failsafe != 1.0:
@@ -93,13 +93,15 @@ def _station_cause(parameters: ArduPilotParameters) -> Cause:
 
 
 def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[LinkLossReaction, ...]:
-    """Return the reactions to the loss of a radio link in AUTO, outside a landing sequence, in order of time.
+    """Return ArduPlane's reactions to the loss of a radio link in AUTO, in order of time.
+
+    A loss within a landing sequence is not considered.
 
     use: "telemetry" for the ground station's heartbeats, "control" for the remote control.
 
-    FS_LONG_TIMEOUT counts from the station's last heartbeat (`Plane::check_long_failsafe`).  For the remote control it
-    counts from the short failsafe, which begins FS_SHORT_TIMEOUT after the loss (`check_short_rc_failsafe`), even if it
-    changes nothing in AUTO.
+    For the ground station, FS_LONG_TIMEOUT starts at the last heartbeat (`Plane::check_long_failsafe`). For the remote
+    control it starts at the short failsafe, which begins FS_SHORT_TIMEOUT after the loss (`check_short_rc_failsafe`).
+    The short failsafe begins even if ArduPlane does not react to it in AUTO.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(FS_SHORT_ACTN=1, FS_LONG_ACTN=1, FS_LONG_TIMEOUT=20)
@@ -127,9 +129,9 @@ def link_loss_reactions(parameters: ArduPilotParameters, use: LinkUse) -> tuple[
 
 
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
-    """Return the reactions to a low and a critical battery, for BATT and for each other battery monitor that is on.
+    """Return ArduPlane's reactions to a low and to a critical battery, for each battery monitor that is on.
 
-    The reaction is "never" without a monitor or without a threshold that the monitor can reach.
+    The reaction is "never" if there is no monitor, or no threshold that the monitor can measure.
     """
     monitors, causes = monitored_batteries(parameters), []
     for monitor in dict.fromkeys(["BATT", *monitors]):
@@ -149,7 +151,7 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
 
 
 def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe, ...]:
-    r"""Return, for all battery monitors, the failsafes that end a mission at a charge or voltage threshold.
+    r"""Return the failsafes that end a mission when a battery reaches a charge or voltage threshold.
 
     A monitor that measures only voltage never triggers on charge, and BATT_LOW_TIMER 0 disables the voltage failsafes
     (`AP_BattMonitor_Backend::update_failsafes`, `check_failsafe_types`).
@@ -180,7 +182,8 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
 def monitored_batteries(parameters: ArduPilotParameters) -> list[str]:
     """Return the prefixes of the battery monitors that are on.
 
-    The default of BATT_MONITOR depends on the board, so a file that does not state it is taken to have a monitor.
+    The default of BATT_MONITOR depends on the board. If a file does not state BATT_MONITOR, the first monitor is
+    assumed to be on.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> monitored_batteries(ArduPilotParameters.defaults().changed(BATT3_MONITOR=4))

@@ -48,7 +48,7 @@ class GoArounds:
 
 
 def count_climb_rows(positions: Floats, end_altitude: float) -> int:
-    """Return the number of positions before the climb of a go-around ends; all of them if the climb never ends.
+    """Return the number of positions up to the end of a go-around's climb; all if the climb never ends.
 
     positions: positions of the go-around, m, (t, 3).
     end_altitude: altitude above which the climb ends, m AMSL.
@@ -104,8 +104,8 @@ def fly_go_arounds(
     starts: (n,) of `flight.autopilots.simulated_returns.RETURN_START`.
     end_altitude: altitude above which the climb ends, m AMSL.
     pitch: pitch angle during the climb, rad.
-    landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  If the
-        sequence contains a loiter, the go-around ends there, after one circle.
+    landings: one or more landing sequences; each go-around joins the sequence that is nearest at the end of its climb.
+        In a sequence with a loiter, the go-around ends there after one circle.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -128,7 +128,7 @@ def fly_go_arounds(
     record, climb = parameters.record(), _make_climb(parameters, end_altitude)
 
     def fly(k: int, landing: LandingStart) -> Floats:
-        """Simulate go-around `k` to a landing sequence, fill its result, and return its positions, m, (t, 3)."""
+        """Simulate go-around `k` to a landing sequence, fill its result, and return its positions, (t, 3) m."""
         stages = np.concatenate([waypoint_ahead(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
         stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
@@ -167,7 +167,7 @@ def fly_go_arounds(
 
 
 def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
-    """Return the `CLIMB` record of a go-around, whose climb ends above an altitude, m AMSL."""
+    """Return the `CLIMB` record of a go-around whose climb ends above an altitude, m AMSL."""
     climb: Record = np.zeros(1, CLIMB)[0]
     climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
@@ -175,7 +175,10 @@ def _make_climb(parameters: ArduPilotParameters, end_altitude: float) -> Record:
 
 
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
-    """Return the control parameters of the climb: TECS_SPDWEIGHT 2, and both pitch limits at ``pitch`` (rad)."""
+    """Return the control parameters of the climb, in which both pitch limits are ``pitch`` (rad).
+
+    TECS_SPDWEIGHT is 2, so that pitch controls the airspeed.
+    """
     climb_parameters = parameters.record()
     climb_parameters.tecs_speed_weight = 2.0
     climb_parameters.tecs_pitch_min = 0.0
@@ -184,7 +187,7 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """Return n `WAYPOINT` records, one for each stop of a landing sequence up to its first loiter."""
+    """Return the stops of a landing sequence up to its first loiter, as n `WAYPOINT` records."""
     stops = truncate_at_first_loiter(sequence)
     stages: Records = np.zeros(len(stops), WAYPOINT)
     for stage, stop in zip(stages, stops, strict=True):

@@ -235,7 +235,9 @@ def ground_loop(
 
 @inner
 def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
-    """Update the flags for ground contact and for a tipped aircraft; the ground is level, as in JSBSim.
+    """Update the flags that show whether the aircraft touches the ground and whether it has tipped over.
+
+    The ground is level, as in JSBSim.
 
     state: a `flight.dynamics.state.STATE` record.
     clearance: height of the center of gravity above ground, m.
@@ -259,7 +261,7 @@ def end_status(work: Record, ground: Record) -> int:
     """Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
 
     work: a `flight.simulation.tick.WORKSPACE` record.
-    ground: a `GROUND_STATE` record, of this or of another control law.
+    ground: a `GROUND_STATE` record; another control law may have filled it.
     """
     state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     is_battery_empty = work.air.energy >= work.settings.battery
@@ -294,8 +296,11 @@ def end_status(work: Record, ground: Record) -> int:
 
 @inner
 def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
-    """Set the commands for one tick of the take-off; once the take-off is complete, begin the first leg."""
-    state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
+    """Set the commands for one tick of the take-off; begin the first leg once the take-off is complete."""
+    state = work.state
+    estimated = work.estimated
+    ground = arduplane.ground
+    memory = arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = eas_to_tas_ratio(estimated.up)
     # The track is measured against the path only after the take-off.
@@ -334,7 +339,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
 
 @inner
 def _is_leveled(parameters: Record, ground: Record) -> bool:
-    """Return True once a take-off has been leveling off for TKOFF_PLIM_SEC.
+    """Return True once the aircraft has leveled off for TKOFF_PLIM_SEC at the end of a take-off.
 
     Follows `Plane::check_takeoff_timeout_level_off`.
     """
@@ -343,10 +348,10 @@ def _is_leveled(parameters: Record, ground: Record) -> bool:
 
 @inner
 def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
-    """Limit the pitch demand until the rotation is complete, if TKOFF_ROTATE_SPD is set.
+    """Limit the pitch demand until the aircraft has rotated, if TKOFF_ROTATE_SPD is set.
 
-    Below that airspeed the pitch is TKOFF_GND_PITCH; then, up to AIRSPEED_CRUISE over the ground, it grows with the
-    ground speed, from at least five degrees (`Plane::takeoff_calc_pitch`).
+    Below TKOFF_ROTATE_SPD the pitch demand is TKOFF_GND_PITCH. Above it, the pitch limit grows with the ground speed,
+    from at least five degrees, until the ground speed exceeds AIRSPEED_CRUISE. Follows `Plane::takeoff_calc_pitch`.
     """
     if ground.rotation_complete:
         return
@@ -364,11 +369,11 @@ def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record,
 def _set_take_off_parameters(
     estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, roll_error: float
 ) -> None:
-    """Set the control parameters of the take-off: a fixed pitch, speed by pitch, bank limit by height.
+    """Set the control parameters of the take-off: fixed pitch, airspeed held by pitch, bank limit by height.
 
     Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
 
-    roll_error: demanded roll minus roll, rad, positive; it reduces the pitch.
+    roll_error: magnitude of demanded roll minus roll, rad; a large error reduces the pitch.
     """
     stage_parameters.tecs_speed_weight = 2.0
     stage_parameters.tecs_pitch_min = 0.0
@@ -385,10 +390,10 @@ def _set_take_off_parameters(
 
 @inner
 def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
-    """Return the factor (0..1) on the minimum pitch near the end of the take-off; 1 before.
+    """Return the factor (0..1) by which the minimum pitch is reduced near the end of the take-off.
 
-    Follows `Plane::get_takeoff_pitch_min_cd`: the pitch is reduced once the climb would reach the end altitude within
-    TKOFF_PLIM_SEC.
+    Follows `Plane::get_takeoff_pitch_min_cd`: the reduction begins once the climb would reach the end altitude within
+    TKOFF_PLIM_SEC. Before that the factor is 1.
     """
     remaining_height = ground.takeoff_end_altitude - estimated.up
     if ground.leveling_height > 0.0:
@@ -406,7 +411,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 
 @inner
 def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
-    """Set the lateral acceleration demand to hold the take-off heading; 0 while the heading is not known.
+    """Set the lateral acceleration demand that holds the take-off heading; 0 until the heading is known.
 
     Follows `AP_L1_Control::update_heading_hold`.
     """
@@ -430,7 +435,10 @@ def _demand_heading(state: Record, estimated: Record, parameters: Record, ground
 def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guidance: Record, ground: Record, memory: Record
 ) -> None:
-    """Begin the leg after the take-off at the aircraft's position, without a line to follow (`Plane::set_next_WP`)."""
+    """Begin the leg after the take-off at the aircraft's position.
+
+    The aircraft flies straight to the end of the leg, without a line to follow (`Plane::set_next_WP`).
+    """
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
@@ -449,9 +457,12 @@ def _begin_first_leg(
 def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
     """Set the commands for one tick of the landing.
 
-    landing_point: waypoint record of the landing point.
+    landing_point: record of `flight.guidance.lateral_reference_laws.WAYPOINT` for the landing point.
     """
-    state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
+    state = work.state
+    estimated = work.estimated
+    ground = arduplane.ground
+    memory = arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = eas_to_tas_ratio(estimated.up)
     work.memory.is_finished = False
@@ -484,7 +495,7 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
 def _follow_line_to_point(
     estimated: Record, parameters: Record, ground: Record, memory: Record
 ) -> tuple[float, float, float, float]:
-    """Set the lateral acceleration demand to follow the extended line to the landing point.
+    """Set the lateral acceleration demand that follows the extended line to the landing point.
 
     Follows `AP_L1_Control::update_waypoint`.
 
@@ -596,15 +607,13 @@ def _demand_glide(
 def _set_landing_parameters(
     estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, line_fraction: float
 ) -> None:
-    """Set the control parameters of the current landing stage in ``stage_parameters``.
+    """Set the control parameters for the current stage of the landing in ``stage_parameters``.
 
     line_fraction: fraction of the line to the landing point that is already flown.
     """
     stage_parameters.tecs_time = parameters.landing_time
-    stage_parameters.airspeed_min, stage_parameters.tecs_pitch_damping = (
-        parameters.airspeed_min,
-        parameters.tecs_pitch_damping,
-    )
+    stage_parameters.airspeed_min = parameters.airspeed_min
+    stage_parameters.tecs_pitch_damping = parameters.tecs_pitch_damping
     speed_weight = parameters.landing_speed_weight
     if speed_weight < 0.0:
         speed_weight = parameters.tecs_speed_weight * (1.0 - min(1.0, max(0.0, line_fraction)))
@@ -623,8 +632,6 @@ def _set_landing_parameters(
         flare_progress = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
         pitch_min = (1.0 - flare_progress) * pitch_min + flare_progress * max(pitch_min, parameters.landing_pitch)
         if parameters.landing_pitch_max != 0.0:
-            stage_parameters.tecs_pitch_max, stage_parameters.pitch_limit_max = (
-                parameters.landing_pitch_max,
-                parameters.landing_pitch_max,
-            )
+            stage_parameters.tecs_pitch_max = parameters.landing_pitch_max
+            stage_parameters.pitch_limit_max = parameters.landing_pitch_max
     stage_parameters.pitch_limit_min = pitch_min

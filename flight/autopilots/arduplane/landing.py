@@ -23,8 +23,8 @@ _GO_AROUND_HEIGHT_M = 30.0
 def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float:
     """Return the equivalent airspeed on the landing glide, m/s.
 
-    The airspeed is TECS_LAND_ARSPD, or by default midway between AIRSPEED_MIN and AIRSPEED_CRUISE, increased in a head
-    wind, and never above AIRSPEED_CRUISE.
+    The airspeed is TECS_LAND_ARSPD, or by default midway between AIRSPEED_MIN and AIRSPEED_CRUISE. It is increased in a
+    head wind, but never exceeds AIRSPEED_CRUISE.
 
     tail_wind: m/s, negative for a head wind.
 
@@ -41,7 +41,7 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
 
 
 def landing_glide(height: float, distance: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
-    """Return the glide to a landing point from the waypoint before it.
+    """Return the glide path to a landing point from the waypoint before the landing point.
 
     height: height of the waypoint above the landing point, m.
     distance: distance of the waypoint from the landing point, m.
@@ -72,7 +72,9 @@ def landing_glide(height: float, distance: float, ground_speed: float, parameter
 
 
 def go_around_height(stated_height: float, takeoff_height: float) -> float:
-    """Return the height of a go-around above home, m: as the landing item or else the take-off states it, or 30 m.
+    """Return the height of a go-around above home, m.
+
+    The landing item states the height. If it does not, the height is that of the take-off, or 30 m without a take-off.
 
     stated_height: height that the landing item states, m; 0 if it states none.
     takeoff_height: height of the take-off item above home, m; 0 without a take-off.

@@ -75,7 +75,9 @@ def takeoff_slew(parameters: ArduPilotParameters) -> float:
 
 
 def run_up_time(start_time: float, parameters: ArduPilotParameters) -> float:
-    """Return the time on the ground until full throttle, s; 0 if the motor starts during the launch or after it.
+    """Return the time that the motor needs on the ground to reach full throttle, s.
+
+    The time is 0 if the motor starts during the launch or after it.
 
     start_time: result of `motor_start`, s; -inf if the motor starts on the ground before the launch.
 

@@ -116,7 +116,7 @@ _RTL_CLIMB_EXTRA_M = 10.0
 
 @inner
 def update_height_demand(estimated: Record, target: Record, parameters: Record, memory: Record, dt: float) -> None:
-    """Update the altitude demand for the current leg, with its rate limit and its lag.
+    """Update the altitude demand for the current leg; it has a limited rate and lags its target.
 
     Follows `AP_TECS::_update_height_demand`.
 
@@ -132,10 +132,8 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
         altitude_target = _leg_altitude(estimated, target, parameters, memory)
     lag_fraction = dt / (dt + parameters.tecs_height_demand_time)
     # In saturation the input of the demand is frozen, and the limits of the climb and sink rates fade to 0.
-    cannot_climb, cannot_sink = (
-        memory.saturation > 0 and memory.climb_rate_demand > 0.0,
-        memory.saturation < 0 and memory.climb_rate_demand < 0.0,
-    )
+    cannot_climb = memory.saturation > 0 and memory.climb_rate_demand > 0.0
+    cannot_sink = memory.saturation < 0 and memory.climb_rate_demand < 0.0
     memory.max_climb_scaler += lag_fraction * ((0.0 if cannot_climb else 1.0) - memory.max_climb_scaler)
     memory.max_sink_scaler += lag_fraction * ((0.0 if cannot_sink else 1.0) - memory.max_sink_scaler)
     if cannot_climb:
@@ -171,11 +169,12 @@ def _is_altitude_step(start_altitude: float, altitude_change: float, target: Rec
 
 @inner
 def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand on a leg at the aircraft, m AMSL: on the leg's slope, or the altitude of its end.
+    """Return the altitude demand on a leg at the aircraft's position, m AMSL.
 
-    The slope of a leg to a loiter leads to the loiter's center.  The altitude of the leg's end applies if the altitude
-    changes in a step or only a little, on a loiter, and in 4.7 in a climb while the aircraft is low above home
-    (`Plane::set_target_altitude_proportion`).
+    Usually the demand follows the slope from the leg's start to its end; on a leg to a loiter the slope ends at the
+    loiter's center. The demand is the altitude of the leg's end if the altitude changes in a step or only a little, if
+    the aircraft is on a loiter, and in 4.7 in a climb at a low height above home. Follows
+    `Plane::set_target_altitude_proportion`.
     """
     end_altitude: float = target.up
     if memory.sloped_leg != memory.leg + 1:
@@ -220,8 +219,9 @@ def _terrain_following_altitude_demand(estimated: Record, target: Record, parame
     """Return the altitude demand (m AMSL) at the aircraft's position on a leg that follows the terrain.
 
     The demanded height above ground changes linearly along the leg, from the height above ground of the leg's start
-    (`Plane::set_target_altitude_proportion_terrain`).  If the terrain ahead rises faster than half of the maximum climb
-    rate allows, the excess is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
+    (`Plane::set_target_altitude_proportion_terrain`). If the terrain ahead rises faster than the aircraft climbs at
+    half of its maximum climb rate, the excess height is added to the demand. A descent of the leg reduces this excess
+    (`lookahead_adjustment` in ArduPlane/altitude.cpp).
     """
     if memory.terrain_leg != memory.leg + 1:
         # The leg began in this update: `update_terrain_lookahead` has not yet looked up the ground at its start.
@@ -244,11 +244,12 @@ def _terrain_following_altitude_demand(estimated: Record, target: Record, parame
 def update_terrain_lookahead(
     work: Record, heights: Heights, waypoints: Records, parameters: Record, memory: Record
 ) -> None:  # pragma: no cover
-    """Update the ground altitude at the aircraft and the terrain lookahead on a leg that follows the terrain.
+    """Update the ground altitude at the aircraft and the terrain lookahead, on a leg that follows the terrain.
 
-    At the first update of a leg, store the height above ground of its start.  The lookahead follows
-    `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: one sample every TERRAIN_SPACING towards the
-    waypoint, no further than the waypoint or TERRAIN_LOOKAHD.  Samples of unknown ground are ignored.
+    The lookahead is the height by which the terrain ahead exceeds what the aircraft can climb. The first update of a
+    leg also stores the height above ground of the leg's start. As in `AP_Terrain::lookahead`, the terrain is sampled
+    every TERRAIN_SPACING towards the waypoint, up to the waypoint or TERRAIN_LOOKAHD, and the climb rate is half of
+    TECS_CLMB_MAX. Samples of unknown ground are ignored.
 
     work: a record of `flight.simulation.tick.WORKSPACE`.
     """
@@ -290,13 +291,14 @@ def update_terrain_lookahead(
 
 @inner
 def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand of an RTL, m AMSL: in a descent on a straight slope, otherwise the target's altitude.
+    """Return the altitude demand of an RTL, m AMSL.
 
-    The slope leads from the start of the RTL to the center of its loiter; on the loiter the target's altitude applies
-    (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
-    point's altitude above home were an altitude AMSL, and never exceeds the altitude at which the RTL began
-    (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).  Until the
-    climb that precedes the turn is done, the demand lies above the start and the target (`Plane::update_alt`).
+    A descent follows a straight slope from the start of the RTL to the center of its loiter. A climb demands the
+    target's altitude at once, and so does the loiter (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).
+    ArduPlane computes the slope to a rally point as if the point's altitude above home were an altitude AMSL. The
+    demand never exceeds the altitude at which the RTL began (`Plane::set_offset_altitude_location`,
+    `Plane::constrain_target_altitude_location`; seen in 20 flights). During the climb before the turn, the demand is
+    above both the start and the target (`Plane::update_alt`).
     """
     end_altitude: float = rtl.up
     if not memory.rtl_climb_complete:
@@ -407,7 +409,7 @@ def control_as_ardupilot(
     memory: a record of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
     Other arguments as for `flight.autopilots.planfly.law.guide`.
 
-    The path is only the reference against which the track is measured; ArduPlane does not use it.
+    ArduPlane does not use the path; the track is only measured against it.
     """
     find_on_path(estimated, pieces, guidance)
     target = waypoints[memory.leg + 1]
@@ -481,7 +483,7 @@ def control_attitude(
     commands: Record,
     dt: float,
 ) -> None:
-    """Drive roll and pitch to their demands with the lags of ArduPlane's controllers, and set the throttle.
+    """Drive roll and pitch to their demands with the lags of ArduPlane's controllers; set the throttle.
 
     Represents `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
     """

@@ -46,7 +46,9 @@ _SAME_PLACE_M = 0.01
 
 @compiled
 def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_distance: float, eas2tas: float) -> float:
-    """Return the distance before a waypoint at which ArduPlane turns to the next leg, m; 0 if it flies to the waypoint.
+    """Return the distance before a waypoint at which ArduPlane turns to the next leg, m.
+
+    The distance is 0 if ArduPlane flies to the waypoint itself.
 
     Follows `AP_L1_Control::turn_distance`.
 
@@ -86,7 +88,7 @@ def navigate_legs(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Set the lateral acceleration demand on the current leg, and change to the next leg once the leg is over.
+    """Set the lateral acceleration demand on the current leg, and begin the next leg once this leg is over.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -118,7 +120,7 @@ def navigate_legs(
 
 @inner
 def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
-    """Return east and north of the leg's end, m: the target, or a point beyond it if it has a pass-by distance.
+    """Return east and north of the leg's end, m: the target, or a point beyond a target with a pass-by distance.
 
     Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by the pass-by distance.
     """
@@ -131,7 +133,7 @@ def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of a waypoint, m; for a waypoint on a loiter, of the loiter's center."""
+    """Return east and north of a waypoint, m; for a waypoint on a loiter, those of the loiter's center."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl
@@ -171,7 +173,7 @@ def _follow_line(
 
 @inner
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
-    """Return L1's angle, rad, or the last angle if the new one would reverse a turn of almost 180 degrees.
+    """Return L1's angle (rad), or the last angle if the new angle would reverse a turn of almost 180 degrees.
 
     Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the heading.
 
@@ -192,9 +194,10 @@ def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: f
 
 @inner
 def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
-    """Return the turn angle at the target that ArduPlane uses, rad, positive (`Plane::setup_turn_angle`).
+    """Return the turn angle at the target that ArduPlane uses, rad, positive.
 
-    If the current or the next leg begins or ends on a loiter, its course is measured from or to the loiter's center.
+    Follows `Plane::setup_turn_angle`. The course of a leg that begins or ends on a loiter is measured from or to the
+    center of the loiter.
     """
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
@@ -211,8 +214,8 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
 def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
     """Begin the leg with the index ``leg``, and reset the memory of the last loiter.
 
-    The leg's line starts at its first waypoint.  It starts at the aircraft if the aircraft leaves a loiter on a
-    tangent, or is already past the leg's end.
+    The line to follow usually starts at the first waypoint of the leg. It starts at the aircraft's position if the
+    aircraft leaves a loiter on a tangent, or if the aircraft is already past the leg's end.
     """
     start, target = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -244,12 +247,12 @@ def _is_leg_over(
     l1_distance: float,
     eas2tas: float,
 ) -> bool:
-    """Return True if the leg's end is within the turn distance, or if the aircraft is past the line across the end.
+    """Return True if the leg's end is within the turn distance, or if the aircraft is past the end.
 
-    Follows `Plane::verify_nav_wp`.  Beyond WP_MAX_RADIUS from the target the leg is never over; an aircraft that passes
-    the target there turns back to it.
+    Follows `Plane::verify_nav_wp`. A leg is never over while the aircraft is further than WP_MAX_RADIUS from the
+    target; an aircraft that passes the target at such a distance turns back to it.
 
-    end_e, end_n: end of the leg, m; with a pass-by distance it lies beyond the target, and the aircraft flies to it.
+    end_e, end_n: end of the leg, m, to which the aircraft flies; with a pass-by distance it lies beyond the target.
     turn_angle: turn of the route at the target, rad.
     """
     is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
@@ -280,7 +283,7 @@ def _update_loiter(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it until it is complete and the aircraft heads for the next waypoint.
+    """Fly to a loiter and around it, until the loiter is complete and the aircraft heads for the next waypoint.
 
     Follows `Plane::update_loiter`.
 
@@ -325,9 +328,9 @@ def _update_loiter(
 
 @inner
 def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: float) -> None:
-    """Update the time on a loiter and the angle flown around it, both since the aircraft captured the loiter.
+    """Update the time on a loiter and the angle flown around it, both since the aircraft reached the circle.
 
-    Also record that the loiter's altitude is reached.  Follows `Plane::loiter_angle_update`.
+    Also record whether the aircraft has reached the loiter's altitude. Follows `Plane::loiter_angle_update`.
     """
     bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
     if memory.loiter_started:
@@ -345,20 +348,18 @@ def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: 
 
 @inner
 def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
-    """Return True once the loiter's turns or time are complete, or its altitude is reached.
+    """Return True once a loiter's turns or time are complete, or its altitude is reached.
 
-    An altitude that the aircraft hardly approaches in three laps is treated as reached.
-    Follows `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
+    The altitude is treated as reached if three laps hardly change the aircraft's altitude. Follows
+    `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
     """
     if not memory.loiter_started:
         return False
     if loiter.loiters_to_altitude:
         if not memory.reached_target_altitude and memory.loiter_angle_sum >= memory.next_sum_lap:
             memory.reached_target_altitude = abs(estimated.up - memory.start_lap_altitude) < LOITER_ALTITUDE_TOLERANCE_M
-            memory.next_sum_lap, memory.start_lap_altitude = (
-                memory.next_sum_lap + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi,
-                estimated.up,
-            )
+            memory.next_sum_lap += _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi
+            memory.start_lap_altitude = estimated.up
         return memory.reached_target_altitude
     if math.isnan(loiter.loiter_time):
         return memory.loiter_angle_sum > loiter.loiter_turns * 2.0 * math.pi
@@ -369,12 +370,12 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
 def _is_heading_lined_up(
     estimated: Record, next_waypoint: Record, loiter: Record, radius: float, memory: Record
 ) -> bool:
-    """Return True if an aircraft on a loiter heads for the next waypoint, within a tolerance that grows with each lap.
+    """Return True if an aircraft on a loiter heads for the next waypoint, within a tolerance.
 
-    From a loiter with an exit bearing, the aircraft leaves on this bearing.  No tangent leads to a waypoint inside the
-    circle: the aircraft then leaves on a tangent that passes the waypoint.
-    Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from the
-    center.
+    The tolerance grows with each lap. From a loiter with an exit bearing, the aircraft leaves on this bearing. If the
+    next waypoint is inside the circle, no tangent leads to it, and the aircraft leaves on a tangent that passes the
+    waypoint. Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft
+    from the center.
 
     radius: radius of the circle, m.
     """
@@ -408,9 +409,9 @@ def _is_heading_lined_up(
 def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Record, eas2tas: float) -> None:
     """Set the lateral acceleration demand of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
 
-    The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
-    square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until the initial climb is
-    done, bank is limited to LEVEL_ROLL_LIMIT; the altitude slope begins at the aircraft once that climb is done.
+    The aircraft turns to the center of the RTL loiter at once. The loiter's radius grows with altitude as the square of
+    the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`). During the initial climb, the bank is
+    limited to LEVEL_ROLL_LIMIT. The altitude slope begins where that climb ends.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.reached_loiter_target = True, False
@@ -442,7 +443,7 @@ def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Re
 
     Without a landing sequence the aircraft stays on the loiter.
 
-    Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The next leg begins at the aircraft.
+    Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1. The next leg begins at the aircraft's position.
     """
     landing_index = memory.leg + 2
     while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:
@@ -471,9 +472,9 @@ def _loiter_acceleration(
 ) -> float:
     """Return the lateral acceleration that a loiter demands, m/s^2 (`AP_L1_Control::update_loiter`).
 
-    The aircraft steers straight to the center until the circle demands the sharper turn, and then flies around the
-    circle.  From then on the loiter is marked as reached, even if a gust or too small a radius takes the aircraft out
-    of the circle.
+    The aircraft steers straight to the center until the circle demands the sharper turn; then it flies around the
+    circle. From that moment the loiter counts as reached, even if a gust or too small a radius takes the aircraft
+    outside the circle.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north

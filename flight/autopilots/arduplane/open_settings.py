@@ -157,9 +157,11 @@ _FREE_BANK_HEIGHT_RATIO = 3.0
 
 
 def describe_open_settings(parameters: ArduPilotParameters, mission: MissionParts, *, by_program: bool) -> list[str]:
-    r"""Describe each parameter that affects a mission's flight but is not simulated, in a text without a full stop.
+    r"""Describe each parameter that affects a mission's flight but is not simulated.
 
-    by_program: True if ArduPlane's own program flies.
+    The texts have no full stop.
+
+    by_program: True if the ArduPlane program flies.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.of_text("LAND_PF_ARSPD 11\nKFF_THR2PTCH 2\n", "mine.param")
@@ -184,7 +186,7 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
 def _describe_dependent_settings(
     parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
 ) -> Iterator[str]:
-    """Describe settings whose effect depends on other settings, on the mission or on the aircraft."""
+    """Describe settings whose effect depends on other settings, the mission or the aircraft."""
     yield from _describe_airspeed_sensor(values)
     yield from _describe_position_estimate(values)
     yield from describe_failed_arming_checks(parameters, values, mission)
@@ -257,7 +259,7 @@ def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
 
 
 def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe settings with which ArduPlane has no position, or a position from another estimator than EKF3."""
+    """Describe settings with which ArduPlane has no position, or uses another estimator than EKF3."""
     type_names: tuple[str, ...] = ("GPS1_TYPE", "GPS2_TYPE")
     if values["GPS_AUTO_SWITCH"] == 0.0:
         type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
@@ -275,7 +277,7 @@ def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
 
 
 def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe each of ailerons, elevator and motor to which the user's file assigns no servo output."""
+    """Describe each control (ailerons, elevator, motor) to which the user's file assigns no servo output."""
     if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
         return
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
@@ -291,9 +293,10 @@ def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[s
 
 
 def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe limits of the pitch rate that are too low for turns or for changes of pitch.
+    """Describe pitch rate limits that are too low for turns or for pitch changes.
 
-    `AP_PitchController::get_servo_out` limits the rate that a turn needs together with the rate that changes the pitch.
+    `AP_PitchController::get_servo_out` limits the sum of two rates: the rate that a turn needs, and the rate that
+    changes the pitch.
     """
     bank = parameters.roll_limit
     turn_rate = math.degrees(GRAVITY / parameters.airspeed_cruise * math.tan(min(bank, _MAX_COORDINATED_BANK_RAD)))
@@ -307,9 +310,9 @@ def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, 
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:
-    """Describe gains of the user's file that are too low or too high to hold the aircraft's attitude.
+    """Describe gains of the user's file that are too low or too high to control the aircraft's attitude.
 
-    The gains of the aircraft's own file are assumed to suit the aircraft, and so are ArduPlane's defaults.
+    The gains in the aircraft's file and ArduPlane's defaults are assumed to suit the aircraft.
     """
     own: dict[str, float] = {}
     if aircraft is not None and (aircraft.folder / AIRCRAFT_FILE).exists():

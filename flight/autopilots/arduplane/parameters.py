@@ -483,11 +483,12 @@ class ArduPilotParameters(ParameterSet):
 
     @classmethod
     def _without_unknown_parameters(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without the parameters that release 4.6 lacks, and the names removed from the file.
+        """Return the sources without parameters that release 4.6 lacks, and the names that were removed.
 
-        For 4.6 a further source states the fixed values that 4.6 uses; other releases have all parameters.
+        Release 4.6 uses fixed values instead of these parameters; an additional source states them. For other releases
+        nothing is removed.
 
-        fields: the further arguments of the class, the first of which is the release.
+        fields: the other arguments of the class; the first is the release.
         """
         if not fields or fields[0] != "4.6":
             return sources, ()
@@ -518,12 +519,12 @@ class ArduPilotParameters(ParameterSet):
 
     @property
     def climbs_before_turn(self) -> bool:
-        """True if an RTL climbs to its altitude before it turns: bit 4 of FLIGHT_OPTIONS."""
+        """True if an RTL climbs to its altitude before it turns (bit 4 of FLIGHT_OPTIONS)."""
         return bool(int(self.flight_options) & CLIMB_BEFORE_TURN)
 
     @property
     def rtl_follows_terrain(self) -> bool:
-        """True if an RTL follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
+        """True if an RTL follows the terrain (bit 0 or bit 4 of TERRAIN_FOLLOW).
 
         >>> [ArduPilotParameters.defaults().changed(TERRAIN_FOLLOW=bits).rtl_follows_terrain for bits in (0, 1, 8, 16)]
         [False, True, False, True]
@@ -532,7 +533,9 @@ class ArduPilotParameters(ParameterSet):
 
     @property
     def has_own_fence(self) -> bool:
-        """True if ArduPlane's own fence (a circle about home, or altitude limits) is on and triggers an action.
+        """True if a fence of ArduPlane itself is on and triggers an action.
+
+        Such a fence is a circle about home, or altitude limits; the mission does not contain it.
 
         >>> default = ArduPilotParameters.defaults()
         >>> [default.changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_own_fence for kind in (4, 6)]
@@ -545,9 +548,9 @@ class ArduPilotParameters(ParameterSet):
     def return_radius(self) -> float:
         """Radius of the RTL loiter, m at sea level, negative to the left.
 
-        It is RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is at most 1 m, or 60 m if both are at most 1 m.  The sign is
-        the sign of RTL_RADIUS unless RTL_RADIUS is 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp,
-        `Plane::update_loiter` in navigation.cpp).
+        It is RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is at most 1 m, or 60 m if both are at most 1 m. The sign is
+        that of RTL_RADIUS unless RTL_RADIUS is 0. Follows `ModeRTL::navigate` in ArduPlane/mode_rtl.cpp and
+        `Plane::update_loiter` in navigation.cpp.
 
         >>> made = ArduPilotParameters.defaults()
         >>> [made.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]

@@ -23,9 +23,10 @@ _PROGRAM_RELEASE = re.compile(r"\bV?(\d{1,2})\.(\d{1,2})")
 
 
 def simulated_release(program: str) -> ArduPlaneVersion:
-    """Return the simulated release for a program: the newest that is not newer than the program's release.
+    """Return the simulated release for a program: the newest that is not newer than the program.
 
-    For an older program return the oldest simulated release, and for a program without a stated release the newest.
+    For a program older than every simulated release, return the oldest simulated release. For a program that states no
+    release, return the newest.
 
     >>> programs = ("ArduPlane V4.5.7", "ArduPlane V4.6.3 (3fc7011a)", "ArduPlane V4.7.0-dev", "ArduPilot")
     >>> [simulated_release(program) for program in programs]
@@ -36,9 +37,9 @@ def simulated_release(program: str) -> ArduPlaneVersion:
 
 
 def release_note(program: str) -> str:
-    """Return a note if the simulated release differs from the release of a program that flew; otherwise "".
+    """Return a note if the simulated release differs from the release of the program that flew.
 
-    The result is also "" if the program states no release.
+    The result is "" if the releases are the same, or if the program states no release.
 
     >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
     ('flown by ArduPlane 4.5, but simulated with 4.6', '')
@@ -52,7 +53,8 @@ def release_note(program: str) -> str:
 def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     r"""Return the release that wrote a parameter file, or None if unknown.
 
-    A comment has priority over the names.  Return None if the file has names of both 4.6 and 4.7, or of neither.
+    The release in a comment has priority over the release that the parameter names indicate. The names indicate no
+    release if the file has names of both 4.6 and 4.7, or of neither.
 
     >>> file_release("#NOTE: ArduPlane V4.5.7\nALT_SLOPE_MIN 15", ["ALT_SLOPE_MIN"])
     FileRelease(release='4.5', evidence='ArduPlane V4.5')
@@ -79,9 +81,9 @@ class ReleaseChoice(NamedTuple):
 
 
 def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
-    """Return the release to simulate: the stated release, or the release of the parameter file, or the newest.
+    """Return the release to simulate: the stated one, the release of the parameter file, or the newest.
 
-    A note names the parameters of the file that have another name in this release.
+    The result has a note if parameters of the file have another name in this release.
 
     params: path of the parameter file.  Raises ParameterError if it cannot be read.
     """

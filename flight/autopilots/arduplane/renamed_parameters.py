@@ -62,9 +62,9 @@ NAMES_SINCE_4_7 = frozenset({*RENAMED["4.7"].values(), "CLIMB_SLOPE_HGT"})
 
 
 def name_in_release(name: str, version: ArduPlaneVersion) -> str:
-    """Return the name of a parameter in a given release; the parameter may be named as in any release.
+    """Return the name of a parameter in a given release.
 
-    The name is returned unchanged if no release renamed the parameter.
+    The given name may be that of any release. It is returned unchanged if no release renamed the parameter.
 
     >>> name_in_release("GLIDE_SLOPE_MIN", "4.7"), name_in_release("ALT_SLOPE_MIN", "4.6")
     ('ALT_SLOPE_MIN', 'GLIDE_SLOPE_MIN')
@@ -80,9 +80,9 @@ def name_in_release(name: str, version: ArduPlaneVersion) -> str:
 
 
 def describe_renamed(names: Iterable[str], used: Iterable[str], version: ArduPlaneVersion) -> str:
-    """Describe in one line the parameters that have another name in a release; "" if there are none.
+    """Describe in one line the parameters that a release names differently; "" if there are none.
 
-    used: names that the control law reads; of the other names only the first is mentioned.
+    used: names that the control law reads. Of the other names, only the first is mentioned.
 
     >>> describe_renamed(["GLIDE_SLOPE_MIN", "WP_RADIUS"], ["GLIDE_SLOPE_MIN"], "4.7")
     'GLIDE_SLOPE_MIN is read as ALT_SLOPE_MIN, its name in ArduPlane 4.7'

@@ -164,9 +164,10 @@ def fly_returns(
 def _make_stages(
     target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
 ) -> Records:
-    """Return the successive targets of an RTL, as n `flight.guidance.lateral_reference_laws.WAYPOINT` records.
+    """Return the successive targets of an RTL, as n `WAYPOINT` records.
 
-    The first target is the RTL loiter, if any; the others are the stops of the landing sequence up to its first loiter.
+    The records are those of `flight.guidance.lateral_reference_laws`. The first target is the RTL loiter, if there is
+    one. The other targets are the stops of the landing sequence, up to its first loiter.
     """
     stops = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))
     stages: Records = np.zeros((target is not None) + len(stops), WAYPOINT)
@@ -183,7 +184,7 @@ def _make_stages(
 
 
 def truncate_at_first_loiter(stops: Sequence[LandingStart]) -> Sequence[LandingStart]:
-    """Return the stops of a landing sequence up to the first loiter, whose exit is not simulated.
+    """Return the stops of a landing sequence up to its first loiter, because the exit from it is not simulated.
 
     >>> stops = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), is_loiter=k == 2) for k in (1, 2, 3)]
     >>> [stop.item for stop in truncate_at_first_loiter(stops)]
@@ -194,7 +195,7 @@ def truncate_at_first_loiter(stops: Sequence[LandingStart]) -> Sequence[LandingS
 
 
 def fill_stage(stage: Record, stop: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Fill a stage's record from a stop of a landing sequence: a waypoint, or the center of a loiter."""
+    """Fill a stage's record from a stop of a landing sequence, which is a waypoint or the center of a loiter."""
     stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = stop.position
     stage.pass_by, stage.home_up = stop.pass_by, stop.home_up
     # The turn to the next leg is unknown: use a right angle, as at a mission's end.
@@ -216,9 +217,12 @@ def waypoint_ahead(start: Record) -> Records:
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s, from the distances and altitude changes between the start and the stages."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between its stages."""
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
-    east, north, altitude, seconds = start["east"], start["north"], start["up"], 0.0
+    east = start["east"]
+    north = start["north"]
+    altitude = start["up"]
+    seconds = 0.0
     for end in stages:
         distance = math.hypot(end["east"] - east, end["north"] - north)
         lap_length = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["loiter_radius"])
@@ -250,7 +254,7 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate the flight from stage to stage for at most ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
+    """Simulate the flight from stage to stage for up to ``timeout`` s; fill the `RETURN_RESULT` ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last loiter is flown on.
     climb_parameters: control parameters during the climb at the start, which the `CLIMB` record ``climb`` describes.
@@ -310,7 +314,7 @@ def fly_stages(
 
 @inner
 def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
-    """Return the fractions by which roll, pitch and path angle approach their demands in a tick of ``dt`` s."""
+    """Return the fractions by which roll, pitch and path angle approach their demands in one tick of ``dt`` s."""
     return (
         1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time)),
         1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
@@ -320,7 +324,7 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
 
 @inner
 def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
-    """Record time and altitude of the first arrival at the loiter; without an engine, end the RTL there."""
+    """Record time and altitude of the first arrival at the loiter; after an engine failure, end the RTL there."""
     if math.isnan(result.arrival_time):
         result.arrival_time, result.arrival_altitude = time, estimated.up
         if engine_out:
@@ -342,10 +346,12 @@ def _is_stage_complete(
     arrival_radius: float,
     dt: float,
 ) -> bool:
-    """Return True if the current stage is complete: the flight straight ahead, the climb, or the leg to the target.
+    """Return True if the current stage is complete.
+
+    A stage is the flight straight ahead before the engine failure is noticed, the climb, or the leg to the target.
 
     loiter: progress around the loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
-    is_before_reaction: True until the engine failure is noticed; the aircraft flies straight on.
+    is_before_reaction: True while the engine failure is not yet noticed and the aircraft flies straight on.
     time: time since the start, s.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     """
@@ -368,22 +374,20 @@ def _demand_climb(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Demand a climb straight ahead: level wings, the pitch limit of ``climb_parameters``, and increasing throttle.
+    """Demand a climb straight ahead: level wings, a fixed pitch, and increasing throttle.
+
+    Both pitch limits of ``climb_parameters`` are this pitch.
 
     airspeed_demand: equivalent airspeed, m/s.
     """
     memory.lateral_acceleration = 0.0
-    memory.altitude_demand_in, memory.altitude_demand_limited, memory.altitude_demand = (
-        estimated.up,
-        estimated.up,
-        estimated.up,
-    )
+    memory.altitude_demand_in = estimated.up
+    memory.altitude_demand_limited = estimated.up
+    memory.altitude_demand = estimated.up
     memory.climb_rate_demand, memory.max_climb_scaler, memory.max_sink_scaler = 0.0, 1.0, 1.0
-    previous_throttle, seb_integrator, ske_integrator = (
-        memory.throttle_demand,
-        memory.seb_integrator,
-        memory.ske_integrator,
-    )
+    previous_throttle = memory.throttle_demand
+    seb_integrator = memory.seb_integrator
+    ske_integrator = memory.ske_integrator
     memory.tas_demand = airspeed_demand * eas2tas
     update_tecs(state, estimated, climb_parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
     wind_up_ste_integrator(climb_parameters, memory)
@@ -402,10 +406,11 @@ def _is_target_reached(
     arrival_radius: float,
     dt: float,
 ) -> bool:
-    """Return True once the waypoint is reached or the loiter is complete, and update ``loiter`` on the last loiter.
+    """Return True once the waypoint is reached or the loiter is complete.
 
-    A loiter before a landing sequence is complete as soon as the aircraft is on it near the target altitude.  The last
-    loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
+    A loiter before a landing sequence is complete as soon as the aircraft is on its circle and near the target
+    altitude. The last loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`; its
+    progress ``loiter`` is updated here.
 
     target: waypoint of the stage.
     loiter: progress around the last loiter, a record of `flight.autopilots.return_steps.LOITER_PROGRESS`.
@@ -422,41 +427,36 @@ def _is_target_reached(
 
 @inner
 def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Record, memory: Record) -> None:
-    """Start a new leg to the stage with the given index.
+    """Start the leg to the stage with the given index.
 
-    The leg starts at the previous stage, or at the aircraft if there is none or the aircraft is already past this leg.
-    Waypoints 1 and 2 both become a copy of the stage.
+    The leg starts at the previous stage. It starts at the aircraft if there is no previous stage, or if the aircraft is
+    already past the leg's end. Waypoints 1 and 2 both become a copy of the stage.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
         target = waypoints[k]
-        target.east, target.north, target.turn, target.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
-        target.centre_east, target.centre_north, target.up, target.loiter_radius = (
-            stage.centre_east,
-            stage.centre_north,
-            stage.up,
-            stage.loiter_radius,
-        )
-        target.is_rtl, target.slope_base, target.without_crosstrack = (
-            stage.is_rtl,
-            stage.slope_base,
-            stage.without_crosstrack,
-        )
+        target.east = stage.east
+        target.north = stage.north
+        target.turn = stage.turn
+        target.airspeed = stage.airspeed
+        target.centre_east = stage.centre_east
+        target.centre_north = stage.centre_north
+        target.up = stage.up
+        target.loiter_radius = stage.loiter_radius
+        target.is_rtl = stage.is_rtl
+        target.slope_base = stage.slope_base
+        target.without_crosstrack = stage.without_crosstrack
         target.pass_by, target.min_ground_speed, target.home_up = stage.pass_by, stage.min_ground_speed, stage.home_up
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     if is_previous_reached and not is_past_finish_line(
         estimated, stages[index - 1].east, stages[index - 1].north, stage.east, stage.north
     ):
-        memory.from_east, memory.from_north, memory.from_up = (
-            stages[index - 1].east,
-            stages[index - 1].north,
-            stages[index - 1].up,
-        )
+        memory.from_east = stages[index - 1].east
+        memory.from_north = stages[index - 1].north
+        memory.from_up = stages[index - 1].up
     if stage.loiter_radius == 0.0 and index + 1 < stages.shape[0]:
-        next_stage, course = (
-            stages[index + 1],
-            math.atan2(stage.east - memory.from_east, stage.north - memory.from_north),
-        )
+        next_stage = stages[index + 1]
+        course = math.atan2(stage.east - memory.from_east, stage.north - memory.from_north)
         turn = abs(wrap(math.atan2(next_stage.east - stage.east, next_stage.north - stage.north) - course))
         waypoints[1].turn, waypoints[2].turn = turn, turn
     memory.leg, memory.sloped_leg, memory.reached_loiter_target, memory.cross_track_integrator = 0, 0, False, 0.0
@@ -472,10 +472,10 @@ def _initialise_memory(
     state: Record,
     memory: Record,
 ) -> None:
-    """Set the state from the motion over the ground, and the control law's memory as after a long steady flight.
+    """Set the state from the motion over the ground, and the memory as after a long steady flight.
 
-    Follows `flight.autopilots.arduplane.law.initialise_memory`, but also for a climb or a descent: the altitude demand
-    is ahead of the aircraft by the demand's lag.
+    Follows `flight.autopilots.arduplane.law.initialise_memory`, which assumes level flight. In a climb or descent the
+    input of the altitude demand is ahead of the aircraft by the lag of the demand.
     """
     initialise_state(start, aircraft, field, state)
     climb_rate = start.velocity_up
@@ -537,11 +537,12 @@ def _demand_throttle_and_pitch(
 ) -> None:
     """Demand throttle and pitch by TECS; in a gliding turn, demand the pitch that holds the airspeed.
 
-    airspeed_demand: equivalent airspeed, m/s.  In a bank it grows as the square root of the load factor, which keeps
-        the angle of attack.
+    airspeed_demand: equivalent airspeed, m/s. In a bank it is multiplied by the square root of the load factor, so that
+        the angle of attack stays the same.
 
-    Six of eight ArduPlane flights turned back like this and lost 55 m in the turn.  The other two, which had been
-    sinking before, held their altitude, slowed down, and lost half as much.  The worse case is simulated.
+    In six of eight ArduPlane flights, the aircraft held its airspeed in this way and lost 55 m in the turn back. In the
+    other two, which had been sinking before, it held its altitude, slowed down, and lost half as much. The worse case
+    is simulated.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)

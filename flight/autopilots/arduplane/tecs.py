@@ -33,8 +33,9 @@ def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> f
 def min_airspeed(bank: float, parameters: Record) -> float:
     """Return the minimum equivalent airspeed at a demanded bank (rad), m/s (`AP_TECS::_update_speed`).
 
-    It is AIRSPEED_MIN times the square root of the load factor of the turn.  If AIRSPEED_STALL is stated, it is
-    AIRSPEED_STALL times this root, but at least AIRSPEED_MIN.  Without stall prevention it is AIRSPEED_MIN.
+    The minimum is AIRSPEED_MIN times the square root of the turn's load factor. If AIRSPEED_STALL is stated, the
+    minimum is AIRSPEED_STALL times this root, but at least AIRSPEED_MIN. Without stall prevention the minimum is
+    AIRSPEED_MIN.
     """
     if parameters.stall_prevention <= 0.0:
         return parameters.airspeed_min
@@ -46,7 +47,7 @@ def min_airspeed(bank: float, parameters: Record) -> float:
 
 @inner
 def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank: float) -> float:
-    """Return the maximum bank (rad) without a stall at an airspeed, but at least ``min_bank``.
+    """Return the maximum bank (rad) at which the aircraft does not stall, but at least ``min_bank``.
 
     airspeed: m/s.
     min_level_airspeed: minimum airspeed in straight flight, m/s; both airspeeds are equivalent, or both are true.
@@ -58,7 +59,7 @@ def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank:
 
 @inner
 def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
-    """Return the bank (rad) for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall.
+    """Return the bank (rad) for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and by the stall.
 
     Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
 
@@ -139,13 +140,13 @@ _UNDERSPEED_EXIT_DELAY_S = 3.0
 
 @inner
 def _update_speed(state: Record, estimated: Record, parameters: Record, memory: Record, dt: float) -> None:
-    """Estimate airspeed and its rate with a complementary filter of acceleration and airspeed.
+    """Update the estimates of airspeed and airspeed rate with a complementary filter.
 
     Follows `AP_TECS::update_50hz` for the acceleration and `AP_TECS::_update_speed` for the filter.
 
-    The acceleration along the nose gives the fast changes, and the measured airspeed gives the slow changes.  An
-    accelerometer along the nose, with gravity removed, measures changes of the velocity over the ground, including its
-    vertical part: at the start of a climb that is more than the airspeed gains.
+    The fast changes come from the acceleration along the nose, the slow changes from the measured airspeed. With
+    gravity removed, an accelerometer along the nose measures the change of the velocity over the ground, including its
+    vertical component. At the start of a climb, this change is larger than the change of the airspeed.
     """
     cos_pitch = math.cos(state.pitch)
     acceleration = (estimated.velocity_east - memory.last_velocity_east) * math.sin(state.yaw) * cos_pitch
@@ -170,14 +171,14 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
 
 @inner
 def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
-    """Update the underspeed flag and return it: True while speed has priority over altitude.
+    """Update the underspeed flag, and return it: True while airspeed has priority over altitude.
 
     Follows `AP_TECS::_detect_underspeed`.
 
     tas_min: AIRSPEED_MIN as a true airspeed, m/s.
 
-    After an engine failure, underspeed lasts until the gliding aircraft meets its descending altitude demand; from then
-    on it glides at AIRSPEED_MIN, above the underspeed threshold (seen in 14 flights).
+    After an engine failure, underspeed lasts until the altitude demand has descended to the gliding aircraft. From then
+    on the aircraft glides at AIRSPEED_MIN, which is above the underspeed threshold (seen in 14 flights).
     """
     is_slow = memory.tas < _UNDERSPEED_RATIO * tas_min
     memory.time_above_underspeed_threshold = 0.0 if is_slow else memory.time_above_underspeed_threshold + dt
@@ -202,11 +203,11 @@ def airspeed_target(
     memory: Record,
     eas2tas: float,
 ) -> float:
-    """Return the target equivalent airspeed, m/s: the commanded airspeed plus an increase for a minimum ground speed.
+    """Return the target equivalent airspeed, m/s, increased if the ground speed is below its minimum.
 
-    The increase is the shortfall of the ground speed along the heading, rounded to whole m/s.  It rises immediately,
-    but falls only when the change is at least `_GROUND_SPEED_HYSTERESIS_MPS`.  The result is limited to AIRSPEED_MIN
-    and AIRSPEED_MAX.  Follows `Plane::calc_airspeed_errors` and `Plane::calc_gndspeed_undershoot`.
+    The increase of the commanded airspeed is the shortfall of the ground speed along the heading, rounded to whole m/s.
+    The increase rises at once, but falls only in steps of at least `_GROUND_SPEED_HYSTERESIS_MPS`. The result is
+    limited to AIRSPEED_MIN..AIRSPEED_MAX. Follows `Plane::calc_airspeed_errors` and `Plane::calc_gndspeed_undershoot`.
 
     commanded_airspeed: equivalent airspeed, m/s.
     waypoint: end of the leg, which states the minimum ground speed, m/s; 0 for none.
@@ -231,7 +232,7 @@ def airspeed_target(
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, memory: Record, tas_target: float, eas2tas: float, dt: float
 ) -> None:
-    """Update the throttle and pitch demands for the altitude demand and a target airspeed.
+    """Update the throttle and pitch demands that hold the altitude demand and a target airspeed.
 
     Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
     `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
@@ -276,9 +277,10 @@ def _update_tas_max(
     ste_rate_min: float,
     dt: float,
 ) -> float:
-    """Update and return the maximum true airspeed, m/s, which falls to AIRSPEED_CRUISE while the throttle is saturated.
+    """Update and return the maximum true airspeed, m/s.
 
-    Follows `AP_TECS::_update_speed`, which slows down an aircraft that cannot climb at its maximum airspeed.
+    The maximum falls towards AIRSPEED_CRUISE while the throttle is saturated, and rises again afterwards. With this
+    rule `AP_TECS::_update_speed` slows down an aircraft that cannot climb at its maximum airspeed.
 
     tas_min: minimum true airspeed, m/s.
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
@@ -303,9 +305,9 @@ def _update_speed_demand(
 ) -> float:
     """Move the airspeed demand towards a target, and return the demanded SKE rate, m^2/s^3.
 
-    Follows `AP_TECS::_update_speed_demand`.  The airspeed rises with half of the energy rate of TECS_CLMB_MAX, and
-    falls with nine tenths of the energy rate of TECS_SINK_MIN at AIRSPEED_CRUISE, or of TECS_SINK_MAX at the maximum
-    airspeed.
+    Follows `AP_TECS::_update_speed_demand`. A rise of the airspeed may use half of the energy rate of a climb at
+    TECS_CLMB_MAX. A fall may use nine tenths of the energy rate of a descent: at TECS_SINK_MIN at AIRSPEED_CRUISE, at
+    TECS_SINK_MAX at the maximum airspeed, and interpolated in between.
 
     tas_target, tas_min, tas_max: true airspeeds, m/s.
     """
@@ -323,7 +325,7 @@ def _update_speed_demand(
 
 @inner
 def _is_bad_descent(parameters: Record, memory: Record, ste_error: float, ste_rate: float) -> bool:
-    """Return True if the aircraft sinks at full throttle because too high an airspeed is demanded.
+    """Return True if the aircraft sinks at full throttle because the demanded airspeed is too high.
 
     Follows `AP_TECS::_detect_bad_descent`. A bad descent lasts until the STE error is no longer positive.
 
@@ -348,7 +350,7 @@ def _update_throttle(
     ste_rate_min: float,
     dt: float,
 ) -> None:
-    """Set the throttle demand for an STE rate demand, from the STE error and the STE rate.
+    """Set the throttle demand from an STE rate demand, the STE error and the STE rate.
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
@@ -386,10 +388,10 @@ def _update_throttle(
 
 @inner
 def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
-    """Set the STE integrator to its value at full throttle, as ArduPlane does at every update of a climb-out.
+    """Set the STE integrator to its value at full throttle, as ArduPlane does during a climb-out.
 
-    `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle therefore
-    stays open for a while afterwards.
+    `AP_TECS::_update_throttle_with_airspeed` does so at every update of a take-off and of an aborted landing. Therefore
+    the throttle stays open for a while afterwards.
     """
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
@@ -410,9 +412,9 @@ def _update_pitch_integrators(
     pitch_max: float,
     dt: float,
 ) -> None:
-    """Update the SEB and SKE integrators of the pitch demand; both fade while the pitch demand is beyond a limit.
+    """Update the SEB and SKE integrators of the pitch demand.
 
-    Follows `AP_TECS::_update_pitch`.
+    Both integrators fade while the pitch demand is beyond a limit. Follows `AP_TECS::_update_pitch`.
 
     seb_rate_demand_total: SEB rate demand without integrators, m^2/s^3.
     seb_change, ske_change: changes of the integrators in this update, m^2/s^3.
@@ -449,7 +451,7 @@ def _update_pitch(
     is_underspeed: bool,
     dt: float,
 ) -> None:
-    """Set the pitch demand from the balance between potential and kinetic energy.
+    """Set the pitch demand from the balance of potential and kinetic energy.
 
     Follows `AP_TECS::_update_pitch`.
 

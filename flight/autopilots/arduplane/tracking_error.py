@@ -73,11 +73,12 @@ def tracking_error(
     fly_over: bool = False,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return ArduPlane's deviations from a plan at an equivalent airspeed (m/s), for which the plan needs margins.
+    """Return ArduPlane's deviations from a plan, for which the plan needs margins.
 
+    airspeed: equivalent airspeed, m/s.
     nav: accuracy of navigation.
     fly_over: True if ArduPlane flies on to each waypoint before it turns.
-    turbulence: turbulence of the wind; gusts leave less of the throttle for a climb.
+    turbulence: turbulence of the wind; in gusts less throttle remains for a climb.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> parameters = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0)
@@ -111,7 +112,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corner_tables(
     parameters: ArduPilotParameters, airspeed: float, fly_over: bool
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the acceptance radius, the excursion and the affected lengths of both legs of corners, m.
+    """Return the acceptance radius, the excursion, and the affected length of each leg at corners, m.
 
     Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`.
     """
@@ -137,9 +138,10 @@ def _measure_corners(
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Fill the `CORNER_TRACKING` records of all corners, one row per turn angle and one column per ground speed.
+    """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns).
 
-    Search for the acceptance radius with the smallest excursion; with ``fly_over`` simulate one turn only.
+    For each corner, search for the acceptance radius with the smallest excursion. With ``fly_over`` there is nothing to
+    choose, and one turn is simulated.
     """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
@@ -159,10 +161,8 @@ def _measure_corners(
                     if corner_flight[0] < min_excursion:
                         best_acceptance, min_excursion = acceptance, corner_flight[0]
                         corner.excursion, corner.after = corner_flight
-                min_acceptance, max_acceptance = (
-                    max(MIN_ACCEPTANCE_M, best_acceptance - step),
-                    min(MAX_ACCEPTANCE_M, best_acceptance + step),
-                )
+                min_acceptance = max(MIN_ACCEPTANCE_M, best_acceptance - step)
+                max_acceptance = min(MAX_ACCEPTANCE_M, best_acceptance + step)
             corner.acceptance = best_acceptance
             corner.before = 0.0 if fly_over else best_acceptance
 
@@ -179,8 +179,8 @@ def _fly_corner(
 ) -> tuple[float, float]:
     """Simulate one corner; return the excursion and the settling distance, m.
 
-    The excursion is the maximum distance from the nearer leg.  The settling distance is the distance along the second
-    leg beyond which the aircraft stays close to it.  The first leg leads north to the origin; the turn is a right turn.
+    The excursion is the maximum distance from the nearer leg. The settling distance is measured along the second leg;
+    beyond it the aircraft stays close to the leg. The first leg leads north to the origin; the turn is a right turn.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]

@@ -30,12 +30,12 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @classmethod
     def accepts_program(cls, program: Path) -> bool:
-        """Return True for any program, because ArduPlane does not report its version until it has started."""
+        """Return True: any program may be ArduPlane, which reports its version only after it has started."""
         return True
 
     @classmethod
     def with_model(cls, model: ArduPlane, binary: Path) -> Self:
-        """Return ArduPlane's program as an autopilot, with the parameters of the simulated ArduPlane."""
+        """Return the autopilot that runs the ArduPlane program, with the parameters of the simulated ArduPlane."""
         return cls(model.parameters, binary=binary)
 
     @classmethod
@@ -51,17 +51,17 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """Checks of the simulated ArduPlane, without battery failsafes: the program flies with them switched off."""
+        """Checks of the simulated ArduPlane, but without battery failsafes, which are off in the program."""
         return replace(super().checks, battery_failsafes=())
 
     def describe_settings_ignored_by_program(self, mission: MissionParts) -> list[str]:
-        """Describe the settings that the program does not receive, or that have no effect on its simulated flight."""
+        """Describe the settings that the program does not receive, or that do not affect its simulated flight."""
         settings = self.describe_unsimulated_settings(mission, by_program=True)
         return [text for text in settings if not text.startswith(_FLOWN_BY_PROGRAM)]
 
     @property
     def ground(self) -> GroundRules:
-        """Rules of take-off and landing; the program flies them only together."""
+        """Rules of take-off and landing; the program flies either both or neither."""
         return replace(super().ground, needs_both_ends=True)
 
     @property

@@ -79,7 +79,7 @@ class AutopilotFlight(SitlFlight):
 
     @property
     def last_item(self) -> int:
-        """Number of the last item; items are numbered from 1, and 0 is home."""
+        """Number of the mission's last item; items are numbered from 1, and 0 is home."""
         return self._mission.last or len(self._mission.items)
 
     @property
@@ -105,7 +105,7 @@ class AutopilotFlight(SitlFlight):
 
 
 def _reported_program(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
-    """Return the description of the program that flew, from the messages that it sent."""
+    """Return the description of the program that flew, from its messages."""
     reported = link.reported
     known = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
     unknown = parameters.changed.keys() - known
@@ -128,7 +128,7 @@ def fly_autopilot(
     *,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with ArduPlane SITL, from the autopilot's boot to the end of the flight.
+    """Fly a setup with ArduPlane SITL, from the program's boot to the end of the flight.
 
     setup, aircraft, autopilot, user_parameters: see `AutopilotFlight`.
     log: file to which the autopilot's own log (.BIN) is moved.

@@ -39,9 +39,10 @@ _MIN_FLARE_HEIGHT_M = 6.0
 
 @compiled
 def program_ground_tick(block: Floats, heights: Heights) -> int:
-    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick; return an end code or 0.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick.
 
-    The program has set the commands in the block.
+    Return the code of the flight's end, or 0 if the flight continues. The program has already set the commands in the
+    block.
     """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
@@ -62,7 +63,9 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def update_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
-    """Change to the next phase when its condition is met: lift-off, end of the climb, last item, flare.
+    """Change to the next phase of the flight when its condition is met.
+
+    The conditions are lift-off, the end of the climb, the last item, and the flare.
 
     true: a `flight.guidance.navigation_error.MOTION` record.
     ground: a `flight.autopilots.arduplane.ground_law.GROUND_STATE` record.

@@ -43,7 +43,7 @@ class ServoPacket(NamedTuple):
 
 
 def parse_servo_packet(data: bytes) -> ServoPacket:
-    """Return the servo outputs in a datagram.
+    """Return the servo outputs in a datagram of ArduPlane.
 
     Raises FlightError if the datagram is of another version of the interface.
 
@@ -67,7 +67,7 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
 
 
 def encode_motion(motion: BodyMotion | tuple[float, ...], battery: tuple[float, float] | None = None) -> bytes:
-    r"""Return the datagram with the motion of the aircraft.
+    r"""Return the datagram that tells ArduPlane the motion of the aircraft.
 
     battery: volts and amperes; None for an aircraft without a battery.
 
@@ -118,7 +118,7 @@ class PhysicsPort:
         self._socket.close()
 
     def receive(self) -> ServoPacket:
-        """Return the next frame.
+        """Return the next frame of servo outputs from the program.
 
         Raises FlightError if the program ends, stops sending, restarts, or uses another version of the interface.
         """
@@ -154,13 +154,13 @@ class PhysicsPort:
                 )
 
     def answer(self, data: bytes) -> None:
-        """Send the autopilot the motion of the aircraft after the last received frame."""
+        """Send ArduPlane the motion of the aircraft that follows the last received frame."""
         self._last_answer = data
         self._answered = self._clock()
         self._send(data)
 
     def _next_datagram(self) -> bytes:
-        """Return the next datagram, or no bytes if none arrives within `_CHECK_INTERVAL_S`."""
+        """Return the next datagram; b"" if none arrives within `_CHECK_INTERVAL_S`."""
         try:
             if self._connected:
                 return self._socket.recv(_MAX_DATAGRAM_BYTES)

@@ -24,7 +24,7 @@ class Preflight(Conversation):
     """Conversation with one running ArduPlane."""
 
     def identify(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read the named parameters that it has.
+        """Identify the autopilot, and read those of the named parameters that it has.
 
         Raises FlightError if the vehicle is not a fixed wing.
         """
@@ -33,7 +33,7 @@ class Preflight(Conversation):
     def prepare(self, mission: UploadedMission) -> Talk:
         """Wait until ArduPlane has a position, upload the mission, arm ArduPlane, and start AUTO.
 
-        Raises FlightError if ArduPlane has no position estimate, or refuses one of these steps.
+        Raises FlightError if ArduPlane finds no position, or refuses one of the other steps.
         """
         reported, ekf = self._reported, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT
         yield from self._wait_for_position(ekf, _MESSAGE_INTERVALS_US[ekf], mavlink.ESTIMATOR_CONST_POS_MODE)
@@ -62,7 +62,9 @@ def _home_item(home: Home) -> MissionItem:
 
 
 def version_text(texts: list[str], number: int | None) -> str:
-    """Return ArduPlane's name and version from its texts, or from AUTOPILOT_VERSION.flight_sw_version.
+    """Return ArduPlane's name and version.
+
+    They are in ArduPlane's status texts, or else in AUTOPILOT_VERSION.flight_sw_version.
 
     >>> version_text(["Initialising", "ArduPlane V4.6.0-dev (0123abcd)"], None)
     'ArduPlane V4.6.0-dev (0123abcd)'

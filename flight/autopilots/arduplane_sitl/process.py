@@ -23,7 +23,7 @@ _SPEEDUP = 1000
 def arduplane_launch(
     home: Home, heading: float, parameters: Mapping[str, float], physics_port: int, link_port: int
 ) -> Callable[[Path], Launch]:
-    """Return a function that prepares a folder for ArduPlane's program and returns its command line.
+    """Return a function that prepares a folder for the ArduPlane program and returns its command line.
 
     home: start position of the aircraft.
     heading: heading at the start, degrees.
@@ -113,10 +113,10 @@ class ArduPlaneFlightParameters:
 def collect_arduplane_parameters(
     setup: FlightSetup, aircraft: Aircraft, servos: ServoMap, user_parameters: Mapping[str, float]
 ) -> ArduPlaneFlightParameters:
-    """Collect the parameters of a flight of ArduPlane's program from the simulation, the aircraft and the user.
+    """Collect the parameters for a flight of the ArduPlane program.
 
-    AIRSPEED_CRUISE is the mission's airspeed, unless the user states a value.  Raises ParameterError if a file is
-    invalid.
+    They come from the simulation, the aircraft and the user. AIRSPEED_CRUISE is the mission's airspeed, unless the user
+    states a value. Raises ParameterError if a file is invalid.
     """
     battery = _MEASURED if aircraft.battery_voltage else _UNMEASURED
     base = SIMULATION | battery | servos.parameters() | load_aircraft_parameters(aircraft)
@@ -129,7 +129,7 @@ def collect_arduplane_parameters(
 
 
 def with_names_of_4_6(values: Mapping[str, float]) -> dict[str, float]:
-    """Return parameters under their names in 4.7 and, where 4.7 renamed them, in 4.6.
+    """Return parameters under their names in 4.7, and under their names in 4.6 where these differ.
 
     >>> with_names_of_4_6({"ALT_SLOPE_MIN": 20.0, "WP_RADIUS": 90.0})
     {'ALT_SLOPE_MIN': 20.0, 'WP_RADIUS': 90.0, 'GLIDE_SLOPE_MIN': 20.0}
@@ -146,11 +146,12 @@ def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
 
 
 def load_user_parameters(setup: FlightSetup) -> dict[str, float]:
-    """Return the user's parameters, from the scenario's parameter file and RTL settings, by present names.
+    """Return the user's parameters: those of the scenario's parameter file, and those of its RTL settings.
 
-    Includes the parameters that are assumed for a mission with a landing, without which ArduPlane would not arm.
+    The result includes parameters that are assumed for a mission with a landing, because ArduPlane would otherwise not
+    arm.
 
-    Leaves out older names and names that are too long for MAVLink; the RTL settings have priority over the file.
+    The RTL settings have priority over the file. Older names, and names that are too long for MAVLink, are left out.
 
     Raises ParameterError, in one line, if the file cannot be read or states a value that is not allowed.
     """

@@ -33,7 +33,10 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the guidance of a [flight] table; a table with parameters names another autopilot."""
+        """Return the guidance that a [flight] table describes.
+
+        A table with parameters describes another autopilot.
+        """
         return cls(table.steering.guidance)
 
     @classmethod
@@ -47,7 +50,7 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return a sentence if the gains file is missing; its gains tune the inner loops of every lateral law."""
+        """Return a sentence if the gains file is missing, because every lateral law needs its gains."""
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
@@ -59,19 +62,22 @@ class PlanflyGuidance(Autopilot):
         return ControlLaw(planfly_tick, planfly_loop, initialise=self._initialise)
 
     def _initialise(self, guidance: Record, record: Record) -> None:
-        """Set the lateral law in the guidance memory."""
+        """Store the lateral law in the guidance memory."""
         guidance.lateral_law = LAWS[self.guidance]
 
     def describe(self, aircraft: str) -> str:
-        """Return a description of the lateral law."""
+        """Return a description of the guidance with its lateral law."""
         return _LAW_NAMES[self.guidance]
 
     @property
     def turns(self) -> TurnRules:
-        """Rules of turns: the reference laws may pass a waypoint at any distance."""
+        """Rules of turns; the laws "l1" and "vector-field" may pass a waypoint at any distance."""
         return TurnRules(keeps_to_arcs=self.guidance == "path")
 
     @property
     def deviations(self) -> Deviations:
-        """Altitude loss in downdrafts; in updrafts the guidance dives and flies faster, so they do not lift it."""
+        """Altitude loss in downdrafts.
+
+        In updrafts the guidance dives and flies faster, so it gains no altitude.
+        """
         return Deviations(gust_sink=height_in_gusts)

@@ -126,7 +126,7 @@ def guide(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` seconds, and update the memory.
+    """Compute the commands for one tick of ``dt`` s, and update the memory of the guidance.
 
     state: a `flight.dynamics.state.STATE` record.
     estimated: a `flight.guidance.navigation_error.MOTION` record.
@@ -158,9 +158,10 @@ def _cross_track_bank_command(
     course: float,
     dt: float,
 ) -> float:
-    """Return the bank command of planfly's own law, rad: curvature feed-forward plus cross-track correction.
+    """Return the bank command of planfly's lateral law, rad.
 
-    Also set the sideslip setpoint and the maximum ground speed for the arcs ahead.
+    The command is a feed-forward of the path's curvature plus a correction of the cross-track error. The sideslip
+    setpoint and the maximum ground speed for the arcs ahead are set as well.
 
     course: course of the path at the aircraft, rad.
     """
@@ -207,9 +208,9 @@ def _cross_track_bank_command(
 def _limit_bank_by_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
     """Return the bank demand, reduced if it would turn the nose too far from the course, rad.
 
-    At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  A larger angle would not help against a
-    crosswind, and the aircraft would turn through 360 degrees.  The result is continuous in both angles unless the nose
-    points straight back.  A bank that already turns the nose back towards the course fast enough is not changed.
+    At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course. Turning further would not help against a
+    crosswind; the aircraft would turn through 360 degrees. The result is continuous in both angles unless the nose
+    points straight back. A bank is not changed if it already turns the nose back towards the course fast enough.
 
     nose_angle: angle from the course to the nose, positive clockwise, within +-pi rad.
     max_bank: rad.
@@ -223,10 +224,10 @@ def _limit_bank_by_nose_angle(bank_demand: float, nose_angle: float, max_bank: f
 def _roll_offset_correction(
     curvature: float, gains: Record, memory: Record, turn_acceleration: float, speed: float, crab: float, dt: float
 ) -> float:
-    """Return the acceleration to the right (m/s^2) that corrects the offset caused by rolling into and out of arcs.
+    """Return the acceleration to the right that corrects the offset from rolling into and out of arcs, m/s^2.
 
-    An aircraft needs time to change its bank, so it leaves the path where the curvature changes in one step.
-    ``memory.roll_offset`` is this planned offset, computed with a model of the roll.
+    An aircraft needs time to change its bank, so it leaves the path where the curvature changes in a step. A model of
+    the roll predicts this offset, which is stored in ``memory.roll_offset``.
 
     curvature: curvature of the path at the aircraft, 1/m.
     turn_acceleration: acceleration to the right for the path ahead, m/s^2.
@@ -256,7 +257,7 @@ def _lateral_correction(
     crab: float,
     dt: float,
 ) -> float:
-    """Return the acceleration to the right that corrects the cross-track error and compensates disturbances, m/s^2.
+    """Return the acceleration to the right that corrects cross-track errors and disturbances, m/s^2.
 
     speed: ground speed, m/s.
     course_error: ground course minus course of the path, rad.
@@ -288,7 +289,7 @@ def _pressure_ratio(state: Record, gains: Record) -> float:
 def _unexplained_acceleration(
     state: Record, estimated: Record, gains: Record, memory: Record, speed: float, crab: float, dt: float
 ) -> float:
-    """Return the smoothed acceleration to the right that neither lift nor ailerons explain, m/s^2.
+    """Return the smoothed acceleration to the right that is caused neither by lift nor by ailerons, m/s^2.
 
     The estimate starts at the second tick, because it needs the previous velocity.
     """
@@ -310,7 +311,7 @@ def _unexplained_acceleration(
 def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:
-    """Return the bank command of L1 (rad), and switch to the next leg if L1 has reached the waypoint."""
+    """Return the bank command of L1 (rad); begin the next leg once L1 has reached the waypoint."""
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     l1_distance = l1_length(speed, gains.l1_period, damping)
@@ -334,7 +335,9 @@ def _l1_bank_command(
 def _field_bank_command(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
 ) -> float:
-    """Return the bank command of the vector field, rad: the bank for the arc, plus a PI law on the course error.
+    """Return the bank command of the vector field, rad.
+
+    The command is the bank for the arc plus a PI law on the course error.
 
     curvature: curvature of the path at the aircraft, 1/m.
     course: course of the path at the aircraft, rad.
@@ -405,14 +408,13 @@ def _max_upward_acceleration(
     rate_gain: float,
     dt: float,
 ) -> float:
-    """Return the maximum upward acceleration that the energy allows, m/s^2.
+    """Return the maximum upward acceleration that the aircraft's energy allows, m/s^2.
 
-    The climb rate available at constant airspeed is the current specific excess power plus the excess power of the
-    unused throttle. While the airspeed is above its minimum, the aircraft may climb faster than at that rate; while the
-    airspeed is below its minimum, the aircraft must climb more slowly, or descend, to regain speed.  Near the stall the
-    measured airspeed, gusts included, replaces the filtered one, because a gust can bring the aircraft to the stall
-    within a second.  In a steep turn this protection starts at a higher airspeed, because the stall speed grows with
-    the square root of the load factor.
+    At constant airspeed the aircraft can climb at a rate equal to its specific excess power, including that of the
+    unused throttle. Above its minimum airspeed, it may climb faster. Below its minimum airspeed, it must climb more
+    slowly, or descend, to regain speed. Near the stall the measured airspeed, gusts included, replaces the filtered
+    airspeed, because a gust can stall the aircraft within a second. In a steep turn this protection starts at a higher
+    airspeed, because the stall speed grows with the square root of the load factor.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
@@ -447,7 +449,9 @@ def _set_throttle(
     speed_along: float,
     dt: float,
 ) -> None:
-    """Set the throttle: trim of level flight, feed-forward for the slope ahead, and PI feedback of the airspeed error.
+    """Set the throttle from the trim of level flight, the slope ahead and the airspeed error.
+
+    The slope ahead gives a feed-forward, the airspeed error a PI feedback.
 
     slope_ahead: slope of the altitude profile ahead, m per m.
     speed_along: ground speed along the path, m/s.
@@ -468,10 +472,10 @@ def _set_throttle(
 
 @inner
 def steer_bank(state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float) -> None:
-    """Set the aileron from a bank command through a roll model, and the rudder for coordination and damping.
+    """Set the aileron from a bank command, and the rudder for coordination and yaw damping.
 
-    The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
-    it never overshoots; `follow_roll` makes the aircraft follow the model.
+    A roll model answers the bank command as a critically damped oscillator within the limits of roll rate and roll
+    acceleration, so it never overshoots. `follow_roll` makes the aircraft follow the model.
     """
     bank, roll_rate, roll_acceleration = step_roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
     follow_roll(state, gains, memory, commands, bank, roll_rate, roll_acceleration, dt)

@@ -172,9 +172,10 @@ class Px4(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults.
+        """Return the autopilot with parameters from the user's file, the aircraft's file, and the defaults.
 
-        Its release is the stated one, or the release that wrote the file, or the newest.
+        The simulated release is the first known of: the release that the table states, the release that wrote the file,
+        the newest release.
         """
         found = None
         if table.params is not None:
@@ -210,11 +211,11 @@ class Px4(Autopilot):
 
     @property
     def control_law(self) -> ControlLaw:
-        """PX4's controllers with these parameters."""
+        """Control law of PX4 with these parameters."""
         return ControlLaw(px4_tick, px4_loop, PX4, self._initialise, _transfer_state)
 
     def _initialise(self, guidance: Record, record: Record) -> None:
-        """Copy the parameters into the controllers' record."""
+        """Copy the parameters into the control law's record."""
         record.parameters = self.parameters.record()
 
     def describe(self, aircraft: str) -> str:
@@ -234,9 +235,9 @@ class Px4(Autopilot):
 
     @cached_property
     def checks(self) -> MissionChecks:
-        """PX4's feasibility checks, from FW_LND_ANG and MIS_TKO_LAND_REQ.
+        """Checks of PX4 before a mission (feasibility checks), from FW_LND_ANG and MIS_TKO_LAND_REQ.
 
-        A file with all parameters is assumed to state MIS_TKO_LAND_REQ.
+        If the user's file is a complete set of parameters, MIS_TKO_LAND_REQ counts as stated.
 
         >>> Px4(Px4Parameters.defaults()).checks.feasibility.requires
         2
@@ -253,9 +254,9 @@ class Px4(Autopilot):
         )
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
-        """Describe settings that end a mission or change its flight, but are not simulated.
+        """Describe settings that would end a mission or change its flight, but are not simulated.
 
-        by_program: True for a flight of PX4's own program, in which more settings have an effect.
+        by_program: True for a flight with the PX4 program, in which more settings have an effect.
         """
         # `FeasibilityChecker` refuses a mission beyond GF_MAX_*, whatever GF_ACTION is.
         parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
@@ -276,7 +277,7 @@ class Px4(Autopilot):
         return [*ending_texts, *changing_texts, *([] if by_program else self._describe_mission_settings(mission))]
 
     def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
-        """Describe settings that matter only for certain missions or releases."""
+        """Describe settings that matter only for some missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
             yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not simulated"
@@ -297,7 +298,7 @@ class Px4(Autopilot):
         yield from self._unjudged_return_texts(mission.rally_distance)
 
     def _unsimulated_return_texts(self, rally_distance: float) -> Iterator[str]:
-        """Describe a value of RTL_TYPE with which no return is simulated.
+        """Describe a value of RTL_TYPE for which no RTL is simulated.
 
         rally_distance: distance of the nearest rally point from home, m; infinite without one.
         """
@@ -308,7 +309,7 @@ class Px4(Autopilot):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where it begins, which is not simulated"
 
     def _unjudged_return_texts(self, rally_distance: float) -> Iterator[str]:
-        """Describe settings with which a part of a return is not simulated; see `_unsimulated_return_texts`."""
+        """Describe settings with which a part of an RTL is not simulated; see `_unsimulated_return_texts`."""
         parameters = self.parameters
         if parameters["RTL_TYPE"] != _TO_RALLY_POINT and rally_distance <= _RALLY_HOME_DISTANCE_M:
             yield "PX4 ignores a rally point within 10 m of home, to which the return is simulated"
@@ -330,10 +331,10 @@ class Px4(Autopilot):
                     yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not simulated"
 
     def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
-        """Return the battery failsafe that ends the mission first; PX4's own program flies without it.
+        """Return the battery failsafe that ends a mission first; the PX4 program flies without it.
 
-        COM_LOW_BAT_ACT acts at BAT_CRIT_THR and at BAT_EMERGEN_THR, which `Battery::determineWarning` tests first.
-
+        COM_LOW_BAT_ACT sets PX4's reaction at BAT_CRIT_THR and at BAT_EMERGEN_THR. `Battery::determineWarning` tests
+        BAT_EMERGEN_THR first.
 
         >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
         >>> Px4(made).checks.battery_failsafes[0].used_charge
@@ -351,9 +352,9 @@ class Px4(Autopilot):
         return (BatteryFailsafe(name, threshold, remaining_fraction=threshold),)
 
     def _return_time_failsafe(self) -> ReturnTimeFailsafe | None:
-        """Return the failsafe of `rtlEstimateCheck`, or None if it does not act.
+        """Return the failsafe on the remaining flight time (`rtlEstimateCheck`); None if PX4 does not react.
 
-        The remaining time is known only with a capacity.
+        PX4 knows the remaining time only if a battery capacity is set.
         """
         parameters = self.parameters
         default = _RETURN_IN_TIME_DEFAULT[parameters.version]
@@ -377,9 +378,10 @@ class Px4(Autopilot):
 
     @property
     def turns(self) -> TurnRules:
-        """Rules of turns from NAV_ACC_RAD (up to 1.16 at least guidance's own switch distance) and FW_R_LIM.
+        """Rules of turns from NAV_ACC_RAD and FW_R_LIM.
 
-        Only PX4's multicopters read the second parameter of a waypoint.
+        Up to 1.16 the acceptance radius is at least the switch distance of the guidance. PX4 ignores a waypoint's
+        acceptance radius (its second parameter) on a fixed wing.
         """
         return TurnRules(
             acceptance_radius=self._turn_distance(math.pi, 0.0),
@@ -409,9 +411,9 @@ class Px4(Autopilot):
 
     @property
     def speeds(self) -> SpeedRules:
-        """Rules of airspeeds, of the throttle limit FW_THR_MAX, and of the limits of climb and sink rates.
+        """Rules of airspeeds, throttle limit (FW_THR_MAX), and limits of climb and sink rates.
 
-        A speed outside FW_AIRSPD_MIN and FW_AIRSPD_MAX is replaced by the nearest limit.
+        A commanded speed outside FW_AIRSPD_MIN..FW_AIRSPD_MAX is replaced by the nearest limit.
         """
         min_airspeed, max_airspeed = self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"]
         limits = SpeedLimits(min_airspeed, max_airspeed, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
@@ -433,7 +435,7 @@ class Px4(Autopilot):
 
     @property
     def returns(self) -> ReturnBehaviour:
-        """Behaviour in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
+        """Behaviour of PX4 in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
         return ReturnBehaviour(
             self._return_rules,
             _rtl_parameters,
@@ -448,7 +450,7 @@ class Px4(Autopilot):
 
     @property
     def _return_trials(self) -> ReturnTrials:
-        """Heights of RTL_RETURN_ALT, then of RTL_DESCEND_ALT, and the values of RTL_TYPE that are simulated."""
+        """Parameter changes to try for a safer RTL: RTL_RETURN_ALT, RTL_DESCEND_ALT, and RTL_TYPE."""
         first, last = ({name: self.parameters[name]} for name in ("RTL_RETURN_ALT", "RTL_DESCEND_ALT"))
         other_types = sorted({0.0, 1.0, 3.0} - {self.parameters["RTL_TYPE"]})
         return ReturnTrials(
@@ -485,7 +487,7 @@ class Px4(Autopilot):
         )
 
     def _failsafe_causes(self, mission: ReturnMission) -> tuple[Cause, ...]:
-        """Return the events that can end a mission, with PX4's reaction to each."""
+        """Return the events that can end a mission, each with PX4's reaction."""
         return failsafe_causes(self.parameters, has_fence=mission.has_fence)
 
     def _unsimulated_returns(self, mission: ReturnMission) -> str:
@@ -496,7 +498,7 @@ class Px4(Autopilot):
         return next(self._unsimulated_return_texts(mission.rally_distance), "")
 
     def _unjudged_returns(self, mission: ReturnMission) -> tuple[str, ...]:
-        """Return the parts of the RTLs of a mission that are not simulated."""
+        """Return texts on the parts of a mission's RTLs that are not simulated."""
         return_type, has_sequence = self.parameters["RTL_TYPE"], any(start.landing for start in mission.landings)
         is_unknown = return_type in _TO_LANDING and not has_sequence and not mission.commands.isdisjoint(LANDINGS)
         landing_text = f"RTL_TYPE {return_type:g} may return to a landing without DO_LAND_START, which is not simulated"
@@ -504,7 +506,7 @@ class Px4(Autopilot):
 
     @property
     def _return_path_text(self) -> str:
-        """Sentence on the path of an RTL."""
+        """Sentence about the path of an RTL."""
         parameters = self.parameters
         return_type = parameters["RTL_TYPE"]
         first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
@@ -516,12 +518,13 @@ class Px4(Autopilot):
 
     @property
     def _return_rules(self) -> ReturnRules:
-        """Rules of an RTL at any distance, from RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_LOITER_RAD and RTL_TYPE.
+        """Rules of an RTL from RTL_RETURN_ALT, RTL_DESCEND_ALT, RTL_LOITER_RAD and RTL_TYPE.
 
-        Both heights apply above a rally point as above home.  Follows PX4's `src/modules/navigator/rtl.cpp`.  RTL_TYPE
-        0 returns to the nearest of home and the rally points; 1 (the default of fixed wings) and 5 return to the
-        nearest rally point, or to home without a rally point.  The other types, and 1, also use a mission's landing, to
-        which an RTL that is an item of the mission is not simulated.
+        The rules are for an RTL that starts at any distance. Both altitudes are heights above the destination, which is
+        home or a rally point. Follows PX4's `src/modules/navigator/rtl.cpp`. RTL_TYPE 0 returns to the nearest of home
+        and the rally points; 1 (the default of fixed wings) and 5 return to the nearest rally point, or to home without
+        a rally point. Type 1 and all other types also use the landing of a mission. If the RTL is an item of the
+        mission itself, an RTL to that landing is not simulated.
 
         >>> rules = Px4(Px4Parameters.defaults()).returns.rules
         >>> rules.includes_home, rules.transit_height, rules.rally_height, rules.deviation_note
@@ -544,7 +547,7 @@ class Px4(Autopilot):
 
     @property
     def loiters(self) -> LoiterRules:
-        """Rules of loiters from NAV_LOITER_RAD, the reference climb and sink rates, and NAV_FW_ALT_RAD.
+        """Rules of loiters from NAV_LOITER_RAD, NAV_FW_ALT_RAD, and the reference climb and sink rates.
 
         >>> Px4(Px4Parameters.defaults()).loiters.radius
         80.0
@@ -563,7 +566,10 @@ class Px4(Autopilot):
 
     @property
     def deviations(self) -> Deviations:
-        """Deviations from the legs, the altitude gained in updrafts, and circles outside NAV_FW_ALT_RAD."""
+        """Deviations from the legs, altitude gained in updrafts, and loiters that correct the altitude.
+
+        PX4 loiters at a waypoint if its altitude error exceeds NAV_FW_ALT_RAD.
+        """
         return Deviations(
             tracking_error=self._tracking_error,
             gust_rise=height_in_updrafts,
@@ -576,7 +582,10 @@ class Px4(Autopilot):
 
     @property
     def _climb_candidates(self) -> tuple[Candidate, ...]:
-        """FW_T_CLMB_MAX, up to FW_T_CLMB_R_SP, if it is the smaller limit of the climb rate."""
+        """Range of values to try for FW_T_CLMB_MAX, if it is the smaller limit of the climb rate.
+
+        The range ends at FW_T_CLMB_R_SP, the other limit of the climb rate.
+        """
         largest_rate = self.parameters["FW_T_CLMB_R_SP"]
         is_smaller = self.parameters["FW_T_CLMB_MAX"] < largest_rate
         return (Candidate("FW_T_CLMB_MAX", 0.5, largest_rate, "m/s"),) if is_smaller else ()
@@ -584,7 +593,7 @@ class Px4(Autopilot):
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return PX4's deviations with these parameters; ``fly_over`` has no effect, as PX4 flies over no waypoint."""
+        """Return PX4's deviations from a plan; ``fly_over`` has no effect, because PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Px4":
@@ -593,7 +602,7 @@ class Px4(Autopilot):
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
-    """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
+    """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter."""
     record.memory = previous_record.memory
     for name in _LEG_FIELDS:
         setattr(record.memory, name, 0)

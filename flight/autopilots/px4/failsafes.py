@@ -37,7 +37,7 @@ _MIN_HOLD_TIME_S = 0.1
 
 
 def failsafe_causes(parameters: Px4Parameters, *, has_fence: bool) -> tuple[Cause, ...]:
-    """Return the events that can end a mission, with PX4's reaction to each, in a fixed order.
+    """Return the events that can end a mission, each with PX4's reaction, in a fixed order.
 
     has_fence: True if the mission carries a fence.
 
@@ -80,10 +80,10 @@ def _link_cause(parameters: Px4Parameters, use: LinkUse) -> Cause:
 
 
 def link_loss_reactions(parameters: Px4Parameters, use: LinkUse) -> tuple[LinkLossReaction, ...]:
-    """Return the reactions to the loss of a radio link in a mission, in order of time.
+    """Return PX4's reactions to the loss of a radio link in a mission, in order of time.
 
-    PX4 notices the loss after COM_DL_LOSS_T or COM_RC_LOSS_T.  Before a return or a landing it holds for
-    COM_FAIL_ACT_T, and then reacts even if the link is back.
+    PX4 notices the loss after COM_DL_LOSS_T or COM_RC_LOSS_T. Before an RTL or a landing PX4 loiters for
+    COM_FAIL_ACT_T. Then it reacts even if the link has been restored.
 
     use: "telemetry" for the ground station's link, "control" for the remote control.
 

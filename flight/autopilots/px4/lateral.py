@@ -27,9 +27,9 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 @inner
 def bearing_feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bearing: float) -> float:
-    """Return the feasibility of a course, 0..1: 1 with enough airspeed, 0 if the wind is too strong for the course.
+    """Return the feasibility of a course in wind, 0..1 (`bearingFeasibility`).
 
-    Follows `bearingFeasibility`.
+    The result is 1 if the airspeed is sufficient for the course, and 0 if the wind is too strong for it.
 
     wind_cross_bearing, wind_dot_bearing: wind components across and along the course, m/s.
     """
@@ -40,7 +40,7 @@ def bearing_feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bea
 
 @inner
 def track_error_bound(ground_speed: float, time_constant: float) -> float:
-    """Return the track error (m) beyond which guidance approaches the track at right angles.
+    """Return the track error (m) beyond which guidance steers at a right angle to the track.
 
     time_constant: NPFG's time constant, s.
     """
@@ -51,7 +51,7 @@ def track_error_bound(ground_speed: float, time_constant: float) -> float:
 
 @inner
 def straight_track_period(parameters: Record) -> float:
-    """Return the period on a straight track, s: NPFG_PERIOD, or more if the roll lag requires it."""
+    """Return NPFG's period on a straight track, s: NPFG_PERIOD, or more if the roll lag requires it."""
     period: float = parameters.npfg_period
     if parameters.npfg_enables_period_lower_bound > 0.0:
         period_lower_bound = (
@@ -68,7 +68,7 @@ def straight_track_period(parameters: Record) -> float:
 def switch_distance(ground_speed: float, parameters: Record) -> float:
     """Return the distance before a waypoint at which guidance would turn to the next leg, m.
 
-    The distance is NPFG_SW_DST_MLT times the bound of the track error.
+    The distance is NPFG_SW_DST_MLT times `track_error_bound`.
     """
     time_constant = straight_track_period(parameters) * parameters.npfg_damping
     return min(
@@ -86,7 +86,9 @@ def adapted_period(
     track_proximity: float,
     parameters: Record,
 ) -> float:
-    """Return the period of the guidance on a track, s: long enough for the roll lag, short enough for a curve in wind.
+    """Return NPFG's period on a track, s.
+
+    The period is long enough for the roll lag, and short enough for a curve in wind.
 
     curvature: curvature of the track, 1/m.
     track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
@@ -118,9 +120,9 @@ def adapted_period(
 def reference_air_velocity(
     bearing_east: float, bearing_north: float, wind_east: float, wind_north: float, airspeed: float
 ) -> tuple[float, float]:
-    """Return the air velocity (east and north, m/s) with which the aircraft flies a course in a wind.
+    """Return the velocity through the air, east and north, m/s, with which the aircraft flies a course in a wind.
 
-    If the wind is too strong for the course, return the air velocity whose ground course deviates least from it.
+    If the wind is too strong for the course, the ground course of the result is as close to the course as possible.
 
     bearing_east, bearing_north: unit vector of the course.
     """
@@ -140,7 +142,7 @@ def reference_air_velocity(
 def heading_error_sine(air_east: float, air_north: float, reference_east: float, reference_north: float) -> float:
     """Return the sine of the angle from the air velocity to its reference, positive to the right.
 
-    The result is 1 or -1 beyond 90 degrees.
+    Beyond 90 degrees the result is 1 or -1.
     """
     speed_product = max(1e-6, math.hypot(air_east, air_north) * math.hypot(reference_east, reference_north))
     sine = (air_north * reference_east - air_east * reference_north) / speed_product
@@ -163,14 +165,14 @@ def guide_to_path(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Set ``memory.lateral_acceleration`` so that the aircraft joins and follows a track (`guideToPath`).
+    """Set ``memory.lateral_acceleration`` to join and follow a track (`guideToPath`).
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     path_east, path_north: point of the track nearest to the aircraft, m.
     tangent_east, tangent_north: direction of the track at that point, a unit vector.
     curvature: 1/m, positive to the right.
     wind_east, wind_north: velocity of the air, m/s.
-    target_airspeed: m/s; ``memory.min_airspeed`` is set if the ground speed would be too low at it.
+    target_airspeed: m/s. If the ground speed would be too low at this airspeed, ``memory.min_airspeed`` is set.
     """
     air_east, air_north = estimated.velocity_east - wind_east, estimated.velocity_north - wind_north
     airspeed = max(0.1, math.hypot(air_east, air_north))
@@ -229,10 +231,10 @@ def follow_leg(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Guide the aircraft onto the line from the leg's start to its end, or straight to one of these points.
+    """Guide the aircraft onto the line from the leg's start to its end (`navigateWaypoints`).
 
-    Before the start and further away than the switch distance, the aircraft flies to the start; past the end, it
-    flies back to the end (`navigateWaypoints`).
+    An aircraft that is before the start, and further from it than the switch distance, flies straight to the start. An
+    aircraft that is past the end flies straight back to the end.
 
     end_east, end_north: end of the leg, m.
     Other arguments as for `guide_to_path`.

@@ -160,7 +160,7 @@ def control_as_px4(
     memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
     Other arguments as for `flight.autopilots.planfly.law.guide`.
 
-    The path is only the reference against which the track is measured; PX4 does not use it.
+    PX4 does not use the path; the track is only measured against it.
     """
     find_on_path(estimated, pieces, guidance)
     guidance.height_error = estimated.up - profile_at(nodes, guidance.distance)[0]
@@ -189,7 +189,10 @@ def control_as_px4(
 
 @inner
 def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
-    """Move the roll setpoint at a limited rate (FW_PN_R_SLEW_MAX) towards that of the lateral acceleration."""
+    """Move the roll setpoint towards the bank for the lateral acceleration, at a limited rate.
+
+    The limit is FW_PN_R_SLEW_MAX.
+    """
     max_roll_step = parameters.roll_slew_rate * dt
     limited_roll = roll_setpoint(memory.lateral_acceleration, parameters)
     memory.roll_setpoint = (
@@ -203,10 +206,10 @@ def update_roll_setpoint(parameters: Record, memory: Record, dt: float) -> None:
 def _end_mission(
     estimated: Record, last_waypoint: Record, guidance: Record, parameters: Record, memory: Record, dt: float
 ) -> None:
-    """End the flight once the aircraft is past the last waypoint and near the waypoint's altitude, or after a timeout.
+    """End the flight once the aircraft is past the last waypoint and near its altitude, or after a timeout.
 
-    If PX4 loiters without end at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one
-    circle of that loiter.  A circle before the waypoint, which corrects the altitude, does not end the flight.
+    If PX4 loiters without end at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one lap
+    of that loiter. A loiter before the last waypoint, in which PX4 corrects the altitude, does not end the flight.
     """
     has_arrived = (
         memory.time_at_mission_end > 0.0 or guidance.is_finished or memory.is_loitering or memory.mission_finished
@@ -266,7 +269,7 @@ def _control_attitude(
     commands: Record,
     dt: float,
 ) -> None:
-    """Drive roll and pitch to their setpoints with the lags of PX4's controllers, and set the throttle."""
+    """Drive roll and pitch to their setpoints with the lags of PX4's controllers; set the throttle."""
     previous_roll_rate = guidance.bank_rate
     roll_rate = (memory.roll_setpoint - guidance.bank) / (ROLL_LAG_RATIO * parameters.roll_time_constant)
     if parameters.roll_rate_max > 0.0:

@@ -49,8 +49,8 @@ def acceptance_radius_at(ground_speed: float, parameters: Record) -> float:
 def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
     """Return the altitude tolerance within which a waypoint or a loiter is accepted, m.
 
-    Follows `Navigator::get_altitude_acceptance_radius`: infinite in a landing sequence (`setActiveMissionItems`),
-    NAV_FW_ALTL_RAD before a landing, otherwise NAV_FW_ALT_RAD.
+    The tolerance is infinite in a landing sequence (`setActiveMissionItems`), NAV_FW_ALTL_RAD before a landing, and
+    otherwise NAV_FW_ALT_RAD. Follows `Navigator::get_altitude_acceptance_radius`.
     """
     if target.ignores_altitude:
         return math.inf
@@ -60,9 +60,10 @@ def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
 
 @inner
 def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
-    """Return True if the aircraft is past the vertical plane through the leg's end, perpendicular to the leg.
+    """Return True if the aircraft is past the end of the leg.
 
-    The result is False for a leg without length.
+    It is past the end if it has crossed the vertical plane through the end that is perpendicular to the leg. The result
+    is False for a leg without length.
     """
     leg_east, leg_north = target.east - memory.from_east, target.north - memory.from_north
     distance_past = (estimated.east - target.east) * leg_east + (estimated.north - target.north) * leg_north
@@ -80,7 +81,7 @@ def navigate(
     memory: Record,
     dt: float,
 ) -> None:
-    """Follow the current leg, set the altitude setpoint, and switch to the next leg when the target is reached.
+    """Follow the current leg, set the altitude setpoint, and begin the next leg once the target is reached.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -117,7 +118,11 @@ def find_target(waypoints: Records, memory: Record) -> int:
 
 @inner
 def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
-    """Return True if the aircraft is past the plane through a gate, perpendicular to the course to the target."""
+    """Return True if the aircraft is past a gate.
+
+    It is past the gate if it has crossed the vertical plane through the gate that is perpendicular to the course from
+    the gate to the target.
+    """
     normal_east, normal_north = target.east - gate.east, target.north - gate.north
     distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
     return distance_past >= 0.0
@@ -135,10 +140,10 @@ def _navigate_waypoint(
     memory: Record,
     dt: float,
 ) -> None:
-    """Follow the leg to a waypoint, circle there while too high or too low, and then begin the next leg.
+    """Follow the leg to a waypoint, and begin the next leg once the waypoint is reached.
 
-    Once the last waypoint of a mission is reached, the aircraft circles about this waypoint; up to 1.16 about the
-    position at which it reached the waypoint.
+    If the aircraft is too high or too low at the waypoint, it loiters there first. At the last waypoint of a mission it
+    loiters without end: about the waypoint, or up to 1.16 about the position at which it reached the waypoint.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -196,7 +201,7 @@ def _navigate_loiter(
     memory: Record,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it until its end condition is met, then begin the next leg.
+    """Fly to a loiter and around it until the loiter's end condition is met, then begin the next leg.
 
     loiter: waypoint on the loiter.
     """
@@ -241,7 +246,7 @@ def _navigate_loiter(
 
 @inner
 def is_last_target(waypoints: Records, memory: Record) -> bool:
-    """Return True if the target is the last one of the route; waypoints on the same loiter are one target."""
+    """Return True if the target is the last target of the route; waypoints on one loiter are one target."""
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
     return target_index + 1 >= waypoints.shape[0] or (target.loiter_radius != 0.0 and waypoints[-1].stop == target.stop)
@@ -249,7 +254,7 @@ def is_last_target(waypoints: Records, memory: Record) -> bool:
 
 @inner
 def _setpoint_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of a waypoint's position setpoint, m: the waypoint, or its loiter's center."""
+    """Return east and north of a waypoint's position setpoint, m: the waypoint, or the center of its loiter."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0
@@ -259,9 +264,10 @@ def _setpoint_position(waypoint: Record) -> tuple[float, float]:
 
 @inner
 def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record) -> bool:
-    """Return True if the ground course points to the waypoint after a loiter, within `EXIT_COURSE_TOLERANCE_RAD`.
+    """Return True if the ground course points to the waypoint after a loiter.
 
-    The result is also True if this waypoint is so close to the loiter's center that the course never points to it.
+    The tolerance is `EXIT_COURSE_TOLERANCE_RAD`. The result is also True if the waypoint is so close to the loiter's
+    center that the course never points to it.
     """
     next_east, next_north = _setpoint_position(next_waypoint)
     if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
@@ -283,10 +289,10 @@ def climb_before_return(
     parameters: Record,
     memory: Record,
 ) -> bool:
-    """Circle up to the return altitude where the RTL began; return False once the aircraft is that high.
+    """Climb in a loiter where the RTL began; return False once the aircraft is at the return altitude.
 
-    ``memory.from_east``, ``from_north`` and ``from_up`` are where the RTL began, and then where the climb ended, at the
-    altitude at which the RTL began.
+    During the climb ``memory.from_east`` and ``from_north`` are the position at which the RTL began; after it, the
+    position at which the climb ended. ``memory.from_up`` always is the altitude at which the RTL began.
 
     lowest_return_altitude: return altitude of an RTL that begins lower, m AMSL.
     """
@@ -325,11 +331,11 @@ def _navigate_rtl(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Fly an RTL: circle up to the return altitude if necessary, fly straight to the target, and descend there.
+    """Fly an RTL: climb in a loiter if necessary, fly straight to the target, and descend there.
 
-    Follows PX4's `src/modules/navigator/rtl.cpp` and `rtl_direct.cpp`: the return altitude is RTL_RETURN_ALT above the
-    destination, or the altitude at the start if that is higher, and the aircraft never descends before it is over its
-    target, where it descends to RTL_DESCEND_ALT.
+    Follows PX4's `src/modules/navigator/rtl.cpp` and `rtl_direct.cpp`. The return altitude is RTL_RETURN_ALT above the
+    destination, or the altitude at the start of the RTL if that is higher. The aircraft does not descend on the way.
+    Over its target it descends to RTL_DESCEND_ALT.
     """
     # The target is RTL_DESCEND_ALT above the destination, but no higher than the return altitude.
     lowest_return_altitude = rtl.up + max(0.0, parameters.rtl_altitude - parameters.rtl_descend_altitude)
@@ -357,10 +363,11 @@ def _navigate_rtl(
 
 @inner
 def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
-    """Make ``leg`` the current leg, along the line between its two waypoints.
+    """Make ``leg`` the current leg, and set the start of the line to its end.
 
-    After a loiter the line starts at the loiter's center, or at the tangent point on the circle if the item says so.
-    After a loiter by turns, which PX4 refuses, the line starts at the aircraft.
+    The line starts at the leg's first waypoint. After a loiter it starts at the loiter's center, or at the tangent
+    point on the circle if the item states an exit on the tangent. After a loiter by turns, which PX4 refuses, it starts
+    at the aircraft's position.
     """
     start, end = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -385,7 +392,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter is past a corner of the route on this loiter, by less than 90 degrees."""
+    """Return True if an aircraft on a loiter has passed a corner of the loiter by less than 90 degrees."""
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
     angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.loiter_radius)
@@ -394,10 +401,11 @@ def is_past_corner(estimated: Record, corner: Record) -> bool:
 
 @inner
 def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance: float, memory: Record) -> float:
-    """Return the altitude setpoint on the slope of a leg, m AMSL: PX4's first-order hold (FOH).
+    """Return the altitude setpoint on the slope of a leg, m AMSL, by PX4's first-order hold (FOH).
 
-    The slope ends ``lead_distance`` m before the end of the leg, and uses the minimum horizontal distance to the end
-    on this leg.  On a leg no longer than ``lead_distance`` the setpoint is the altitude of its end.
+    The slope ends ``lead_distance`` m before the end of the leg. The setpoint depends on the minimum horizontal
+    distance to the end so far. On a leg no longer than ``lead_distance``, the setpoint is the altitude of the leg's
+    end.
     """
     leg_length = math.hypot(end_east - memory.from_east, end_north - memory.from_north)
     min_distance = min(memory.min_distance_to_end, leg_length)

@@ -46,7 +46,9 @@ _GAIN_FACTOR = math.degrees(1.0) / 45.0
 
 
 def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None, *, by_program: bool) -> Iterator[str]:
-    """Describe settings that leave the aircraft without a position or control, each in a text without a full stop.
+    """Describe settings that leave the aircraft without a position or without control.
+
+    The texts have no full stop.
 
     aircraft: None if the aircraft is not known.
     by_program: True if PX4's own program flies, which uses the gains of the rate controllers.
@@ -72,9 +74,10 @@ def _describe_position_estimate(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe a control allocation of the file that is not a fixed wing's, or lacks ailerons, elevator or motor.
+    """Describe a control allocation of the file that does not suit a fixed wing.
 
-    A release before control allocation (SYS_CTRL_ALLOC 0) states no airframe.
+    It is for another airframe, or it lacks ailerons, elevator or motor. Parameters without control allocation
+    (SYS_CTRL_ALLOC 0) state no airframe.
     """
     stated = parameters.by_origin("file")
     if parameters["CA_AIRFRAME"] != _FIXED_WING:
@@ -93,7 +96,10 @@ def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe slew rate limits of the outputs (`ControlAllocation::applySlewRateLimit`; s for the whole range)."""
+    """Describe slew rate limits of the actuator outputs, which are given in s for the whole range.
+
+    Follows `ControlAllocation::applySlewRateLimit`.
+    """
     stated = parameters.by_origin("file")
     for name in SLEW_NAMES:
         if (value := stated.get(name, 0.0)) > 0.0:
@@ -101,7 +107,7 @@ def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe output functions of the file that include no motor, or no control surface."""
+    """Describe output functions in the user's file that lack a motor or any control surface."""
     stated = parameters.by_origin("file")
     functions = {stated[name] for name in OUTPUT_FUNCTION_NAMES if name in stated}
     if not functions:
@@ -112,9 +118,9 @@ def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:
-    """Describe gains of the user's file that are too low or too high to hold the aircraft's attitude.
+    """Describe gains of the user's file that are too low or too high to control the aircraft's attitude.
 
-    The gains of the aircraft's own file for ArduPlane are assumed to suit the aircraft, and so are PX4's defaults.
+    The gains in the aircraft's file for ArduPlane, and PX4's defaults, are assumed to suit the aircraft.
     """
     own = {} if aircraft is None or not (aircraft.folder / AIRCRAFT_FILE).exists() else rate_gains(aircraft)
     stated = parameters.by_origin("file")
@@ -135,7 +141,7 @@ def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:
-    """Return PX4's gains of the rate controllers by name, converted from the aircraft's gains for ArduPlane.
+    """Return PX4's rate controller gains by name, converted from the aircraft's gains for ArduPlane.
 
     Raises ParameterError if the file is invalid.
 

@@ -270,7 +270,7 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values of ArduPlane's parameters in the aircraft's file as PX4's parameters, within PX4's ranges.
+        """Return the values in the aircraft's file for ArduPlane, converted to PX4's parameters and ranges.
 
         Parameters that PX4 does not have are omitted.
         """
@@ -286,20 +286,24 @@ class Px4Parameters(ParameterSet):
     def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
         """Return False for the default value of a parameter that is not simulated.
 
-        A ground station saves every parameter, so a default value in a file does not show what the user wants.
+        A ground station saves every parameter, so a default value in a file does not mean that the user has set it.
         """
         return definition.name not in NOT_SIMULATED or value != definition.default
 
     @property
     def is_complete_set(self) -> bool:
-        """True if the user's file is a complete set: a parameter that it lacks has the default of the release."""
+        """True if the user's file is a complete set of parameters.
+
+        In this case a parameter that the file lacks has the default of the release.
+        """
         return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
 
     @property
     def uses_switch_distance(self) -> bool:
-        """True if the navigator uses the switch distance of the guidance (NPFG).
+        """True if the navigator uses the switch distance of the guidance (NPFG), as releases up to 1.16 do.
 
-        Up to 1.16 the position controller published this distance; the modules that replaced it in 1.17 do not.
+        Up to 1.16 the position controller published this distance. The modules that replace the controller in 1.17 do
+        not.
         """
         return self.version == "1.16"
 
@@ -321,8 +325,9 @@ def speed_filter_gains(
 ) -> tuple[float, float, float, float]:
     """Return the 2x2 steady-state Kalman gains of the airspeed filter, row by row (PX4: kKg00 to kKg11).
 
-    The rows correct the airspeed (1/s, 1) and the airspeed rate (1/s^2, 1/s); the columns are for the errors of the
-    measured airspeed and of the measured rate.
+    The first row corrects the airspeed, the second row the airspeed rate. The first column applies to the error of the
+    measured airspeed, the second to the error of the measured rate. The units are 1/s and 1 in the first row, 1/s^2 and
+    1/s in the second.
 
     speed_sigma, rate_sigma: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).
     process_sigma: standard deviation of the noise that drives the rate, m/s^2.

@@ -119,7 +119,7 @@ def _fly_one(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate an RTL; see `fly_rtl`.
+    """Simulate one RTL with `fly_rtl`.
 
     limits: timeout, s, and height above ground and distance outside spheres, m, below which the RTL is aborted.
     """
@@ -144,7 +144,10 @@ def _fly_one(
 
 
 def _make_route(start: Record, target: ReturnTarget, parameters: Px4Parameters) -> Records:
-    """Return the waypoints of an RTL: its start, and its loiter, or the stops of a landing sequence and its landing."""
+    """Return the waypoints of an RTL: its start and its loiter, or its start and a landing sequence.
+
+    A landing sequence consists of its stops and the landing.
+    """
     stops = () if target.landing is None else (target.landing, *target.landing.next_stops)
     route = waypoint_column(2 if target.landing is None else len(stops) + 2)
     route["airspeed"], route["stop"] = parameters["FW_AIRSPD_TRIM"], np.arange(len(route))
@@ -174,7 +177,7 @@ def _fill_stop(waypoint: Record, stop: LandingStart, parameters: Px4Parameters) 
 
 
 def _rtl_timeout(start: Record, target: ReturnTarget, parameters: Px4Parameters, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s, from its distances and altitude changes."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between its waypoints."""
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.max_wind)
     climb_rate = min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"])
     sink_rate = min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"])
@@ -210,9 +213,10 @@ def fly_rtl(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Simulate an RTL for at most ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
+    """Simulate an RTL for up to ``timeout`` s, and fill the `RETURN_RESULT` ``result``.
 
-    waypoints: its start, and the loiter at its end; or the stops of a landing sequence, and then its landing.
+    waypoints: start of the RTL, then the loiter at its end; or the start, the stops of a landing sequence, and the
+        landing.
     transit_altitude: altitude to which an RTL to a landing sequence climbs first, m AMSL.
     min_clearance, min_distance: height above ground and distance outside spheres, m, below which the RTL is aborted.
     positions: array (t, 3), m, to fill with one position per second until it is full.
@@ -262,9 +266,11 @@ def _update_arrival(
     time: float,
     result: Record,
 ) -> bool:
-    """Return True over the destination, or once the leg to the landing is the current leg; record the first time.
+    """Return True once the RTL has arrived, and record the time of the arrival.
 
-    radius: distance from the center, m, within which the aircraft has arrived at its loiter.
+    An RTL to a loiter arrives over its destination; an RTL to a landing arrives when it begins the leg to the landing.
+
+    radius: distance from the loiter's center within which the aircraft has arrived, m.
     """
     if lands:
         has_arrived = has_begun_sequence and memory.leg + 2 >= waypoints.shape[0]
@@ -289,7 +295,10 @@ def _steer(
     has_begun_sequence: bool,
     dt: float,
 ) -> bool:
-    """Set the setpoints of bank, pitch and throttle; return True once an RTL to a landing flies its sequence."""
+    """Set the setpoints of bank, pitch and throttle for one tick.
+
+    Return True once an RTL to a landing flies the landing sequence, and not the climb before it.
+    """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
     # Guidance gets the true airspeed; from 1.17 on it gets the equivalent airspeed, which it treats as true airspeed.
@@ -318,8 +327,8 @@ def _begin_sequence(
 ) -> None:
     """Begin the leg to the first stop of a landing sequence.
 
-    After a climb the leg begins at the center of the climb's loiter.  Otherwise PX4 has no previous setpoint: the leg
-    begins at the aircraft, at the altitude of its end.
+    After a climb the leg begins at the center of the loiter in which the aircraft climbed. Without a climb PX4 has no
+    previous setpoint. The leg then begins at the aircraft's position, and at the altitude of the leg's end.
     """
     begin, first_stop = waypoints[0], waypoints[1]
     has_climbed = begin.up < transit_altitude - parameters.altitude_acceptance_radius
@@ -333,7 +342,7 @@ def _begin_sequence(
 def _follow_setpoints(
     state: Record, parameters: Record, memory: Record, aircraft: Record, pitch: float, path_angle: float, dt: float
 ) -> tuple[float, float]:
-    """Let the bank follow its setpoint, and return pitch and path angle after a tick, rad."""
+    """Let the bank follow its setpoint; return the pitch and path angle after a tick, rad."""
     roll_change = (1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time_constant))) * (
         memory.roll_setpoint - state.roll
     )
@@ -358,9 +367,9 @@ def _initialise_memory(
     state: Record,
     memory: Record,
 ) -> None:
-    """Set the state of the point mass, and the control law's memory as after a long steady flight, also in a climb.
+    """Set the state of the point mass, and the control law's memory as after a long steady flight.
 
-    In a steady climb the altitude reference is ahead of the aircraft by the lag of TECS.
+    The steady flight may be a climb, in which the altitude reference is ahead of the aircraft by the lag of TECS.
     """
     initialise_state(start, aircraft, field, state)
     climb_rate, eas_to_tas = start.velocity_up, eas_to_tas_ratio(start.up)

@@ -63,7 +63,7 @@ def update_tecs(
     eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Update the throttle and pitch setpoints in ``memory`` for the altitude setpoint and an airspeed setpoint.
+    """Update the throttle and pitch setpoints for the altitude setpoint and an airspeed setpoint.
 
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
     `_calcAirspeedControlOutput`.  The setpoint of the SKE rate follows from the airspeed setpoint
@@ -110,10 +110,10 @@ def update_tecs(
 def _adapt_airspeed_setpoint(
     airspeed_setpoint: float, parameters: Record, memory: Record, eas_to_tas: float, dt: float
 ) -> None:
-    """Move the true airspeed setpoint at a limited rate towards an equivalent airspeed (m/s).
+    """Move the true airspeed setpoint towards an equivalent airspeed (m/s) at a limited rate.
 
-    Follows `adapt_airspeed_setpoint`.  The limits of the airspeed apply at once; in a bank the minimum grows as the
-    square root of the load factor.
+    Follows `adapt_airspeed_setpoint`. The airspeed limits are not rate-limited. In a bank the minimum airspeed grows as
+    the square root of the load factor.
     """
     min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
     tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
@@ -124,7 +124,7 @@ def _adapt_airspeed_setpoint(
 
 @inner
 def detect_underspeed(equivalent_airspeed: float, parameters: Record) -> float:
-    """Return the underspeed ratio, 0 to 1, by which speed gets priority over altitude (`_detectUnderspeed`).
+    """Return the underspeed ratio, 0..1: the priority of airspeed over altitude (`_detectUnderspeed`).
 
     The ratio is 0 above the underspeed threshold and rises to 1 below it.
 
@@ -146,10 +146,14 @@ def _calc_pitch_control(
     underspeed_ratio: float,
     dt: float,
 ) -> None:
-    """Set the pitch setpoint for an altitude rate (m/s) and an SKE rate (m^2/s^3), by the energy balance rate (SEB).
+    """Set the pitch setpoint from the setpoint of the SEB rate.
 
-    Follows `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
+    The SEB rate is the balance between the rates of potential and kinetic energy. Follows
+    `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
     `_calcPitchControlOutput`.
+
+    altitude_rate_setpoint: m/s.
+    ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
     """
     tas = memory.tas
     speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
@@ -159,10 +163,8 @@ def _calc_pitch_control(
         GRAVITY * estimated.velocity_up * spe_weighting - tas * memory.tas_rate * ske_weighting
     )
     seb_rate_per_pitch = tas * GRAVITY
-    pitch_max, pitch_min = (
-        parameters.pitch_limit_max - parameters.pitch_trim,
-        parameters.pitch_limit_min - parameters.pitch_trim,
-    )
+    pitch_max = parameters.pitch_limit_max - parameters.pitch_trim
+    pitch_min = parameters.pitch_limit_min - parameters.pitch_trim
     increment = seb_rate_error * parameters.integrator_gain_pitch / seb_rate_per_pitch * dt
     # With the setpoint at a limit the integrator may only move away from the limit.
     if memory.pitch_setpoint >= pitch_max:
@@ -191,10 +193,12 @@ def _calc_throttle_control(
     eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Set the throttle setpoint for an altitude rate (m/s) and an SKE rate (m^2/s^3), by the total energy rate (STE).
+    """Set the throttle setpoint from the setpoint of the STE rate, the rate of the total energy.
 
     Follows `TECSControl::_calcThrottleControlSteRate`, `_calcThrottleControlUpdate` and `_calcThrottleControlOutput`.
 
+    altitude_rate_setpoint: m/s.
+    ske_rate_setpoint: rate of the kinetic energy, m^2/s^3.
     min_sink_rate: sink rate at idle throttle, m/s.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate

@@ -66,8 +66,9 @@ def tracking_error(
     *,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return PX4's deviations at an equivalent airspeed (m/s), for which a plan needs margins.
+    """Return PX4's deviations from a plan, for which the plan needs margins.
 
+    airspeed: equivalent airspeed, m/s.
     nav: accuracy of navigation.
     turbulence: turbulence of the wind.
 
@@ -99,11 +100,11 @@ def tracking_error(
 def altitude_miss_probability(
     acceptance: float, climb_reserve: float, sink_reserve: float, turbulence: Turbulence
 ) -> float:
-    """Return the probability that gusts carry the aircraft beyond NAV_FW_ALT_RAD at a waypoint.
+    """Return the probability that gusts carry an aircraft beyond its altitude tolerance at a waypoint.
 
-    acceptance: NAV_FW_ALT_RAD, m.
-    climb_reserve, sink_reserve: unused climb and sink rates, m/s; an up- or downdraft that exceeds them carries the
-        aircraft away until the draft ends.
+    acceptance: altitude tolerance (NAV_FW_ALT_RAD), m.
+    climb_reserve, sink_reserve: climb and sink rates that the aircraft does not use, m/s. A draft that exceeds these
+        rates moves the aircraft away until the draft ends.
 
     The result is 0 for any turbulence other than moderate.
 
@@ -123,7 +124,7 @@ def altitude_miss_probability(
 
 
 def _exceedance_probability(deviations: float) -> float:
-    """Return the probability that a normal variable exceeds its mean by a number of standard deviations."""
+    """Return the probability that a normal variable exceeds its mean by this number of standard deviations."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
 
@@ -133,7 +134,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 @lru_cache(maxsize=8)
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return the acceptance radius, the excursion and the affected lengths of both legs of corners, m.
+    """Return the acceptance radius, the excursion, and the affected length of each leg at corners, m.
 
     Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`.
     """
@@ -157,7 +158,7 @@ def _measure_corners(
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Fill the `CORNER_TRACKING` records of all corners, one row per turn angle and one column per ground speed."""
+    """Fill the `CORNER_TRACKING` record of each corner, by turn angle (rows) and ground speed (columns)."""
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
             corner = corners[i, j]
@@ -175,8 +176,8 @@ def _fly_corner(
 ) -> tuple[float, float]:
     """Simulate one corner; return the excursion and the settling distance, m.
 
-    The excursion is the maximum distance from the nearer leg.  The settling distance is the distance along the second
-    leg beyond which the aircraft stays close to it.  The first leg leads north to the origin.
+    The excursion is the maximum distance from the nearer leg. The settling distance is measured along the second leg;
+    beyond it the aircraft stays close to the leg. The first leg leads north to the origin.
 
     turn: rad, to the right.
     speed: ground speed, m/s.
@@ -191,7 +192,12 @@ def _fly_corner(
     estimated.north = -acceptance_radius_at(speed, parameters) - _RUN_IN_M
     lag = ROLL_LAG_RATIO * parameters.roll_time_constant
     decay = math.exp(-_TIME_STEP_S / lag)
-    course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    course = 0.0
+    lateral_acceleration = 0.0
+    time = 0.0
+    excursion = 0.0
+    settled_distance = 0.0
+    distance_along = -1.0
     while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, memory, _TIME_STEP_S)

@@ -26,17 +26,17 @@ class Px4Sitl(ProgramAutopilot, Px4):
 
     @classmethod
     def accepts_program(cls, program: Path) -> bool:
-        """Return True if the program's name begins with "px4", or if PX4's start-up files are next to it."""
+        """Return True if a program's name begins with "px4", or if PX4's start-up files are next to it."""
         return program.name.lower().startswith("px4") or startup_files(program) is not None
 
     @classmethod
     def with_model(cls, model: Px4, binary: Path) -> Self:
-        """Return PX4's program as an autopilot, with the parameters of the simulated PX4."""
+        """Return the autopilot that runs the PX4 program, with the parameters of the simulated PX4."""
         return cls(model.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list: the only file that PX4 requires, the servo map, is reported for ArduPlane's program."""
+        """Return an empty list: the only required file, the servo map, is reported by the ArduPlane program."""
         return []
 
     @property
@@ -45,11 +45,11 @@ class Px4Sitl(ProgramAutopilot, Px4):
         return Px4(self.parameters)
 
     def describe_settings_ignored_by_program(self, mission: MissionParts) -> list[str]:
-        """Describe the settings that have no effect on a flight of PX4's program in planfly's physics."""
+        """Describe the settings that do not affect a flight of the PX4 program in planfly's physics."""
         return self.describe_unsimulated_settings(mission, by_program=True)
 
     def store(self) -> StoredAutopilot:
-        """Return the settings of the simulated PX4, and the program."""
+        """Return the settings of the simulated PX4, and the program, for a log."""
         return super().store()._replace(program=self.program)
 
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:

@@ -87,12 +87,15 @@ class Px4Flight(SitlFlight):
 
     @property
     def _is_ending(self) -> bool:
-        """True once PX4 has reached a last waypoint at which it circles; otherwise as in the base class."""
+        """True if the mission is about to end.
+
+        This is the case once PX4 has reached a last waypoint at which it loiters; otherwise as in the base class.
+        """
         ends_in_circle = self._workspace.path["waypoint"]["is_mission_end"][self.setup.route.legs]
         return self._link.reported.reached >= self.last_item if ends_in_circle else super()._is_ending
 
     def keep_log(self, target: Path) -> bool:
-        """Make PX4 close its log (.ulg), end it, and move the log to a file; return True if there was a log."""
+        """Make PX4 close its log (.ulg), end the program, and move the log; return True if there was a log."""
         self._preflight.disarm()
         for _ in range(round(_LOG_CLOSING_TIME_S * FRAME_HZ)):
             if not self._answer_frame():
@@ -117,7 +120,7 @@ def _has_started(process: AutopilotProcess) -> bool:
 
 
 def _reported_program(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:
-    """Return the description of the program that flew, from the messages that it sent."""
+    """Return the description of the program that flew, from its messages."""
     reported = link.reported
     unknown = parameters.changed.keys() - reported.parameters.keys()
     return AutopilotProgram(

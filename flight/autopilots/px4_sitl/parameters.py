@@ -80,10 +80,10 @@ class Px4FlightParameters:
 def collect_px4_parameters(
     setup: FlightSetup, aircraft: Aircraft, law_parameters: Px4Parameters
 ) -> Px4FlightParameters:
-    """Collect the parameters of a flight of PX4's program from the simulation, the aircraft and the user's file.
+    """Collect the parameters for a flight of the PX4 program.
 
-    FW_AIRSPD_TRIM is the mission's airspeed, unless the user states a value.  Raises ParameterError if a file is
-    invalid.
+    They come from the simulation, the aircraft and the user's file. FW_AIRSPD_TRIM is the mission's airspeed, unless
+    the user states a value. Raises ParameterError if a file is invalid.
     """
     file = setup.scenario.flight.params
     user_values = {} if file is None else {name: entry.value for name, entry in read_parameter_file(Path(file)).items()}

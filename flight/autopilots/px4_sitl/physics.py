@@ -56,7 +56,7 @@ _PRESSURE_NOISE_HPA = 5e-3
 
 
 def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
-    """Return the Earth's magnetic field north, east and down, gauss, from pymavlink's tables.
+    """Return the Earth's magnetic field (north, east, down), gauss, from pymavlink's tables.
 
     >>> north, east, down = earth_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
@@ -93,7 +93,7 @@ class Sensors:
         self._random = random.Random(1)
 
     def sensor_message(self, motion: BodyMotion) -> Any:
-        """Return HIL_SENSOR with the readings of inertial sensors, magnetometer, barometer and Pitot tube."""
+        """Return HIL_SENSOR: readings of the inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
         field = to_body_axes((motion.roll, motion.pitch, motion.yaw), self._field)
         pressure, temperature, density = atmosphere(self._home[2] - motion.down)
@@ -117,7 +117,7 @@ class Sensors:
         )
 
     def gnss_message(self, motion: BodyMotion) -> Any:
-        """Return HIL_GPS with position and velocity."""
+        """Return HIL_GPS: position and velocity."""
         lat, lon = position_on_sphere(motion.north, motion.east, self._home[0], self._home[1])
         north, east, down = motion.velocity_north, motion.velocity_east, motion.velocity_down
         return mavlink.MAVLink_hil_gps_message(
@@ -201,7 +201,7 @@ class SimulatorPort:
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def pack(self, *messages: Any) -> bytes:
-        """Return the bytes of messages, for `send`."""
+        """Return the bytes of some messages, for `send`."""
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
@@ -215,7 +215,9 @@ class SimulatorPort:
             return
 
     def receive_answer(self, timeout: float) -> tuple[float, ...] | None:
-        """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if it does not arrive within ``timeout`` s by the clock.
+        """Return the 16 controls of HIL_ACTUATOR_CONTROLS, or None after a timeout.
+
+        timeout: s, in real time.
 
         Raises FlightError if the program ends.
         """
@@ -229,7 +231,7 @@ class SimulatorPort:
         return self._answers.pop(0)
 
     def require_answer(self) -> tuple[float, ...]:
-        """Return PX4's answer to the last step, once its outputs run.
+        """Return PX4's answer to the last step; PX4 must already run its outputs.
 
         Raises FlightError if no answer arrives within `SILENCE_TIMEOUT_S`.
         """
@@ -239,7 +241,10 @@ class SimulatorPort:
         return answer
 
     def _receive_data(self, timeout: float) -> bool:
-        """Read data for up to ``timeout`` s, but at most `_CHECK_INTERVAL_S`, and return True if any arrived."""
+        """Read data for up to ``timeout`` s; return True if any data arrived.
+
+        A single call waits at most `_CHECK_INTERVAL_S`.
+        """
         if self._stream is None:
             raise ValueError("PX4 has not connected")
         wait = min(timeout, _CHECK_INTERVAL_S)
@@ -329,12 +334,14 @@ class HilLockstep(Lockstep):
         return self._last_answer
 
     def _send(self, data: bytes) -> None:
-        """Send packed sensor messages, which trigger a step of PX4."""
+        """Send packed sensor messages, which make PX4 run a step."""
         self._port.send(data)
         self._awaits_answer = True
 
     def boot(self, rail: RailEnd, has_started: Callable[[], bool], stall_time: float, startup_timeout: float) -> None:
-        """Wait for PX4's start-up script, and trigger a step only when PX4 waits for one.
+        """Wait until PX4's start-up script has ended.
+
+        Meanwhile PX4 gets a step only when it waits for one.
 
         has_started: function that returns True once the script has ended.
         stall_time: time without an answer after which PX4 waits for a step, s by the clock.

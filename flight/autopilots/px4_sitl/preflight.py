@@ -34,7 +34,7 @@ class Px4Preflight(Conversation):
     """Conversation with one running PX4."""
 
     def identify(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read the named parameters that it has.
+        """Identify the autopilot, and read those of the named parameters that it has.
 
         Raises FlightError if the autopilot is not PX4.
         """
@@ -47,8 +47,8 @@ class Px4Preflight(Conversation):
     def prepare(self, mission: UploadedMission) -> Talk:
         """Wait until PX4 has a position, upload the mission, and arm PX4 in MANUAL.
 
-        In any other mode PX4's TECS would integrate errors on the rail.  Raises FlightError if PX4 has no position
-        estimate, or refuses the mission, home, or arming.
+        PX4 must be in MANUAL because its TECS would otherwise integrate errors on the rail. Raises FlightError if PX4
+        has no position estimate, or refuses the mission, home, or arming.
         """
         estimator = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
         yield from self._wait_for_position(estimator, _MESSAGE_INTERVALS_US[estimator])
@@ -70,7 +70,10 @@ class Px4Preflight(Conversation):
         yield from self._wait_until(lambda: self._reported.mode == MISSION_MODE and self._reported.armed, mission_mode)
 
     def send_periodic_messages(self) -> None:
-        """Send a heartbeat, and neutral joystick inputs with closed throttle, as PX4 expects from a ground station."""
+        """Send the messages that PX4 expects from a ground station.
+
+        They are a heartbeat, and joystick inputs in neutral position with closed throttle.
+        """
         self._send_heartbeat()
         self._link.send(mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 0, 0, 0))
 
@@ -83,9 +86,9 @@ class Px4Preflight(Conversation):
 
 
 def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:
-    """Return a mission's items numbered from 0, as in PX4, which stores home separately.
+    """Return a mission's items numbered from 0, as PX4 numbers them.
 
-    ArduPlane numbers items from 1.
+    PX4 stores home separately. ArduPlane numbers items from 1, because item 0 is home.
 
     >>> jump = MissionItem(3, Command.DO_JUMP, 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     >>> counted_from_0([jump])[0].seq, counted_from_0([jump])[0].params[:2]

@@ -32,7 +32,7 @@ def startup_files(program: Path) -> Path | None:
 def px4_launch(
     binary: Path, parameters: Mapping[str, float], simulator_port: int, own_port: int, link_port: int
 ) -> Callable[[Path], Launch]:
-    """Return a function that prepares a folder for PX4's program and returns its command line.
+    """Return a function that prepares a folder for the PX4 program and returns its command line.
 
     parameters: values by name.
     simulator_port: port on this machine of the physics (TCP).

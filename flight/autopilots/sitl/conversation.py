@@ -54,7 +54,10 @@ class _Stopwatch:
         self._start_times = now(), clock()
 
     def has_passed(self, seconds: float) -> bool:
-        """Return True if more than ``seconds`` of the autopilot's time and the minimum real time have passed."""
+        """Return True if more than a time has passed, both by the autopilot's clock and in real time.
+
+        seconds: time by the autopilot's clock, s. The minimum real time is a constant.
+        """
         start, clock_start = self._start_times
         return self._now() - start > seconds and self._clock() - clock_start > min(seconds, _MIN_REAL_TIME_S)
 
@@ -91,7 +94,7 @@ class Conversation:
 
         kind: name of the expected autopilot.
         message_intervals: interval of each requested message by its number, microseconds.
-        parameters: names of the parameters to read; parameters that the autopilot lacks are skipped.
+        parameters: names of the parameters to read; parameters that the autopilot does not have are skipped.
 
         Raises FlightError if no heartbeat arrives, or if its vehicle is not a fixed wing.
         """
@@ -129,7 +132,10 @@ class Conversation:
     def _wait_until(
         self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
     ) -> Talk:
-        """Wait until a condition is true, and repeat a request each second.  Raises FlightError after a timeout."""
+        """Wait until a condition is true, and repeat a request every second.
+
+        Raises FlightError after a timeout.
+        """
         stopwatch, last_request = self._start_stopwatch(), None
         while not is_done():
             if stopwatch.has_passed(awaited.timeout):
@@ -179,10 +185,12 @@ class Conversation:
         )
 
     def _send_until_accepted(self, command: int, request: Callable[[], None], name: str) -> Talk:
-        """Call ``request`` each second until the autopilot accepts the command.  Raises FlightError after a timeout.
+        """Send a command every second until the autopilot accepts it.
 
         request: function that sends the command.
         name: name of the command's effect, for messages.
+
+        Raises FlightError after a timeout.
         """
         acknowledged = self._reported.acknowledged
         acknowledged.pop(int(command), None)
@@ -193,7 +201,10 @@ class Conversation:
         )
 
     def _read_parameters(self, names: list[str]) -> Talk:
-        """Request parameters, and wait up to a second: the autopilot does not answer for parameters it lacks."""
+        """Request parameters, and wait up to a second for the values.
+
+        The wait is limited because the autopilot does not answer for a parameter that it lacks.
+        """
         for name in names:
             self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
         stopwatch, parameters = self._start_stopwatch(), self._reported.parameters
@@ -226,7 +237,7 @@ class Conversation:
             yield from self._wait(RETRY_INTERVAL_S)
 
     def _send_items(self, items: list[MissionItem], kind: MissionType) -> Talk:
-        """Send the number of items and each requested item, until an acknowledgment or a timeout."""
+        """Send the number of items and each item that is requested, until an acknowledgment or a timeout."""
         reported, link = self._reported, self._link
         reported.requested = reported.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
@@ -241,7 +252,7 @@ class Conversation:
             yield
 
     def _wait(self, seconds: float) -> Talk:
-        """Wait for a number of seconds of the autopilot's time."""
+        """Wait for a number of seconds by the autopilot's clock."""
         start = self._now()
         while self._now() - start < seconds:
             yield

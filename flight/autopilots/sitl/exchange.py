@@ -55,7 +55,7 @@ class BodyMotion(NamedTuple):
 
 
 def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """Return the north and east offset (m) of a position from another position, on ArduPilot's spherical Earth.
+    """Return the north and east distances (m) between two positions on ArduPilot's spherical Earth.
 
     lat, lon: the position, rad.
     from_lat, from_lon: the position from which the offset is measured, rad.
@@ -70,11 +70,12 @@ def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -
 
 
 def position_on_sphere(north: float, east: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """Return the latitude and longitude (rad) at an offset from a position; inverse of `offset_on_sphere`.
+    """Return the latitude and longitude (rad) at a distance north and east of a position.
 
-    north, east: offset, m.
+    This inverts `offset_on_sphere`.
+
+    north, east: distances, m.
     from_lat, from_lon: the position from which the offset is measured, rad.
-
 
     >>> position = position_on_sphere(*offset_on_sphere(0.63, -1.49, 0.62, -1.5), 0.62, -1.5)
     >>> [round(angle, 12) for angle in position]
@@ -132,9 +133,9 @@ class RailEnd:
 
 
 def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
-    """Return the level rail that ends in trimmed flight at a state.
+    """Return the level rail that ends where the aircraft is in trimmed flight.
 
-    state: a record of `flight.dynamics.state.STATE`.
+    state: state of the trimmed flight, a record of `flight.dynamics.state.STATE`.
     wind: mean wind north, east and down, m/s.
     """
     return RailEnd(
@@ -152,10 +153,10 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
 
 
 def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tuple[float, float, float]) -> BodyMotion:
-    """Return the motion on the rail ``push_duration`` s after the start of the push.
+    """Return the motion on the rail ``push_duration`` s after the push began.
 
-    The aircraft is at rest at the start of the rail if ``push_duration`` is 0 or less, and remains at the end of the
-    rail after the push.
+    With ``push_duration`` 0 or less the aircraft is at rest at the start of the rail. After the push it stays at the
+    end of the rail.
 
     time: time since the start of the exchange, s.
     origin: latitude and longitude (rad) and altitude (m) from which positions are measured.
@@ -199,7 +200,7 @@ def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tupl
 def to_body_axes(
     attitude: tuple[float, float, float], vector: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return the body-axis components of a vector given by its north, east and down components.
+    """Convert a vector from north, east and down to the body axes of an aircraft.
 
     attitude: roll, pitch and yaw, rad.
 
@@ -271,14 +272,14 @@ class Lockstep(ABC):
         """
 
     def _battery(self) -> tuple[float, float] | None:
-        """Return volts and amperes of the battery; the voltage is constant."""
+        """Return the voltage (V) and the current (A) of the battery; the voltage is constant."""
         if not self._volts:
             return None
         current, factor = self._current
         return self._volts, current() * factor
 
     def hold(self, rail: RailEnd, push_duration: float = 0.0) -> None:
-        """Run one frame with the aircraft on the rail, ``push_duration`` s after the start of the push."""
+        """Run one frame with the aircraft on the rail, ``push_duration`` s after the push began."""
         self._workspace.commands[:] = self._receive_commands()
         motion = motion_on_rail(rail, self._next_time(), push_duration, self._home)
         north, east, up, velocity_north, velocity_east, velocity_up = self.error
@@ -295,7 +296,7 @@ class Lockstep(ABC):
         )
 
     def step(self) -> None:
-        """Run one frame of flight with the present controls: step JSBSim, and send the motion to the autopilot."""
+        """Run one frame of flight: step JSBSim with the present controls, and send the motion to the autopilot."""
         self._access.run()
         lat, lon, amsl, velocity_north, velocity_east, velocity_down, roll, pitch, yaw, p, q, r, airspeed = [
             get() * factor for get, factor in self._motion
@@ -329,7 +330,10 @@ class Lockstep(ABC):
         steps: number of frames in a tick.
         gusts, ground: True to set the tick's gusts and ground in JSBSim.
         """
-        workspace, fdm, receive_commands, step = self._workspace, self._fdm, self._receive_commands, self.step
+        workspace = self._workspace
+        fdm = self._fdm
+        receive_commands = self._receive_commands
+        step = self.step
         getters = [self._access.getters[field] for field in READ_FIELDS]
         pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
         pack_commands: Callable[..., None] = struct.Struct("4d").pack_into
@@ -361,7 +365,7 @@ class Lockstep(ABC):
         return fly
 
     def serve(self) -> None:
-        """Run one more frame: apply the autopilot's commands, and send the motion to the autopilot."""
+        """Run one more frame: apply the autopilot's commands, and send it the motion."""
         self._fdm.write(self._receive_commands())
         self.step()
 

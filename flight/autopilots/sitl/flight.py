@@ -62,11 +62,14 @@ _SEARCHED_PIECES = 4
 
 @compiled
 def autopilot_tick(block: Floats, heights: Heights) -> int:
-    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick; return an end code or 0.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick.
 
-    The program has set the commands in the block.  Once the program reports that it flies to its last item, the flight
-    completes where the aircraft passes the end of the path; an RTL completes in its loiter, a loiter without end after
-    `ENDLESS_LOITER_TIME_S` and one lap, and a mission whose last waypoint is circled completes after one lap.
+    Return the code of the flight's end, or 0 if the flight continues. The program has already set the commands in the
+    block.
+
+    The flight may be complete once the program reports that it flies to its last item. Usually it completes where the
+    aircraft passes the end of the path. An RTL completes in its loiter. A loiter without end completes after
+    `ENDLESS_LOITER_TIME_S` and one lap, and a loiter about the last waypoint after one lap.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -95,14 +98,17 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
-    """Set leg, distance, cross-track error and altitude error in ``memory`` from the nearest piece of the path.
+    """Set leg, distance, cross-track error and altitude error from the nearest piece of the path.
 
-    The search starts at the piece of the previous tick.  It skips later pieces that the aircraft flies against, because
-    both directions of an out-and-back leg lie on one line.
+    The values are set in ``memory``. The search starts at the piece of the previous tick. Later pieces that lead
+    against the aircraft's motion are skipped, because the two legs of an out-and-back route lie on one line.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
-    nearest_piece, min_distance, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
+    nearest_piece = memory.piece
+    min_distance = math.inf
+    distance = 0.0
+    cross_track = 0.0
     for candidate in range(memory.piece, min(memory.piece + _SEARCHED_PIECES, pieces.shape[0])):
         piece = pieces[candidate]
         piece_distance, piece_cross_track, course = project(piece, true.east, true.north)
@@ -124,10 +130,11 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
 @inner
 def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: float) -> None:
-    """Update time and angle on a loiter without end; finish the flight after `ENDLESS_LOITER_TIME_S` and one lap.
+    """Update the time and angle flown on a loiter without end, and finish the flight when it is complete.
 
-    The time starts when the aircraft is near the circle, and its speed around the center, in the loiter's direction, is
-    higher than its speed towards or away from the center.  Once started, it does not depend on the radius flown.
+    The loiter is complete after `ENDLESS_LOITER_TIME_S` and one lap. Time and angle are counted from the moment when
+    the aircraft is near the circle and moves mainly around the center, in the loiter's direction. From then on they are
+    counted at any distance from the center.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -152,7 +159,10 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
 
 @inner
 def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, float]:
-    """Return the cross-track distance from the last leg (right positive) and the distance past its end, m."""
+    """Return the distance to the right of the last leg, and the distance past its end, m.
+
+    Both are negative on the other side.
+    """
     start, end = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(end.east - start.east, end.north - start.north)
     east, north = (end.east - start.east) / length, (end.north - start.north) / length
@@ -172,7 +182,7 @@ _RUN_IN_TIMEOUT_S = 40.0
 
 
 def launch_rail(release_state: Release, take_off: TakeOff) -> RailEnd:
-    """Return the rail of a launch; on a runway, where the release has no speed, the rail has no length."""
+    """Return the rail of a launch; for a runway, a rail without length, because the aircraft starts at rest."""
     north, east, _ = release_state.velocity
     roll, pitch, yaw = release_state.attitude
     lat, lon = (math.radians(value) for value in release_state.position[:2])
@@ -234,7 +244,7 @@ class SitlFlight(ProgramFlight):
 
     @property
     def _ground_tick(self) -> Tick:
-        """Compiled function for one tick of a flight from the ground.
+        """Compiled function for one tick of a flight that starts on the ground.
 
         Raises ValueError if the program flies no take-off.
         """
@@ -281,19 +291,19 @@ class SitlFlight(ProgramFlight):
                 self._start_free_flight(self._release)
 
     def _push(self, start_fraction: float = 0.0, end_fraction: float = 1.0) -> None:
-        """Accelerate the aircraft along the rail, from one fraction of the push time to another."""
+        """Accelerate the aircraft along the rail from one fraction of the push time to another."""
         frames = math.ceil(self._rail.push_time * FRAME_HZ)
         for k in range(math.ceil(start_fraction * frames) + 1, math.ceil(end_fraction * frames) + 1):
             self._lockstep.hold(self._rail, k / FRAME_HZ)
 
     def keep_log(self, target: Path) -> bool:
-        """End the program cleanly, and move its own log to a file; return True if there was a log."""
+        """End the program cleanly and move its log to a file; return True if there was a log."""
         self._process.end(self._answer_frame)
         return self._process.keep_log(target)
 
     @contextlib.contextmanager
     def _errors_name_program(self, error_class: type[FlightError] = FlightError) -> Iterator[None]:
-        """Raise any FlightError of this context as an ``error_class`` whose message names the program's file."""
+        """Convert each FlightError in this context to an ``error_class`` that names the program's file."""
         try:
             yield
         except FlightError as error:
@@ -301,9 +311,9 @@ class SitlFlight(ProgramFlight):
             raise error_class.from_error(error, "" if is_named else self._binary) from error
 
     def _trim_on_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft at its release, straight and level before the first waypoint, and return its rail.
+        """Trim the aircraft before the first waypoint, and return the rail that ends there.
 
-        For a take-off, return the rail of the launch.
+        The aircraft is released straight and level. For a take-off, return the rail of the launch.
         """
         start, points = self._find_start(setup), setup.route.positions
         if self._ground_phases.take_off is not None:
@@ -321,7 +331,7 @@ class SitlFlight(ProgramFlight):
         return rail_end(self.fdm.read(), start.wind)
 
     def _hold_during(self, talk: Talk) -> None:
-        """Hold the aircraft at rest on the rail until a conversation has ended."""
+        """Hold the aircraft at rest on the rail while ``talk`` exchanges messages with the program."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
                 self._lockstep.hold(self._rail)
@@ -331,7 +341,7 @@ class SitlFlight(ProgramFlight):
                 return
 
     def _poll_link(self) -> None:
-        """Read the autopilot's messages, and store for the tick whether the program flies its last leg."""
+        """Read the autopilot's messages, and store for the next tick whether the program flies its last leg."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 
@@ -343,7 +353,7 @@ class SitlFlight(ProgramFlight):
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
     def _start_free_flight(self, release_state: Release) -> None:
-        """Start the simulated motion with SITL's controls, at the end of the launch or stationary on the runway."""
+        """Start the simulated motion at the end of the launch, or at rest on the runway."""
         self._set_unit_factors()
         commands = tuple(float(command) for command in self._workspace.commands)
         self._work.commands = release(self.fdm, release_state, (commands[0], commands[1], commands[2], commands[3]))
@@ -362,7 +372,7 @@ class SitlFlight(ProgramFlight):
         )
 
     def _make_loop(self, tick: Tick) -> None:
-        """Replace the loop by one that flies over the terrain and records the track with a compiled tick."""
+        """Replace the loop by a loop that uses a compiled tick, flies over the terrain, and records the track."""
         bound_tick = partial(tick, self._workspace.block, self._ground.heights)
         tick_with_gnss_error = partial(self._tick, bound_tick, bool(self._work.settings.navigation_sigma))
         self._loop = self._lockstep.make_loop(
@@ -372,7 +382,7 @@ class SitlFlight(ProgramFlight):
     def _fly_to_first_waypoint(self) -> None:
         """Fly to the first waypoint in the mean wind, without turbulence and without ground.
 
-        A tick that ends the flight, or the timeout, ends the run-in before the waypoint.
+        The run-in ends before the waypoint if a tick ends the flight, or at a timeout.
         """
         work, timing, steps = self._work, self._work.timing, self._steps
         self._set_unit_factors()
@@ -391,7 +401,7 @@ class SitlFlight(ProgramFlight):
         self._make_loop(autopilot_tick)
 
     def _tick(self, tick: "partial[int]", has_gnss_error: bool) -> int:
-        """Run a tick, and set the GNSS error after it."""
+        """Run one tick, and set the GNSS error after it."""
         status = tick()
         if has_gnss_error:
             east, north, up, velocity_east, velocity_north, velocity_up = self._workspace.navigation_error()
@@ -403,7 +413,7 @@ class SitlFlight(ProgramFlight):
             return self._loop(count)
 
     def _answer_frame(self) -> bool:
-        """Answer one more frame of a program that is about to end; return False if it has ended."""
+        """Answer one more frame of a program that is about to end; return False if the program has ended."""
         try:
             self._lockstep.serve()
         except FlightError:

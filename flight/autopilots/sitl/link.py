@@ -99,7 +99,7 @@ class AutopilotLink(ABC):
 
     @abstractmethod
     def _transmit(self, data: bytes) -> None:
-        """Send bytes; bytes that the program no longer accepts are lost."""
+        """Send bytes; if the program no longer accepts them, they are lost."""
 
     def poll(self) -> None:
         """Process the received messages, without waiting."""
@@ -114,7 +114,7 @@ class AutopilotLink(ABC):
                     handler(message)
 
     def send(self, message: Any) -> None:
-        """Send a message; it is lost if the program no longer accepts it."""
+        """Send a message; if the program no longer accepts it, it is lost."""
         data = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         self._transmit(data)
@@ -233,7 +233,7 @@ class UdpLink(AutopilotLink):
 
 
 def free_ports(count: int) -> list[int]:
-    """Return UDP port numbers that are not in use at the moment, for a program that is to listen on them."""
+    """Return UDP port numbers that are not in use at the moment, on which a program can listen."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for udp_socket in sockets:

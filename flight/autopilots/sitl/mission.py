@@ -49,9 +49,9 @@ class UploadedMission:
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """Return the mission to upload for a setup; its altitudes are AMSL, except for rally points.
+    """Return the mission to upload for a setup; altitudes are AMSL, except those of rally points.
 
-    For a flight from the ground to the ground the mission is uploaded unchanged.
+    A mission that begins and ends on the ground is uploaded unchanged.
     """
     if setup.ground_phases:
         return _unchanged_mission(setup, setup.ground_phases)
@@ -79,7 +79,7 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
 
 
 def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> UploadedMission:
-    """Return the mission as in its file, with its home; a home without an altitude gets the ground's altitude.
+    """Return the mission as in its file; a home without an altitude gets the altitude of the ground.
 
     Raises ValueError without a home, a take-off or a landing.
     """
@@ -99,10 +99,11 @@ def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> Uploa
 def _item_with_position(
     item: MissionItem, route: Route, waypoint_indices: NDArray[np.intp], origin: GeoOrigin, earlier: list[MissionItem]
 ) -> MissionItem:
-    """Return a navigation item for the upload: a loiter keeps its parameters, anything else becomes a waypoint.
+    """Return a navigation item for the upload; a loiter keeps its parameters, other items become waypoints.
 
     waypoint_indices: waypoints of the route that belong to the item.
-    earlier: items that are uploaded before this one; a loiter without a position is about the last of their positions.
+    earlier: items that are uploaded before this item; a loiter without a position is placed at the last of their
+        positions.
     """
     position = route.positions[waypoint_indices[-1]]
     loiter = stated_loiter(item)
@@ -123,7 +124,7 @@ def _item_with_position(
 
 
 def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
-    """Return waypoints and changes of speed for a route whose mission has no items with positions."""
+    """Return waypoints and speed changes for a route whose mission has no items with positions."""
     items: list[MissionItem] = []
     speed = math.nan
     for index, point in enumerate(route.positions):
@@ -144,14 +145,20 @@ def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin
 
 
 def _extra_point(route: Route) -> Floats:
-    """Return the position (3,) of the extra waypoint, m: straight on after the last leg, at its final altitude."""
+    """Return the position of the extra waypoint, (3,) m.
+
+    It lies straight on after the last leg, at that leg's final altitude.
+    """
     east, north, _ = route.positions[-1] - route.positions[-2]
     scale = EXTRA_WAYPOINT_DISTANCE_M / math.hypot(east, north)
     return route.positions[-1] + np.array([scale * east, scale * north, 0.0])
 
 
 def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return copies of the items numbered from 1; a jump leads to the first remaining item at or after its target."""
+    """Return copies of the items, numbered from 1.
+
+    A jump leads to its target, or to the next remaining item if the target is not among the items.
+    """
     items = []
     for number, item in enumerate(items_in_order, 1):
         params = item.params
@@ -166,10 +173,10 @@ def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def _home_for_upload(setup: FlightSetup) -> Home:
-    """Return the mission's home, or the start's position, at an altitude that lets the motor run.
+    """Return the mission's home, or the start's position, at an altitude that allows full throttle.
 
-    Near home's altitude ArduPlane would limit the throttle as before a take-off.  A mission with an RTL, which measures
-    its altitudes from home, keeps its own home.
+    Near the altitude of home ArduPlane would limit the throttle as before a take-off. A mission with an RTL keeps its
+    own home, because the RTL measures altitudes from home.
     """
     start = setup.route.positions[0]
     home = setup.mission.home

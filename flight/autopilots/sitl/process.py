@@ -95,7 +95,7 @@ class AutopilotProcess:
             raise
 
     def _spawn(self, guard: Guard) -> "subprocess.Popen[bytes]":
-        """Start the program in a process group of its own, which the guard kills if planfly is killed."""
+        """Start the program in its own process group, which the guard kills if planfly is killed."""
 
         def register_before_start() -> None:
             """Register the process group with the guard before the program runs.
@@ -151,7 +151,7 @@ class AutopilotProcess:
         )
 
     def end(self, answer_request: Callable[[], bool]) -> None:
-        """Ask the program to end, so that it closes its log; kill it if it does not end within `_GRACE_S`.
+        """Ask the program to end, so that it closes its log; kill it if it has not ended after `_GRACE_S`.
 
         answer_request: function that answers one physics request of the program; returns False if there is none.
         """
@@ -163,7 +163,7 @@ class AutopilotProcess:
         self._kill()
 
     def keep_log(self, target: Path) -> bool:
-        """Move the program's own log to a file; return True if there was a log."""
+        """Move the program's log to a file; return True if there was a log."""
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:
             return False
@@ -172,9 +172,10 @@ class AutopilotProcess:
         return True
 
     def _signal(self, number: int) -> bool:
-        """Send a signal to the program and its children (0: only check); return True if any of these processes exists.
+        """Send a signal to the program and its children; return True if any of these processes exists.
 
-        After the process group has ended, no signal is sent: its number may belong to another group by then.
+        number: number of the signal; 0 only checks for processes. No signal is sent after the process group has ended,
+            because its number may then belong to another group.
         """
         if not self._ended:
             try:
@@ -194,7 +195,7 @@ class AutopilotProcess:
         self._process.wait()
 
     def lines(self) -> list[str]:
-        """Return the lines of the program's output, without blank lines."""
+        """Return the lines of the program's output; blank lines are left out."""
         try:
             text = (self._folder / _OUTPUT_FILE).read_text(encoding="utf-8", errors="replace")
         except OSError:
@@ -206,5 +207,5 @@ class AutopilotProcess:
 
 
 def _die_with_parent() -> None:
-    """Ask the kernel to kill the program if planfly is killed."""
+    """Ask the operating system to kill the program if planfly is killed."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -38,7 +38,7 @@ class ServoOutput:
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
-        """Return the control at a pulse, microseconds; the control at the center pulse if there is no pulse (0).
+        """Return the control at a pulse, microseconds; without a pulse (0), the control at the center pulse.
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value(1700)
         -0.25
@@ -55,9 +55,10 @@ class ServoOutput:
         return values[-1]
 
     def value_at_fraction(self, fraction: float) -> float:
-        """Return the control at a fraction of the servo's throw: -1 and 1 at the end pulses, 0 at the center pulse.
+        """Return the control at a fraction of the servo's throw, from -1 to 1.
 
-        The center of a servo with only two knots is halfway between its end pulses.
+        The fraction is -1 and 1 at the end pulses, and 0 at the center pulse. A servo with only two knots has its
+        center halfway between the end pulses.
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value_at_fraction(0.5)
         -0.25
@@ -78,7 +79,10 @@ class ServoMap:
 
     def commands(self, pulses: Sequence[int]) -> Commands:
         """Return the controls for the pulses of an autopilot's outputs, microseconds, (outputs,)."""
-        elevator, aileron, rudder, throttle = self.elevator, self.aileron, self.rudder, self.throttle
+        elevator = self.elevator
+        aileron = self.aileron
+        rudder = self.rudder
+        throttle = self.throttle
         return Commands(
             elevator.value(pulses[elevator.number - 1]),
             aileron.value(pulses[aileron.number - 1]),
@@ -87,7 +91,7 @@ class ServoMap:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return ArduPilot's parameters for these outputs."""
+        """Return ArduPilot's parameters that describe these servo outputs."""
         parameters: dict[str, float] = {}
         for name, function in FUNCTIONS.items():
             output: ServoOutput = getattr(self, name)
