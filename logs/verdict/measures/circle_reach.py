@@ -35,7 +35,7 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the hazards to a flight that may lead anywhere within a distance of a center.
+    """Describe the hazards within a distance of a center.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
@@ -71,7 +71,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _ground_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe ground within reach that is unknown, too close below the aircraft, or (with a height limit) too far."""
+    """Describe ground within reach that is unknown, too close below, or too far below for a height limit."""
     terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if terrain is None:
         return []

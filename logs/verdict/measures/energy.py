@@ -12,8 +12,8 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
     """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN if the power is not known.
 
-    Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.
-    Turns and gusts take a few per cent more.
+    Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.  The
+    prediction leaves out turns and gusts, which take a few per cent more.
     """
     volts = requirements.setup.envelope.volts
     energies, peak_power = leg_energies(requirements)

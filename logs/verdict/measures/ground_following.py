@@ -32,7 +32,7 @@ def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Floats) -> Floats:
-    """Return the altitude that a leg which follows the ground demands at positions, m AMSL, (n,).
+    """Return the altitudes demanded at positions on a leg that follows the ground, m AMSL, (n,).
 
     The height above ground changes linearly along the leg, as in `flight.guidance.path.fly_by_path`.  The altitude is
     NaN where the ground is unknown.
@@ -52,7 +52,7 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
 
 
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
-    """Return the part of a leg on whose demand an aircraft falls furthest below that climbs at most at a slope, rad.
+    """Find where an aircraft limited to a climb slope (rad) falls furthest below a ground-following leg.
 
     The ground is sampled at steps of `GROUND_STEP_M`, as ArduPlane's terrain data.  Return None if every part of the
     leg is within the limit.

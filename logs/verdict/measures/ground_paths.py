@@ -112,7 +112,7 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
 
 
 def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """Return the first waypoint of a mission item, and this item if it is a take-off, otherwise None."""
+    """Return the first waypoint with a mission item, and this item if it is a take-off, otherwise None."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]
@@ -120,7 +120,7 @@ def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | No
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """Return the waypoint and the item of a mission's last NAV_LAND landing, or None if there is none."""
+    """Return the waypoint and the item of the mission's last NAV_LAND, or None if it has none."""
     landings = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     landing_waypoints = [
         (k, landings[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in landings

@@ -57,7 +57,7 @@ def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
 def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
     """Return the moves of a route's fly-by path, flown at each leg's ground speed.
 
-    On a leg without a ground speed, the airspeed is used.
+    If a leg has no ground speed, its airspeed is used.
 
     first, last: first and last leg to return; by default all legs.
     """

@@ -70,7 +70,7 @@ class _Boxes(NamedTuple):
 
 
 def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Measure the visits of a path to m spheres; a radius of 0 means that there is no sphere.
+    """Measure the visits of a path to m spheres; a radius of 0 stands for no sphere.
 
     points, time: points of the path, m, (n, 3), and their times, s, (n,).
     centres: centers of the spheres, m, (m, 3).
@@ -240,7 +240,7 @@ def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floa
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
-    """Return the stays of a track inside a sphere, in order of time; a point on the surface is inside.
+    """Return the periods that a track spends inside a sphere or on its surface, in order of time.
 
     time, position: times, s, (t,), and positions, m, (t, 3), of the track.
     centre: center of the sphere, m, (3,).
@@ -280,7 +280,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return clearances as `_path_clearances` does, but NaN for segments with an implausible end."""
+    """Return each segment's clearance like `_path_clearances`, but NaN if an end is implausible."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)

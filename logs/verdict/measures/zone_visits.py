@@ -61,10 +61,10 @@ def distances_outside_zone(
 
 @inlined
 def violation_depth(exclusion: bool, outline_distance: float, band_distance: float) -> float:
-    """Return the depth of a violation at a position, m; negative if the position complies.
+    """Return how deep a position violates a zone, m; negative if it complies.
 
-    The depth is the shortest horizontal or vertical distance to the zone's limit, or NaN if it depends on unknown
-    ground.
+    The depth is the shortest distance to the zone's limit, horizontally or vertically.  It is NaN if it depends on
+    unknown ground.
     outline_distance, band_distance: from `distances_outside_zone`.
     """
     if band_distance != band_distance:
@@ -98,7 +98,7 @@ def copy_move_part(source: Record, target: Record) -> None:
 def depth_bounds(
     exclusion: bool, part: Record, length: float, height_change: float, max_distance: float
 ) -> tuple[float, float]:
-    """Return lower and upper bounds of the violation's depth along one part of a move, m.
+    """Return lower and upper bounds of the depth of a violation along one part of a move, m.
 
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
 
@@ -257,8 +257,8 @@ def _fill_visit(
 
     known_depth: depth below which the result need not be exact, m.
 
-    The work has three rounds: round 0 checks only the moves' ends; round 1 finds the deepest point, which is near the
-    deepest end; and, if the zone is violated, round 2 finds the times.
+    There are three rounds.  Round 0 checks only the ends of the moves.  Round 1 finds the deepest point, which is near
+    the deepest end.  If the zone is violated, round 2 finds the times.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -348,7 +348,7 @@ def _bisect_move(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Bisect a move until each part is certain, and update a visit with the parts.
+    """Bisect a move until each part can be decided, and update a visit with the parts.
 
     in_order: True to bisect until each part is on one side of the limit, and add the parts in order of time; False to
         bisect until no part can be deeper than the known depth.
@@ -400,7 +400,7 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the depths at both ends depend on unknown ground, so that the whole part is unknown."""
+    """Return True if the depth of a part is unknown because the ground is unknown at both of its ends."""
     start_depth, end_depth = (
         violation_depth(exclusion, part.outline_distance, part.band_distance),
         violation_depth(exclusion, part.end_outline_distance, part.end_band_distance),

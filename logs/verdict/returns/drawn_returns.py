@@ -87,13 +87,13 @@ class DrawnReturns:
 
     @property
     def worst_by_start(self) -> list[SimulatedReturn]:
-        """The worst return from each start, in order of time."""
+        """Worst return from each start, in order of time."""
         by_time = sorted(self.returns.each, key=lambda ret: ret.time)
         return [min(group, key=worst_first_key) for _, group in groupby(by_time, lambda ret: ret.time)]
 
     @property
     def segments_by_outcome(self) -> list[tuple[Kind, list[SimulatedReturn]]]:
-        """Segments of the path with the same outcome of their returns."""
+        """Segments of the path, each with one outcome of the returns that start on it."""
         return group_segments(self.worst_by_start, lambda ret: ret.kind)
 
 
@@ -116,7 +116,7 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
-    """Add all data for drawing to judged returns.
+    """Add the data for drawing to judged returns.
 
     starts: the starts of the judged returns.
     """
@@ -125,12 +125,15 @@ def drawn_returns(
 
 
 def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Add the data for drawing to judged returns, without glides and minimum altitudes, which take longest."""
+    """Add the data for drawing to judged returns, without the slow parts: glides and minimum altitudes."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Select the returns to draw: the worst of each kind of failure, then others; or the lowest if all are safe."""
+    """Select the returns to draw.
+
+    These are the worst of each kind of failure, then others; the lowest return if all are safe.
+    """
     unsafe_ranges = [return_range for return_range in returns.ranges if not return_range.worst.safe]
     worst_range_by_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe_ranges)}
     ranked_ranges = [
@@ -156,7 +159,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
 
 
 def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> Floats:
-    """Return the position at which a return fails or, if it is safe, is lowest, m, (3,)."""
+    """Return the position at which a return fails, m, (3,); if it is safe, its lowest position."""
     if ret.kind == "threat":
         distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
         return np.asarray(path[int(np.argmin(distances))])

@@ -45,15 +45,15 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return, for each of n starts, the altitude (m) left on arrival at the best destination, and its cell.
+    """Return the altitude left on arrival at each start's best destination, m, and its cell, (n,) each.
 
     starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
     airspeed: equivalent airspeed of the glide, m/s.
     bank: bank of the turn, rad; limited to the bank that the airspeed allows.
 
-    The altitude is negative if the destination is out of reach, and -inf if no path leads to one.  The cell is numbered
-    through all rows of the map, as in `logs.verdict.returns.glide_map.GlideAltitudes`; -1 without a path.
+    The altitude is negative if the destination is out of reach, and -inf if no path leads to one.  The cell is a flat
+    index into the map, row by row, as in `logs.verdict.returns.glide_map.GlideAltitudes`; -1 without a path.
     """
     altitude_left, reached_cells = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
     grid = glide_altitudes.grid
@@ -80,7 +80,7 @@ def remaining_glide_altitudes(
 
 
 def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
-    """Return the center of a cell, as east, north and ground altitude, m.  cell: number through all rows of the map."""
+    """Return the center of a cell, as east, north and ground altitude, m. cell: flat index into the map, row by row."""
     row, column = divmod(cell, grid.floor.shape[1])
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
@@ -194,9 +194,10 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
 
 @inner
 def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
-    """Return the altitude left, the row and the column of the best cell: the aircraft's cell or one of its neighbours.
+    """Return the altitude left in the best cell, and its row and column.
 
-    Neighbours are included because a cell's center may lie in a sphere even if the aircraft does not.
+    The best cell is the aircraft's cell or one of its neighbours.  Neighbours are included because a cell's center may
+    lie in a sphere even if the aircraft does not.
 
     slope: height lost per meter on the way to a cell's center.
     """
@@ -216,7 +217,7 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 def _remaining_turn(
     state: Record, i: int, j: int, turn_sign: float, next_step: Codes, step_records: Records, glider: Record
 ) -> float:
-    """Return the turn that remains to the course of the path at a cell, rad.
+    """Return the remaining turn to the course of the path at a cell, rad.
 
     It is negative if the course was overshot, and 0 at the end of the path.
 

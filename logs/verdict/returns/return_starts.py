@@ -116,7 +116,7 @@ def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_tim
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return two masks (n,): True for rows low in take-off or landing, and for rows too slow to fly."""
+    """Return two masks (n,): rows that are low in a take-off or landing, and rows too slow to fly."""
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
@@ -129,7 +129,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return the ground velocities at some rows, m/s, (n, 3); compute missing velocities from positions."""
+    """Return the ground velocities at some rows, m/s, (n, 3), with missing ones computed from positions."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -188,7 +188,7 @@ def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floa
 
 
 def _moves_before_return(setup: FlightSetup) -> Records:
-    """Return the moves of the planned path up to its own return to launch; none if it begins with one."""
+    """Return the moves of the planned path up to its return to launch; none if it begins with a return."""
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
@@ -196,8 +196,9 @@ def _moves_before_return(setup: FlightSetup) -> Records:
 
 
 def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[np.intp], Floats, Floats]:
-    """Return times, s, move numbers, flown fractions of these moves, all (t,), and positions, m, (t, 3).
+    """Sample moves at an interval of time.
 
+    Returns times, s, numbers of the moves, and the flown fraction of each move, all (t,), and positions, m, (t, 3).
     moves: at least one move of a planned path.
     interval: time between samples, s.
     """
@@ -244,7 +245,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 def _ground_speeds(setup: FlightSetup) -> Floats:
     """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
 
-    In a forecast, it is the wind at the leg's middle when the aircraft is there.
+    In a forecast, this is the wind at the middle of the leg at the time when the aircraft is there.
     """
     route, speeds = setup.route, []
     courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)

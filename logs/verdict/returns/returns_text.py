@@ -221,7 +221,7 @@ def point_of_no_return_text(returns: Returns) -> str:
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List the events that make the aircraft return, that make it land, and that do neither, in up to three lines.
+    """List, in up to three lines, the events that cause a return, those that cause a landing, and the others.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -233,7 +233,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     """
 
     def setting_text(cause: Cause) -> str:
-        """Return the parameter of an event and its value in brackets."""
+        """Return the parameter that decides on an event, and its value, in brackets."""
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
     returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.is_return]
@@ -251,7 +251,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 def describe_landing(returns: Returns) -> list[str]:
     """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
 
-    For an autopilot other than ArduPlane, return its sentence on the path of an RTL.
+    For any other autopilot than ArduPlane, the line is its text on the path of an RTL.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return keeps circling at its target']

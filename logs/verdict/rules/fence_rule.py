@@ -49,7 +49,7 @@ def fence_findings(
 ) -> list[Finding]:
     """Judge each zone that the planned path or the flight touches; return [] without zones.
 
-    If no zone is violated, the first finding says so.
+    If no zone is violated, the first finding states this.
     """
     airspace = requirements.airspace
     findings = []
@@ -98,7 +98,7 @@ def _compliance_finding(
 ) -> Finding:
     """Return the finding that no judged zone is violated, with the distance to the nearest zone.
 
-    planned_visits, flown_visits: one record for each zone, none of which is violated; see `zone_visits`.
+    planned_visits, flown_visits: one record for each zone; see `zone_visits`.
     """
     airspace, corridor = requirements.airspace, requirements.setup.corridor
     count, visits = len(airspace.zones), planned_visits if flown_visits is None else flown_visits
@@ -136,7 +136,7 @@ def _zone_finding(
 ) -> Finding:
     """Judge how deep the flight violates one zone, or the planned path if nothing was flown.
 
-    The finding is undecided if no violation is known and the terrain below the zone is unknown in places.
+    The finding is undecided if no violation is known but the terrain below the zone is partly unknown.
     """
     airspace = requirements.airspace
     zone = airspace.zones[zone_number]

@@ -46,8 +46,8 @@ def stall_findings(
 ) -> list[Finding]:
     """Judge the minimum margin of airspeed above the stall in a bank; return [] for a route without a turn.
 
-    A route whose speed is below the stall in a bank that it needs fails in flight too, whatever speed was flown: an
-    autopilot that did not accept the speed, or banked less, does not make the route flyable.
+    If a route's airspeed is below the stall speed in a bank that the route needs, the rule also fails after a flight.
+    It does not matter that the autopilot flew faster or banked less: this does not make the route flyable.
     """
     planned = _planned_findings(requirements)
     if geometric:
@@ -83,8 +83,8 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
     """Return the bank that a waypoint's turn needs at an airspeed (m/s), up to the bank limit, rad.
 
-    On an arc of radius R the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A turn that ends
-    before the aircraft has rolled in completely needs no more bank than the aircraft reaches by then.
+    On an arc of radius R, the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A short turn ends
+    before the aircraft has rolled in completely: it needs only the bank reached by then.
     """
     turn, radius, limit = abs(float(requirements.turns[i])), float(requirements.radius[i]), requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
@@ -135,7 +135,7 @@ def _window_means(values: NDArray[np.floating], width: int) -> Floats:
 
 
 def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *, geometric: bool) -> Finding:
-    """Return the finding on a margin above the stall.  tolerance: accepted deficit of airspeed, m/s."""
+    """Make the finding on a margin above the stall. tolerance: accepted deficit of airspeed, m/s."""
     stall_text = (
         f"{margin.speed:.1f} m/s {time_or_place_text}, stall {margin.stall_speed:.1f} m/s in"
         f" {math.degrees(margin.bank):.0f}° of bank"

@@ -141,9 +141,10 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the distance from waypoint `i` at which the track first crossed the line across the leg's end, m.
+    """Return the distance from waypoint `i` at which the track first crossed the end line of the leg, m.
 
-    Return inf if the track did not cross this line, or for the first waypoint.
+    The end line runs through the waypoint, across the leg.  Return inf if the track did not cross it, or for the first
+    waypoint.
     """
     if i == 0:
         return math.inf
@@ -193,7 +194,7 @@ def _closest_approach(
 def explain_by_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Add to the reason of each failed finding the circles that the autopilot flew there at a waypoint's altitude."""
+    """Extend the reason of each failed finding by the circles that the autopilot flew at its waypoints."""
     circles = [] if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)
