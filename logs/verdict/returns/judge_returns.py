@@ -364,13 +364,13 @@ class ReturnWorld:
 
     @property
     def ending(self) -> Ending:
-        """How an RTL ends: with a circle or a landing sequence."""
+        """Type of ending of an RTL: a circle or a landing sequence."""
         ending_by_join: dict[str, Ending] = {"circle": "on to land", "straight": "straight to land"}
         return ending_by_join.get(self.autopilot.returns.rules.landing_join, "circle") if self.landings else "circle"
 
     @property
     def endings(self) -> tuple[Ending, ...]:
-        """How returns from all possible causes end; the ending of an RTL comes first."""
+        """Endings of the returns from all possible causes, the ending of an RTL first."""
         has_landing = any(cause.action == "land" for cause in self.causes) and self.ending != "straight to land"
         return (self.ending, "straight to land") if has_landing else (self.ending,)
 

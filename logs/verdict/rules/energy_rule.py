@@ -50,8 +50,7 @@ def energy_findings(
     """Compare the energy used with the battery's energy without its reserve.
 
     If a battery failsafe aborts the mission earlier, the energy used up to then is the limit.  An endless jump fails.
-    The energy is not judged if the battery is guessed, or if the uncertainty of the model's power leaves it open
-    whether the limit is kept.
+    Nothing is judged if the battery is guessed, or if the model's power is too uncertain.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
