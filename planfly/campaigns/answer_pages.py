@@ -15,7 +15,7 @@ from world.wording import count_text
 
 
 def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPage:
-    """Return the page of a window: the chart, and a table of all departures.
+    """Return the page of a take-off window: the chart, and a table of all departures.
 
     figure: chart of the departures.
     command: command line that repeats the search; "" if there is none.

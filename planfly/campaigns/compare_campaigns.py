@@ -57,7 +57,7 @@ class CampaignComparison:
 
     @property
     def answer(self) -> Literal["more likely", "less likely", "no difference shown"]:
-        """Answer by the interval: flights of the second campaign are more or less likely to be flyable, or neither."""
+        """Answer by the interval: second campaign more likely flyable, less likely flyable, or neither."""
         if self.difference.interval.low > 0.0:
             return "more likely"
         return "less likely" if self.difference.interval.high < 0.0 else "no difference shown"
@@ -80,7 +80,7 @@ class CampaignComparison:
 
 
 def campaign_table(path: Path) -> Path | None:
-    """Return the file of a campaign's table for the campaign's folder or for the file itself; None for another path."""
+    """Return the table file of a campaign, given its folder or the file itself; None for any other path."""
     if path.is_dir():
         path /= CAMPAIGN_DATABASE
     return path if path.name == CAMPAIGN_DATABASE and path.is_file() else None
@@ -121,7 +121,7 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
 
 
 def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> ComparedCampaign:
-    """Return the counts of a campaign."""
+    """Count the outcomes of a campaign."""
     outcomes = table["outcome"].tolist()
     tally = Tally(*map(outcomes.count, OUTCOMES))
     goal = Goal(
@@ -138,9 +138,9 @@ def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[s
 
 
 def _paired_outcomes(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Return True for each flyable flight of the flights that both campaigns have, (n, 2).
+    """Return a mask of the flyable flights among those that both campaigns have, (n, 2).
 
-    n is 0 if the draws of any of these flights differ, because then the flights are no pairs.
+    n is 0 if the draws of any of these flights differ, because the flights are then not paired.
     """
     _, first_rows, second_rows = np.intersect1d(first["flight"], second["flight"], return_indices=True)
     for name in ("seed", *NAMES):
@@ -150,7 +150,7 @@ def _paired_outcomes(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDA
 
 
 def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]], pairs: int) -> list[str]:
-    """Return remarks on the flights that are compared, and on assumptions of the interval that do not hold."""
+    """Return remarks on the compared flights, and on assumptions of the interval that do not hold."""
     notes = []
     counts = [len(table["flight"]) for table in tables]
     if pairs and pairs < max(counts):
@@ -165,7 +165,7 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
 
 
 def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:
-    """Return a remark if the test and the interval, which decides the answer, disagree on a difference; otherwise [].
+    """Return a remark if the test contradicts the interval, which decides the answer; otherwise [].
 
     >>> _disagreement_notes(ProportionDifference(0.1, Interval(0.02, 0.3), 0.04), is_paired=True)
     []

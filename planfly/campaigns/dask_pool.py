@@ -85,7 +85,7 @@ class DaskPool:
         client.register_plugin(CampaignPlugin(self._name, copy))
 
     def close(self) -> None:
-        """Remove the campaign from the workers, ignoring the errors of workers that die in the meantime."""
+        """Remove the campaign from the workers; ignore errors of workers that die meanwhile."""
         with contextlib.suppress(OSError):
             self._client.unregister_worker_plugin(self._name)
 

@@ -377,8 +377,8 @@ class Draw:
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     r"""Draw the values of all quantities for one flight.
 
-    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``. No draw depends on another draw, so any
-    order, any number of workers and any part of a campaign give the same flights.
+    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``.  Each draw is independent of the others.
+    The flights are therefore the same in any order, with any number of workers, and in any part of a campaign.
 
     seed: seed of the campaign.
 

@@ -143,10 +143,10 @@ def fly_for_energy(
 
 
 def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: float) -> EnergyRow:
-    """Return the row with the return that needs the most energy; without a home, return the row unchanged.
+    """Add the return that needs the most energy to a row; without a home, return the row unchanged.
 
-    The energy of a return is that of the point mass, times the ratio of flown to predicted energy of this flight's
-    mission: the point mass does not know the drawn mass and drag, gusts and turns.
+    The point mass does not know the drawn mass and drag, gusts and turns.  Its energy of a return is therefore
+    multiplied by the ratio of flown to predicted energy in the mission of this flight.
     """
     if varied.setup.mission.home is None:
         return row
@@ -229,12 +229,12 @@ class BatteryResult:
 
     @property
     def completed(self) -> tuple[EnergyRow, ...]:
-        """Flights that completed the mission with a known energy."""
+        """Rows of the flights that completed the mission with a known energy."""
         return tuple(row for row in self.rows if row.mission_energy > 0.0)
 
     @property
     def own_probability(self) -> Interval:
-        """Bounds of the probability that the aircraft's own battery keeps the reserve, each with the confidence."""
+        """Bounds of the probability that the aircraft's battery keeps the reserve, at the goal's confidence."""
         from scipy import stats
 
         two_sided = 1.0 - 2.0 * (1.0 - self.goal.confidence)
@@ -243,7 +243,7 @@ class BatteryResult:
 
     @property
     def is_enough(self) -> bool | None:
-        """True if the aircraft's own battery keeps the reserve with the probability; None if it is not known."""
+        """True if the aircraft's battery keeps the reserve with the required probability; None if not known."""
         if self.is_guessed or math.isnan(self.capacity) or not self.has_returns:
             return None
         if self.own_probability.low >= self.goal.probability:
@@ -257,7 +257,7 @@ class BatteryResult:
 
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
-        """Parts that decide the battery, the most frequent first."""
+        """Parts of a flight that decide the battery, the most frequent first."""
         legs = Counter(row.return_leg if row.is_decided_by_return else -1 for row in self.completed)
         times = {
             leg: [row.return_time for row in self.completed if row.is_decided_by_return and row.return_leg == leg]
@@ -282,8 +282,8 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 
     Raises PlanflyError for an aircraft that burns fuel.
 
-    If the mass changes with the battery, campaigns of the same draws are flown with the mass of the battery that the
-    campaign before has found, until the battery no longer changes.
+    If the mass changes with the battery, the campaign is repeated with the same draws and the mass of the battery found
+    last, until the battery no longer changes.
     """
     aircraft = base.airframe.aircraft
     if not aircraft.battery_voltage > 0.0:
@@ -351,10 +351,11 @@ def fly_energy_campaign(
 
 
 def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tuple[float, CapacityRange]:
-    """Return the quantile of the capacities that the flights need, Wh, and its interval from the order statistics.
+    """Return the quantile of the capacities that the flights need, Wh, and its interval.
 
-    Both are NaN if a larger part of the flights than the goal leaves open did not complete the mission or has returns
-    of unknown energy, or if the aircraft's power is unknown.  A bound is inf if no battery covers so many flights.
+    The interval follows from order statistics.  A bound is inf if no battery is enough for that many flights.  Quantile
+    and interval are NaN if the aircraft's power is unknown.  They are also NaN if too many flights did not complete the
+    mission, or have returns of unknown energy, to reach the goal.
     """
     from scipy import stats
 
@@ -366,6 +367,6 @@ def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tu
     low, high = stats.quantile_test(needed, p=goal.probability).confidence_interval(goal.confidence)
     largest = float(needed[needed < _ENDLESS_BATTERY_WH].max(initial=0.0))
     bounds = [float(low) if math.isfinite(low) else 0.0, float(high) if math.isfinite(high) else math.inf]
-    # A quantile between the largest capacity and none is that of a flight that no battery covers.
+    # A quantile interpolated between the largest capacity and infinity is infinite: no battery is enough.
     capacity, *bounds = (math.inf if value > largest else value for value in (capacity, *bounds))
     return capacity, CapacityRange(*bounds)

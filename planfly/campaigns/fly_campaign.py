@@ -64,12 +64,11 @@ def _add_outcome(tally: Tally, outcome: str) -> Tally:
 def resumed_goal(
     requested: Goal | None, folder: Path, confidence: float | None = None, *, keeps_flights: bool = False
 ) -> Goal:
-    """Return the goal of a resumed campaign: the requested goal, or the stored goal if none is requested.
+    """Return the goal of a resumed campaign: the requested goal, or else the stored goal.
 
-    confidence: confidence of the goal; None keeps the stored confidence.
-    keeps_flights: True keeps the stored number of flights, if both goals have a fixed number or both stop by
-        themselves.
-    Raises StoreError for a folder without a campaign.
+    confidence: confidence of the goal; None to keep the stored confidence. keeps_flights: True to keep the stored
+    number of flights, if both goals have a fixed number or both stop by themselves.  Raises StoreError for a folder
+    without a campaign.
     """
     path = folder / CAMPAIGN_DATABASE
     settings = read_stored_settings(path)
@@ -86,7 +85,7 @@ def resumed_goal(
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
     """Create the table of a campaign in a folder, or open it to resume the campaign.
 
-    Raises StoreError, also if the table has more flights than the goal.
+    Raises StoreError for a table that cannot be used, or that has more flights than the goal.
     """
     settings = {
         "name": base.name,
@@ -109,8 +108,8 @@ def fly_campaign(
 ) -> Estimate:
     """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
-    Flights are counted in the order of their indices, so that answer and table do not depend on the speed of the
-    workers; flights after the deciding flight are deleted. Flights completed before an error or Ctrl-C stay in the
+    Flights are counted in the order of their indices, and flights after the deciding flight are deleted.  Answer and
+    table therefore do not depend on the speed of the workers.  Flights completed before an error or Ctrl-C stay in the
     table.
     """
     estimator = Estimator(goal)
@@ -169,7 +168,7 @@ class _ProgressReport:
     def report(self, tally: Tally, is_last: bool = False) -> None:
         """Report flights, probability of success with its bounds, rate of flights and remaining time.
 
-        is_last: True reports even if no report is due.
+        is_last: True to report even if no report is due.
         """
         if self._advance is None or not tally.flown or not (self._rate.is_due() or is_last):
             return

@@ -260,7 +260,7 @@ _PANELS_PER_ROW = 5
 def draw_clearance_fan(
     clearance: Floats, has_failed: NDArray[np.bool_], terrain_altitudes: Floats, length: float, min_clearance: float
 ) -> Figure:
-    """Draw the height above ground of all flights along the path as quantile bands, and the ground below.
+    """Draw quantile bands of the flights' heights along the path, above the ground.
 
     clearance: minimum clearance of each flight on each of s equal pieces of the path, m, (n, s); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
@@ -316,7 +316,7 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
-    """Draw where the flights crossed each waypoint, seen along the path, a panel for each waypoint.
+    """Draw a panel for each waypoint with the positions at which flights crossed it, seen along the path.
 
     The panels show the ellipse of 95 % of the flights.
 
@@ -424,7 +424,7 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart, north up, of the winds in which a mission is flyable; edge: `max_speed`, m/s.
+    """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
 
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
@@ -481,7 +481,7 @@ def draw_go_no_go(
 def _draw_wind_areas(axes: Any, directions: Sequence[ChartDirection], max_speed: float) -> None:
     """Draw the areas of winds in which a mission is and is not flyable, and the boundary between them.
 
-    Next to a direction that is not judged nothing is known.
+    The sectors next to a direction that is not judged are grey.
     """
     angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
     circle = [*directions, directions[0]]
@@ -658,7 +658,7 @@ def _move_legends(figure: Figure, legends: Sequence[Legend], columns: int) -> No
 
 
 def _narrow_map(figure: Figure) -> Figure:
-    """Change a map to a narrow layout: below it colour bar, compass and notes side by side, and then the legend."""
+    """Change a map to a narrow layout: colour bar, compass and notes in a row below it, then the legend."""
     map_axes, *side_axes = figure.axes
     old_width, old_height = figure.get_size_inches().tolist()
     map_box = map_axes.get_position()

@@ -256,7 +256,7 @@ def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwri
 
     out: path of the folder, or None for a temporary folder, which is removed at the end.
 
-    Raises ArgumentError if a campaign is to be resumed without a folder.
+    Raises ArgumentError for a campaign to be resumed without a folder.
     """
     if out is not None:
         yield OutputDirectory(Path(out), table, resume, overwrite)
@@ -475,7 +475,7 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return lines that the search or some of its directions are not judged, and why; [] if all are judged."""
+    """Return lines which state that the search or some directions are not judged, and why; [] if all are."""
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
@@ -538,7 +538,7 @@ def _deciding_lines(winds: WindsResult) -> list[str]:
 def _lines_without_failures(winds: WindsResult) -> list[str]:
     """Return a line about the directions in which no flight failed; [] if there are none.
 
-    The line states the probability of success that the flights in the maximum wind of these directions prove alone.
+    The line states the probability of success that is proven by the flights in the maximum wind of these directions.
     """
     max_speed, confidence = winds.goal.most, winds.goal.confidence
     counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
@@ -555,7 +555,7 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
 
 
 def _calm_lines(winds: WindsResult) -> list[str]:
-    """Return lines about the rules that fail in calm air; empty if the mission flies in calm air."""
+    """Return lines about the rules that fail in calm air; [] if the mission is flyable in calm air."""
     calm = winds.calm
     if calm is None or not calm.failed_count:
         return []
@@ -567,7 +567,7 @@ def _calm_lines(winds: WindsResult) -> list[str]:
 
 
 def _failing_lines(winds: WindsResult) -> list[str]:
-    """Return a line for each direction from which every flight fails, and whose boundary is not judged."""
+    """Return a line for each direction in which every flight fails and the boundary is not judged."""
     lines = []
     for direction, undecided_count in zip(chart_directions(winds), winds.undecided_counts(), strict=True):
         has_passed = any(flyable for _, _, flyable in direction.flights)
@@ -638,8 +638,8 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 
     name: mission of the search.
 
-    The answer fails unless it is "judged".  A direction that is not judged is skipped, and a direction fails in which
-    the mission does not fly even in calm air.
+    The answer fails unless it is "judged".  A direction that is not judged is skipped.  A direction fails if the
+    mission is not flyable there even in calm air.
     """
     lines, reasons = wind_lines(winds), winds.reasons
     cases = [answer_case("" if winds.answer == "judged" else lines[0])]
@@ -663,7 +663,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the unlocked table in its folder, and write its files.
+    """Summarise a campaign from the table in its folder, which must not be locked, and write its files.
 
     command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.

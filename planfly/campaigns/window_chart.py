@@ -29,7 +29,7 @@ _MAX_LABELS = 26
 
 
 def draw_window(result: WindowResult) -> Figure:
-    """Draw the departures of a window: probability with its interval and deciding rule, mean wind, and least energy."""
+    """Draw each departure's probability with interval and deciding rule, its mean wind and least energy."""
     with clean_style():
         figure = new_figure(6.4)
         probability = figure.add_axes((0.08, 0.54, 0.89, 0.37))
@@ -76,7 +76,7 @@ def draw_window(result: WindowResult) -> Figure:
 
 
 def _number_of(time: datetime) -> float:
-    """Return a time as matplotlib's number of days since 1970."""
+    """Convert a time to matplotlib's number of days since 1970."""
     return time.timestamp() / 86_400.0
 
 

@@ -157,7 +157,7 @@ def near_miss_entry(near_miss: NearMiss) -> NearMissEntry:
 
 
 def survey_remedy_entry(remedy: SurveyRemedy) -> SurveyRemedyEntry:
-    """Return the JSON entry of a remedy, a change that makes all lines of a survey usable."""
+    """Return the JSON entry of a remedy: a change that makes all photo lines of a survey usable."""
     return SurveyRemedyEntry(
         kind=remedy.kind,
         name=remedy.name,

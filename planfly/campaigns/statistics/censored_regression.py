@@ -67,8 +67,8 @@ class BinaryLink(Protocol):
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         """Return the Fisher information of a flight about its predictor.
 
-        width: range of predictors above ``x`` within which a passed flight gives its margin; 0 for a flight that gives
-        only pass or fail.
+        width: range of predictors above ``x`` in which a passed flight reports its margin; 0 if flights report only
+            pass or fail.
         """
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
@@ -226,7 +226,7 @@ _SEED = 1
 def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
     """Return equally likely points of a distribution in random order, (count, k).
 
-    The points are spread most evenly in the first coordinate.
+    The points are spread more evenly in the first coordinate than in the others.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
     mean, covariance: approximate mean (k,) and covariance (k, k) of the distribution.
     count: a power of two.
@@ -310,7 +310,7 @@ class Outcomes:
 
     @property
     def marginal(self) -> Bools:
-        """Mask (n,): True for flights that passed by a known margin of less than a scale."""
+        """Mask (n,): True for flights that passed with a known margin below the rule's scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
     def as_pass_or_fail(self) -> "Outcomes":
@@ -318,7 +318,7 @@ class Outcomes:
         return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
     def margins_given_pass(self) -> "Outcomes":
-        """Return the outcomes of the flights with a known margin, given that they passed."""
+        """Return the outcomes of the passed flights with a known margin, conditional on having passed."""
         has_margin = self.margin > 0.0
         return Outcomes(self.terms[has_margin], self.failed[has_margin], self.margin[has_margin], given_passed=True)
 
@@ -351,11 +351,11 @@ class RegressionFit:
 def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionFit | None = None) -> RegressionFit:
     """Fit the regression of flight outcomes, and return the most probable fit.
 
-    A fit is made with each prior of the draws' coefficients.
+    One fit is made for each prior of the coefficients of the draws.
 
     link: link function between the predictor and the probability of failure.
-    nearby_fit: a fit of the same coefficients, whose mode is an additional start; the posterior of margins only may
-        have two modes.
+    nearby_fit: a fit of the same coefficients, whose mode is used as an additional start point, because a posterior
+        from margins alone may have two modes.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -407,7 +407,7 @@ class _Posterior:
     def coefficients(self, points: Floats) -> Floats:
         """Return the coefficients of the terms at points (..., k).
 
-        A point has the logarithm of the wind's coefficient in place of the coefficient itself.
+        In a point, the wind's coefficient is replaced by its logarithm.
         """
         beta = points.copy()
         beta[..., 1] = np.exp(np.minimum(points[..., 1], _MAX_LOGARITHM))
@@ -441,8 +441,8 @@ class _Posterior:
     def sample(self, mode: Floats) -> Floats:
         """Return equally likely coefficients of the terms, (s, size), by importance sampling around the mode.
 
-        With few failures the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
-        Therefore the constant is replaced by the predictor at the wind where the predictor is best known.
+        With few failures, the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
+        Therefore the sampling replaces the constant by the predictor in the wind at which the predictor is known best.
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
         covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
@@ -501,9 +501,9 @@ class _Posterior:
 def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
     """Find the mode of a posterior from a start point, and return the fit: mode, covariance and evidence.
 
-    The search is Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss
-    is not convex, which is possible with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006,
-    sections 3.4 and 19.2).
+    The search is Newton's method with halved steps.  Where the loss is not convex, which happens only with margins
+    alone, the absolute eigenvalues of the curvature are used (Nocedal and Wright, Numerical Optimization, 2nd edition,
+    2006, sections 3.4 and 19.2).
     """
     size = posterior.size
 

@@ -59,7 +59,7 @@ def boundary_quantiles(
 ) -> list[float]:
     """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``.
 
-    draws: (m, d) possible draws, evenly spread also if only the first few are used.
+    draws: possible draws, (m, d), spread evenly even if only the first few are used.
     failing_fraction: fraction of flights that fail at the boundary, above 0 and below 1.
     probabilities: probability of each quantile, 0 to 1.
 
@@ -125,7 +125,7 @@ class _FailureFractions:
         self._at_origin = [make_regressors(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
-        """Return the logarithm of the failing fraction for each sample at its own wind (n,), m/s."""
+        """Return the logarithm of each sample's failing fraction, (n,), at a wind for each sample, m/s."""
         success = np.ones_like(self._at_origin[0])
         for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
             success *= mode.link.survival(predictor + sample[:, 1] * (speeds - WIND_ORIGIN_MPS))
@@ -291,7 +291,7 @@ class Direction:
 
     @cached_property
     def _failure_distributions(self) -> FailureWindDistributions:
-        """Distributions that replace the regression while all flights have the same outcome."""
+        """Distributions used instead of the regression while all flights have the same outcome."""
         return FailureWindDistributions.on_grid(self.max_speed)
 
 
@@ -336,7 +336,7 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """Return wind (m/s) and draw of the next `count` flights of a direction.
 
-    As long as all flights have the same outcome, the wind is found by bisection; after that, the flights are chosen
+    As long as all flights have the same outcome, the wind is chosen by bisection.  After that, the flights are chosen
     that are expected to reduce the variance of the boundary most.
     """
     if direction.all_flyable or direction.all_failed:
@@ -415,10 +415,10 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return the reduction of the boundary's variance between the fits that each flight is expected to bring, (n,).
+    """Return each flight's expected reduction of the boundary's variance between the fits, (m/s)^2, (n,).
 
-    The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction, in
-    (m/s)^2, is the variance over the two outcomes of the mean boundary given the outcome.
+    The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction is the
+    variance, over the two outcomes of a flight, of the mean boundary given the outcome.
 
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
@@ -454,7 +454,7 @@ class _ExpectedPosterior:
         return self._fit.weight * expected_gains
 
     def include_flight(self, row: Floats) -> None:
-        """Update the covariances by the information of a flight whose outcome is not known yet.
+        """Update the covariances with the information expected from a flight that is not flown yet.
 
         row: terms of the flight, (2 + d,).
         """
