@@ -134,7 +134,7 @@ def new_figure(height: float) -> Figure:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """Render the figure as a PNG; the same figure gives the same bytes (no date, no version inside).
+    """Render the figure as a PNG without date or version, so that the same figure gives the same bytes.
 
     >>> figure = new_figure(2.0)
     >>> data = png_bytes(figure)

@@ -69,7 +69,7 @@ class LabelPlacer:
         optional: bool = False,
         **style: Any,
     ) -> None:
-        """Write the text next to data position (x, y), at the place of lowest cost.
+        """Write the text next to data position (x, y), where the cost is lowest.
 
         size: font size, points.
         gap: pixels between text and position.
@@ -145,7 +145,7 @@ class LabelPlacer:
         )
 
     def _order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a label's box that stands on the wrong side of the labels of near points.
+        """Return the cost of a box on the wrong side of the labels of near points.
 
         A framed label has no such cost, because it has a line to its point.
 

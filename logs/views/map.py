@@ -204,7 +204,8 @@ def map_json(chart: MapChart) -> Json:
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
     """Return the east and north range that shows the scenario's area and all paths, with a margin, m.
 
-    Bounds made around an external mission limit nothing: the range covers its path, and the parts of zones within them.
+    Bounds that planfly made around an external mission are no limit: the range then covers the path, and the zones
+    within these bounds.
 
     paths: paths (t, 3), m; rows with NaN are ignored.
     """
@@ -228,9 +229,9 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
 
 
 def _area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Return the layer of the edge of the scenario's area.
+    """Return the layer of the edge of the scenario's area; [] for an external mission.
 
-    There is none for an external mission, because the bounds made around it limit nothing.
+    The bounds that planfly makes around an external mission are no limit.
     """
     if scenario.external:
         return []
@@ -313,7 +314,7 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
 
 
 def _are_close(a: Floats, b: Floats) -> bool:
-    """Return True if two points lie within 50 m on the ground, so that one marker stands for both."""
+    """Return True if two points lie within 50 m horizontally, so that one marker is enough for both."""
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 

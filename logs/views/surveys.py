@@ -18,7 +18,7 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Chart each survey of a flight from above, rotated so that its lines are horizontal, a panel each.
+    """Chart each survey of a flight in a panel, from above, rotated so that its lines are horizontal.
 
     Return None without a flown survey.
     """

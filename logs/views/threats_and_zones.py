@@ -256,7 +256,7 @@ def zone_text(zone: Zone) -> str:
 
 
 def _level_text(level: ZoneLevel) -> str:
-    """Return an altitude limit of a zone as text, with what it is measured from."""
+    """Return an altitude limit of a zone as text, with its datum."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
 
@@ -305,7 +305,7 @@ class ZoneCut:
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
-    """Return the parts of the plane that zones forbid, without zones away from the path.
+    """Return the parts of the plane that zones forbid; zones away from the path are left out.
 
     An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.
     """

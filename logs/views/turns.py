@@ -37,7 +37,7 @@ class PlaceValue:
 
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """List the findings of a rule by number of their waypoint or leg; findings elsewhere are left out."""
+    """Sort the findings of a rule by the number of their waypoint or leg; other findings are left out."""
     place_rows = []
     for finding in findings:
         place = finding.place
@@ -52,7 +52,7 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
-    """Chart turns, slopes, clearances, waypoints and corridor, a panel each if the verdict has findings.
+    """Chart turns, slopes, clearances, waypoints and corridor; each has a panel if the verdict judged it.
 
     Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.
 

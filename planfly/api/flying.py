@@ -404,7 +404,7 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
-    """Judge a flight that was flown before.
+    """Judge a recorded flight again.
 
     terrain: elevation file that replaces the terrain of the flight; None keeps the terrain.
     fences: additional fences.

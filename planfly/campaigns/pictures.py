@@ -696,7 +696,7 @@ def _left_title(axes: Axes) -> list[Text]:
 
 
 def _wrap_text(text: Text, width: float) -> float:
-    """Break a text into lines of at most `width` (in), and return the total height of the lines, in."""
+    """Break a text into lines of at most `width` inches, and return the total height of the lines, inches."""
     size = float(text.get_fontsize()) / 72.0
     lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))

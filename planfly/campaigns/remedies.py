@@ -24,7 +24,7 @@ _HEIGHT_RULES = ("clearance", "approach", "climbout")
 
 
 def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
-    """Return changes that would raise the probability, for the rules that most flights failed; () for none.
+    """Return changes that would raise the probability, for the most failed rules; () if no flight failed.
 
     scenario: scenario of the mission.
     """

@@ -136,7 +136,7 @@ def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance)
 
 
 def run_window_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the times of take-off at which a mission is flyable in the forecast of its scenario, as page data.
+    """Find the take-off times at which a mission is flyable in its scenario's forecast, as page data.
 
     payload: editing context, and mission.
 

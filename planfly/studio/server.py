@@ -162,7 +162,7 @@ class Server:
     # One page.
 
     async def serve(self, socket: WebSocket) -> None:
-        """Accept a websocket; if it sends the token, serve its page until the page disconnects or is too slow."""
+        """Accept a websocket; if it sends the token, serve its page until it disconnects or is too slow."""
         await socket.accept()
         page = await self._authenticate(socket)
         if page is None:
@@ -433,9 +433,9 @@ class Server:
                 self._loop.call_soon_threadsafe(self._send_messages_of_answer, worker, answer)
 
     def _send_messages_of_answer(self, worker: str, answer: Answer) -> None:
-        """Send the messages that a worker's answer causes to the pages.
+        """Handle a worker's answer: send the resulting messages to the pages.
 
-        If it is the first planned path, the path becomes the mission.
+        If the answer is the first planned path, the path becomes the mission.
         """
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)

@@ -72,7 +72,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a mission by geometry, and return those that passed, as `try_flown_suggestions` does."""
+    """Try a mission's suggestions by geometry; return passed ones like `try_flown_suggestions`."""
     context, mission = payload
     return _try_suggestions(context, context.judge(mission), advance)
 
@@ -80,8 +80,8 @@ def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advan
 def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
     """Try the suggestions of a failed flight in trial flights, and return those that passed.
 
-    The result has the findings with these suggestions, as page data, and each changed mission with its suggestion,
-    keyed by the numbers of finding and suggestion; a suggestion that changes no mission is not among them.
+    The result contains the findings with these suggestions as page data.  It also contains each changed mission with
+    its suggestion, keyed by the numbers of finding and suggestion; suggestions that change no mission are left out.
 
     payload: the editing context, and the pickled flight.
     """
@@ -90,7 +90,7 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
 
 
 def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a verdict, and return those that passed, as `try_flown_suggestions` does."""
+    """Try a verdict's suggestions; return passed ones like `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
@@ -153,7 +153,7 @@ class PlanRequest:
 
 
 def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
-    """Plan one or several paths, and return them with the shortest first.
+    """Plan one or several paths, and return them, the shortest first.
 
     If no path is safe, the best path is returned.
     """

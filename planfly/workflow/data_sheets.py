@@ -104,7 +104,7 @@ class StatedParameters:
 
 
 def stated_parameters(file: Path) -> StatedParameters:
-    """Return the parameters of a file for ArduPlane or PX4 that describe the aircraft and differ from their defaults.
+    """Return the non-default parameters of an ArduPlane or PX4 file that describe the aircraft.
 
     Raises ParameterError for a file that cannot be read, a file for another vehicle, and a file whose names neither
     autopilot knows.
@@ -122,7 +122,7 @@ def stated_parameters(file: Path) -> StatedParameters:
 
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return a parameter's value, its default, and its text in a file for ArduPlane; None if the file lacks it."""
+    """Return a parameter's value, default and text from an ArduPlane file; None if the file lacks it."""
     definition = next((one for one in DEFINITIONS.values() if one.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
@@ -135,7 +135,7 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return a parameter's value and default in ArduPlane's unit, and its text in a file for PX4; None without it."""
+    """Return a parameter's value, default and text from a PX4 file, in ArduPlane's unit; None if it lacks it."""
     px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
     if px4_name not in entries:
         return None
@@ -147,7 +147,7 @@ def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, s
 def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedParameters) -> list[str]:
     """Return texts on the parameters that the numbers of a data sheet override.
 
-    numbers: by keyword, in the units of the options; None or 0 if not stated.
+    numbers: numbers of the data sheet by keyword, in the units of the options; None or 0 if not stated.
 
     >>> overridden_texts({"cruise": 18.0}, StatedParameters({"AIRSPEED_CRUISE": 19.0}, {"AIRSPEED_CRUISE": "A 19"}))
     ['A 19 (cruise 18 m/s)']
@@ -160,7 +160,7 @@ def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedPara
 
 
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
-    """Return a data sheet whose missing values are taken from parameters, by ArduPlane's names.
+    """Fill missing values of a data sheet from parameters, which are keyed by ArduPlane's names.
 
     TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX (libraries/AP_TECS/AP_TECS.cpp).
 
@@ -311,8 +311,8 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     """Return the uncertainty of a data sheet's model, and aircraft drawn from it.
 
     The uncertainty has standard deviations of factors on model properties, and of the resulting climb, descent, top
-    speed and power at cruise.  All factors are independent except the factor on thrust: it compensates the effect of
-    the other factors on the climb, because an aircraft with more drag has a stronger motor, and then varies by the
+    speed and power at cruise.  All factors are independent except the factor on thrust.  An aircraft with more drag has
+    a stronger motor, so this factor compensates the effect of the other factors on the climb.  It also varies by the
     uncertainty of the climb itself.
     """
     estimated = _performance_vector(aircraft)
@@ -361,7 +361,7 @@ def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, f
     The factor on thrust compensates the effect of the other factors on the climb.
 
     balance: change of the logarithm of the thrust per logarithm of each other factor.
-    thrust_sd: standard deviation of the logarithm of the thrust that varies the climb.
+    thrust_sd: standard deviation of the logarithm of the thrust that represents the uncertainty of the climb.
     """
     draws = draw_quantities(uncertainty.quantities)
     logarithms = np.log(draws.values)
@@ -424,10 +424,10 @@ def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: floa
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the signed effect (n,) of a factor on path angles and speeds: half of increased - decreased.
+    """Return the signed effect (n,) of a factor on path angles and speeds: (increased - decreased) / 2.
 
-    A value is NaN if the aircraft cannot be trimmed.  If either `increased` or `decreased` is NaN, the effect is the
-    difference between the other value and the estimated value; if both are NaN, the magnitude of the estimated value.
+    A value is NaN if the aircraft cannot be trimmed.  If one of `increased` and `decreased` is NaN, the effect is the
+    difference between the other one and `estimated`.  If both are NaN, it is the magnitude of `estimated`.
 
     increased, decreased: values (n,) with the factor increased and decreased.
     estimated: values (n,) with the estimated factor.
@@ -475,12 +475,12 @@ def make_data_sheet_folder(
     *,
     overwrite: bool = False,
 ) -> Aircraft:
-    """Write the folder of an aircraft made from its data sheet, completely or not at all.
+    """Write the folder of an aircraft made from its data sheet, and return the aircraft.
 
-    Returns the aircraft.
+    The folder is written completely or not at all.
 
-    parameters: file of ArduPlane's or PX4's parameters, which fill the gaps of the sheet.
-    sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
+    parameters: file of ArduPlane's or PX4's parameters, which replace missing values of the sheet.
+    sized: aircraft sized from the sheet as another class of aircraft; None for the default class of the layout.
     overwrite: True replaces the folder of an aircraft.
     Raises FlightError, in one line with the allowed range, for a sheet outside the range of small aircraft, a folder
     that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
@@ -573,9 +573,9 @@ def _file_texts(
 
 
 def _check_endurance(aircraft: Aircraft, power: float) -> None:
-    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.
+    """Raise FlightError if level flight empties the battery within `_MIN_ENDURANCE_S`.
 
-    power: W.
+    power: power of level flight, W.
     """
     if not aircraft.battery_voltage or aircraft.battery_energy >= _MIN_ENDURANCE_S * power:
         return
@@ -774,7 +774,7 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
 
 def _climb_lines(stated: StatedParameters) -> list[str]:
-    """Return a line of ``README.md`` on the throttle of the file's climb rate; [] if it is full throttle."""
+    """Return a line of ``README.md`` on the throttle at the file's climb rate; [] if it is full throttle."""
     if not {"TECS_CLMB_MAX", "THR_MAX"} <= stated.values.keys():
         return []
     climb_name, throttle_name = (stated.texts[name].split()[0] for name in ("TECS_CLMB_MAX", "THR_MAX"))

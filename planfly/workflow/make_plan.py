@@ -40,7 +40,7 @@ def make_plan(
     flown_plan_and_leg: tuple[Plan, int] | None = None,
     continues: bool = False,
 ) -> Plan:
-    """Plan a path within the limits of scenario and aircraft, less the uncertainty of the limits.
+    """Plan a path within the limits of scenario and aircraft, reduced by the uncertainty of the limits.
 
     All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
     waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`).  If gusts change the
@@ -90,7 +90,7 @@ def make_plan(
 
 
 def _complete_in_gusts(plan: Plan, airframe: Airframe, search: Search) -> Plan:
-    """Return a plan that gusts do not make unsafe, or the given plan as not safe."""
+    """Return a plan that is safe in gusts, or the given plan marked as not safe."""
 
     def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
         return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, search_limits), search_limits)
@@ -112,7 +112,7 @@ def make_given_plan(scenario: Scenario, airframe: Airframe, seed: int, waypoints
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
-    """Apply to a plan the steps that `make_plan` takes after its search, without another search.
+    """Complete a plan without another search, by the steps that `make_plan` takes after its search.
 
     keeps_waypoints: see `limit_waypoint_orbits`.
     """

@@ -36,7 +36,7 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
 
     properties: properties of each feature in addition to its name and its height above ground.
 
-    Across the antimeridian longitudes continue beyond 180 degrees, so that no area is torn.
+    At the antimeridian, longitudes continue beyond 180 degrees, so that no area is split.
     """
     features = [
         {

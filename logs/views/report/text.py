@@ -200,7 +200,7 @@ def _place_and_value(row: FindingRow) -> str:
 
 
 def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
-    r"""Return changes of the plan as text, each of which would make a failed finding pass.
+    r"""Return alternative changes of the plan, as text, that would make a failed finding pass.
 
     Return "" if none is known.
 
@@ -232,7 +232,7 @@ def count_sentence(rows: list[FindingRow]) -> str:
 
 
 def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
-    """Return all numbers and texts of one finding.
+    """Return the row of one finding: its numbers and texts.
 
     deciding: as in `finding_rows`.
     """

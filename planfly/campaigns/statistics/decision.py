@@ -37,7 +37,7 @@ class Tally(NamedTuple):
 
     @property
     def unknown(self) -> int:
-        """Number of lost and undecided flights: failures in lower bounds, and successes in upper bounds."""
+        """Number of lost and undecided flights: failures in a lower bound, successes in an upper bound."""
         return self.lost + self.undecided
 
     @property
@@ -190,7 +190,7 @@ class StoppingBound:
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded by a fraction of successes above p, or below p if `above` is False."""
+        """Return True if p is excluded and lies below the fraction of successes; above it if `above` is False."""
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence

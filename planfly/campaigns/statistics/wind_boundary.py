@@ -347,7 +347,7 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
 
 
 def _bisect_speed(direction: Direction) -> float:
-    """Return the next wind, m/s, between flown winds of one outcome and the end of the range."""
+    """Return the next wind while all outcomes are equal, m/s: between the flown winds and the range's end."""
     max_speed = direction.max_speed
     if not direction.speeds:
         return _round_to_grid(0.5 * max_speed, max_speed)
@@ -439,7 +439,7 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return by how much each flight is expected to reduce the boundary's variance, (n,), (m/s)^2.
+        """Return each flight's expected reduction of the boundary's variance, (m/s)^2, (n,).
 
         Only the variance within the fit is considered.
 
