@@ -72,7 +72,8 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
 def _run_command(argv: Sequence[str] | None) -> int:
     """Parse the command line, run its command, and return the exit code.
 
-    An error is written to the files of --json and --junit, so that none of an earlier run is taken for this one's.
+    An error is also written to the files of --json and --junit, so that files of an earlier run are not mistaken for
+    this run's.
     """
     parser = build_parser()
     try:

@@ -7,7 +7,7 @@ from logs.verdict.rules.fence_rule import make_zone_test
 
 
 def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
-    """Return a plan's mission with a fence, and notes on what the fence leaves out.
+    """Return a plan's mission with a fence, and notes on shapes that the fence omits.
 
     The fence is made from the threats, the area and the zones of the scenario.
 

@@ -207,7 +207,7 @@ def index_dataflash(
     large log is small.
 
     data: bytes of the log, (n,).
-    release_memory: called regularly, to release the memory of the bytes that were read.
+    release_memory: function that releases the memory of the bytes read so far; called regularly.
     """
     is_format = np.zeros(256, np.bool_)
     is_format[FMT_TYPE] = True

@@ -293,7 +293,7 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 
 def _is_armed(topics: Topics, time: Floats) -> Flags:
-    """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not say."""
+    """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not state it."""
     states = _samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)

@@ -218,7 +218,7 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write how the flight ended, verdict, reference flights and returns, and close the file."""
+        """Write the end of the flight, verdict, reference flights and returns, and close the file."""
         if self._skipped_row is not None:
             self._append_rows(self._skipped_row)
             self._skipped_row = None
@@ -274,7 +274,7 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """Write a scene that is known only at the end of the flight, but is shown from its start."""
+        """Write a scene that is known only at the end of the flight, but is shown from the start."""
         self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 

@@ -235,7 +235,7 @@ def fly(
 
 
 def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
-    """Convert a judged flight to its result; a flight that did not start has no log and no flight model."""
+    """Convert a judged flight to a `FlownMission`, without log and flight model if it did not start."""
     log = log if len(flight.track) else None
     program_log = None if log is None or program is None else autopilot_log_path(log, program)
     return FlownMission(

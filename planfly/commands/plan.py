@@ -102,7 +102,7 @@ def _algorithms_help() -> str:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan a path, and write the plan file; return 4 if the plan is not safe, or does not hold in its flights."""
+    """Plan a path, and write the plan file; return 4 if the plan is not safe, or fails in its flights."""
     _check_replanning(args)
     check_flights_option(args, "front")
     if args.front is not None:

@@ -63,7 +63,7 @@ def add_run_parser(command_line: LineParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``.
 
-    Returns the code of the verdict, or 4 if the plan does not hold in the flights of ``--flights N``.
+    Returns the exit code of the verdict, or 4 if the plan fails in the flights of ``--flights N``.
     """
     check_flights_option(args, "sitl")
     result = call_api(planfly.run, args, on_round=_print_round)

@@ -104,7 +104,7 @@ class Identified:
     def aircraft_draws(self) -> Draws:
         """Return the draws as values of the model's properties.
 
-        If no current was logged, the factor on battery power is one of them.
+        If no current was logged, they include the factor on battery power.
         """
         properties = tuple(parameter.property_name for parameter in PARAMETERS)
         if self.estimate.with_current:

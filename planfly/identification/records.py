@@ -457,7 +457,7 @@ def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floa
 
 
 def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags:
-    """Return `usable` with the rows of a blocked airspeed sensor set to False.
+    """Set the rows of a blocked airspeed sensor to False in a copy of `usable`.
 
     Raises LogError if too many usable rows are blocked.
 

@@ -141,9 +141,9 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
 
 
 def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
-    """Return the problem of an aircraft that climbs too slowly for any margin against downdrafts.
+    """Describe the problem of an aircraft that climbs too slowly for any margin against downdrafts.
 
-    Returns "" otherwise.
+    Return "" for any other aircraft.
 
     With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, more downdrafts arrive before the aircraft has climbed back.
     Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none
@@ -312,7 +312,7 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
     """Cut the legs near the ends of a path into short parts.
 
-    The needed margin grows with the distance from the end there.
+    Near an end, the needed margin grows with the distance from the end.
 
     Legs are not cut within turns.
 

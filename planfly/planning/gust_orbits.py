@@ -37,7 +37,7 @@ def limit_waypoint_orbits(
     *,
     keeps_waypoints: bool = False,
 ) -> Plan:
-    """Return a plan with so few waypoints that gusts rarely make the aircraft orbit at one of them.
+    """Return a plan with few enough waypoints that gusts rarely make the aircraft orbit at one of them.
 
     The given plan is returned if it has few enough waypoints, otherwise a plan with fewer waypoints.
 

@@ -222,7 +222,7 @@ class _Trials:
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
     def _fly_trial(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
-        """Fly a changed mission, and remember the flight if it came closest to passing.
+        """Fly a changed mission, and store the flight if it came closest to passing.
 
         description: description of the change.
         Returns verdict, mission and path length (m), or None for a mission without a valid route.
@@ -262,7 +262,7 @@ class _Trials:
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
         """Return True if all lines are usable in a flight, and no other rule fails more than before.
 
-        A rule may fail by up to one noticeable difference (`scale`) more than before.
+        A failure may become larger by at most one noticeable difference (`scale`) of the rule.
         """
         return (
             flight is not None
@@ -407,7 +407,7 @@ class _Trials:
         return min(remedies, key=lambda remedy: remedy.length, default=None)
 
     def find_parameter(self) -> SurveyRemedy | None:
-        """Find an autopilot parameter of which another value makes the flight pass; return None without one."""
+        """Find an autopilot parameter that makes the flight pass at another value; return None without one."""
         passed_flights: list[_TrialFlight] = []
 
         def passes_with(autopilot: Autopilot) -> bool:
@@ -487,7 +487,7 @@ class _Trials:
     def _find_turn_around_for_parameter(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes with the farthest value of a parameter.
 
-        Then the value nearest to the current value that passes with this distance is searched.
+        After that, the search finds the passing value nearest to the current value, with this distance.
         """
         remedies = list[SurveyRemedy]()
         # Do not suggest values below the documented range.
@@ -526,7 +526,7 @@ class _Trials:
     def try_default_airspeed(self) -> SurveyRemedy | None:
         """Try longer turn-around distances with the default airspeed, if the mission sets a too low airspeed.
 
-        Too low is an airspeed below the minimum airspeed of the aircraft.
+        An airspeed is too low if it is below the minimum airspeed of the aircraft.
         """
         mission, default_airspeed = self._setup.mission, self._airframe.airspeed
         slow_items = [

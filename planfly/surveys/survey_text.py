@@ -153,7 +153,7 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     """Describe the loss at the ends of the lines.
 
-    The loss shows the turn-around distance that would be needed.
+    This loss indicates the turn-around distance that would be needed.
     """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:

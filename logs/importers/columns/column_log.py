@@ -205,7 +205,7 @@ class ColumnLog:
         return LogError.at(self.table_path, field, value, allowed)
 
     def _file_of(self, clock: ClockTable) -> Path:
-        """Return the data file of a clock: its own, or else the opened data file, or else the table's file."""
+        """Return the data file of a clock: the clock's file, else the opened data file, else the table's file."""
         if clock.file is not None:
             return self.table_path.parent / clock.file
         if self.path != self.table_path:
@@ -278,7 +278,7 @@ class ColumnLog:
 
     @property
     def _main_clock(self) -> str:
-        """Name of the main clock: "main", or the first clock if none has this name."""
+        """Name of the main clock: "main", or else the name of the first clock."""
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
     def _times(self, name: str) -> Floats:
@@ -376,7 +376,10 @@ class ColumnLog:
         return data.columns[name]
 
     def _column_on_clock(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
-        """Return a column with a clock.  Raises LogError if it has another number of rows than the clock."""
+        """Return a column that uses a clock.
+
+        Raises LogError if the column and the clock have different numbers of rows.
+        """
         values = self._column_by_name(clock.data, name, field)
         if len(values) != len(clock.time):
             allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
@@ -390,7 +393,7 @@ class ColumnLog:
     def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
         """Return the series of one entry in SI units, radians and the default frame.
 
-        Only the span that the table names is read.  Rows that do not meet the entry's condition are NaN.
+        Only the time span that the table names is read.  Rows that do not meet the entry's condition are NaN.
         """
         if entry.value is not None:
             time = self._times(self._main_clock)

@@ -239,7 +239,7 @@ def _plain_name(name: str) -> str:
 
 
 def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
-    """Split a column's name into its prefix, its own name without a unit, and the unit.
+    """Split a column's name into a prefix, a name and a unit.
 
     The unit is the one that the file or the name states; "" if neither states one.
     """
@@ -253,7 +253,7 @@ def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
 
 
 def _time_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
-    """Yield a clock for each column that has the name of a time and increasing values."""
+    """Yield a clock for each column with increasing values and a name that stands for time."""
     for column, values in data.columns.items():
         prefix, own, unit = _name_parts(data, column)
         if {_plain_name(own), _plain_name(column.rpartition(".")[2])} & set(_TIMES) and (
