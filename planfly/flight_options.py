@@ -278,6 +278,7 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
 
     @functools.wraps(function)
     def with_defaults(*args: _Taken.args, **keywords: _Taken.kwargs) -> _Given:
+        """Check the arguments, add the defaults of missing options, and call the function."""
         for name in keywords:
             if name not in signature.parameters:
                 hint = did_you_mean(name, signature.parameters)
@@ -416,7 +417,9 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     >>> flight_entries({"autopilot": "ardupilot-4.6"})["arduplane_version"]
     '4.6'
     """
-    aircraft, params, autopilot = options.get("aircraft"), options.get("params"), options.get("autopilot")
+    aircraft = options.get("aircraft")
+    params = options.get("params")
+    autopilot = options.get("autopilot")
     check_arguments(autopilot=autopilot)
     if program is not None and autopilot is not None:
         allowed = "not with sitl: a real autopilot flies by its own control laws"

@@ -21,6 +21,7 @@ def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     is_entered_zone = make_zone_test(setup)
 
     def is_entered_shape(shape: tuple[MissionItem, ...]) -> bool:
+        """Return True if the planned path violates a zone of a fence shape."""
         return any(is_entered_zone(zone) for zone in fence_zones(shape, setup.scenario.origin))
 
     return with_fences(setup.mission, setup.scenario, is_entered_shape)

@@ -209,7 +209,8 @@ class _Reader:
         if not times:
             return np.zeros(0, np.int64), np.zeros(0), ()
         order = np.argsort(np.concatenate(starts), kind="stable")
-        sorted_starts, raw_times = np.concatenate(starts)[order], np.concatenate(times)[order]
+        sorted_starts = np.concatenate(starts)[order]
+        raw_times = np.concatenate(times)[order]
         is_finite = np.isfinite(raw_times)
         steady = remove_clock_jumps(raw_times[is_finite])
         return sorted_starts[is_finite], steady.time - raw_times[is_finite], steady.jumps

@@ -123,9 +123,11 @@ class _FormatCheckingFile:
         return self._file.seek(offset + missing, whence)
 
     def tell(self) -> int:
+        """Return the position in the file, bytes."""
         return self._file.tell()
 
     def close(self) -> None:
+        """Close the file."""
         self._file.close()
 
 

@@ -159,7 +159,8 @@ class FlightEvents:
 
     def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
         """Make the record of the event that the aircraft enters or leaves the range of a threat."""
-        name, level = self._threats.names[threat], "warning" if kind == "missile range" else "info"
+        name = self._threats.names[threat]
+        level = "warning" if kind == "missile range" else "info"
         text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
         return self._event_record(time, text, level if has_entered else "info")
 

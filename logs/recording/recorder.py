@@ -327,7 +327,8 @@ def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
     # Convert to lists first: reading the fields chunk by chunk costs a microsecond each.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
-    offsets, messages = layout.channels["offset"].tolist(), layout.channels["messages"].tolist()
+    offsets = layout.channels["offset"].tolist()
+    messages = layout.channels["messages"].tolist()
     for k in range(len(layout.chunks)):
         yield ChunkContent(
             records=records[bounds["start"][k] : bounds["stop"][k]],

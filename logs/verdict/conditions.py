@@ -249,7 +249,8 @@ def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     for k in range(len(waypoints) - 3):
         (start, end), (other_start, other_end) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
         leg_vector, other_vector = end - start, other_end - other_start
-        leg_length, other_length = float(np.hypot(*leg_vector)), float(np.hypot(*other_vector))
+        leg_length = float(np.hypot(*leg_vector))
+        other_length = float(np.hypot(*other_vector))
         if leg_length <= 0.0 or other_length <= 0.0:
             continue
         direction = leg_vector / leg_length

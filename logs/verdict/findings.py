@@ -283,9 +283,8 @@ def worst_first_key(finding: Finding) -> tuple[int, float]:
     >>> worst_first_key(near) < worst_first_key(far)
     True
     """
-    return (
-        0 if finding.ok is False else 1 if finding.ok is None else 2
-    ), 0.0 if finding.margin is None else finding.margin
+    rank = {False: 0, None: 1, True: 2}[finding.ok]
+    return rank, 0.0 if finding.margin is None else finding.margin
 
 
 def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:

@@ -90,7 +90,8 @@ def suggest_passing_zone(
     if aligned is not None and planned_depth <= ROUNDING_M:
         moves, extra_depth = flown_moves(aligned, first_leg, last_leg), 0.0
     else:
-        moves, extra_depth = planned_moves(requirements, first_leg, last_leg), max(0.0, flown_depth - planned_depth)
+        moves = planned_moves(requirements, first_leg, last_leg)
+        extra_depth = max(0.0, flown_depth - planned_depth)
     leg_moves = moves[(moves["leg"] >= first_leg) & (moves["leg"] <= last_leg)]
     changes = []
     for shifts in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
@@ -187,7 +188,8 @@ def suggest_gentler_slope(
     if max_slope <= 0.0 or planned_slope <= max_slope:
         return _gentler_arc(requirements, leg)
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
-    gentler_height_change, longer_length = leg_length * math.tan(max_slope), height_change / math.tan(max_slope)
+    gentler_height_change = leg_length * math.tan(max_slope)
+    longer_length = height_change / math.tan(max_slope)
     alternatives: list[_SizedSuggestion] = []
     if gentler_height_change >= MIN_SUGGESTED_RISE_M:
         change = Change("rise", place, sign * height_change, sign * math.floor(gentler_height_change), "m")
@@ -227,10 +229,8 @@ def suggest_gentler_landing(
     height = altitude - ground
     step = float(math.ceil(height - length * math.tan(max_slope)))
     longer_length = float(math.ceil(height / math.tan(max_slope)))
-    lower, further = (
-        Change("descent", requirements.waypoint(leg), None, step, "m"),
-        Change("length", requirements.leg(leg), length, longer_length, "m"),
-    )
+    lower = Change("descent", requirements.waypoint(leg), None, step, "m")
+    further = Change("length", requirements.leg(leg), length, longer_length, "m")
     return _smallest_first(
         [(step / height, (lower,)), (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,))]
     )
@@ -381,10 +381,8 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
     """
     envelope = requirements.setup.envelope.with_margin()
     min_speed, max_speed = envelope.level_speeds(altitude)
-    min_speed, max_speed = (
-        max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
-        min(max_speed, float(envelope.airspeed[-1])),
-    )
+    min_speed = max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0]))
+    max_speed = min(max_speed, float(envelope.airspeed[-1]))
     min_speed, max_speed = min_speed / factor, max_speed / factor
     steps = (
         np.arange(
@@ -400,9 +398,11 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
     slope: absolute value of the slope, rad.
     """
-    course, direction = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
+    course = float(requirements.courses[leg])
+    direction = 0 if requirements.slopes[leg] >= 0.0 else 1
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
-    factor, certain_limits = _true_airspeed_ratio(requirements, leg), requirements.limits.with_margin()
+    factor = _true_airspeed_ratio(requirements, leg)
+    certain_limits = requirements.limits.with_margin()
 
     def can_hold_slope(speed: float) -> bool:
         """Return True if the aircraft certainly holds the slope at both ends of the leg at an airspeed, m/s."""

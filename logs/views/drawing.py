@@ -472,7 +472,9 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 def _area_look(look: theme.Look) -> dict[str, Any]:
     """Return matplotlib's style options of a filled area."""
-    edge = (theme.colour(look.edge) if look.edge else look.light) if look.width or look.hatch else "none"
+    edge = theme.colour(look.edge) if look.edge else look.light
+    if not look.width and not look.hatch:
+        edge = "none"
     return {
         "facecolor": (*theme.rgb(look.light), look.fill),
         "edgecolor": edge,

@@ -236,7 +236,8 @@ def _area_edge_layers(scenario: Scenario) -> list[Layer]:
     if scenario.external:
         return []
     (west, east), (south, north) = scenario.bounds.tolist()
-    x, y = np.array([west, east, east, west, west]), np.array([south, south, north, north, south])
+    x = np.array([west, east, east, west, west])
+    y = np.array([south, south, north, north, south])
     return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
@@ -303,7 +304,8 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
 
     stops: number of each waypoint of the route.
     """
-    ends, numbers_of_ends = _named_ends(scenario, route), ("", "") if route is None else (stops[0], stops[-1])
+    ends = _named_ends(scenario, route)
+    numbers_of_ends = ("", "") if route is None else (stops[0], stops[-1])
     start, destination = (
         Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
         for (name, point), stop in zip(ends, numbers_of_ends, strict=True)

@@ -246,7 +246,8 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     scenario, limit = setup.scenario, drawn_returns.returns.limit
     segments = path_by_outcome(setup, drawn_returns, track)
     points = [point for _, segment in segments for point in segment]
-    time, positions = np.array([point.time for point in points]), np.array([point.position for point in points])
+    time = np.array([point.time for point in points])
+    positions = np.array([point.position for point in points])
     ground, safe_altitudes = terrain_altitudes(scenario, positions), drawn_returns.min_safe_altitudes
     altitudes = np.concatenate([positions[:, 2], safe_altitudes.altitude, np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))

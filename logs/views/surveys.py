@@ -61,7 +61,9 @@ def _survey_panel(
         """Convert positions to distances along and across the survey's lines, m."""
         return (positions[:, :2] - origin) @ axes
 
-    usable_parts, lost_parts, unknown_parts = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros((0, 2))]
+    usable_parts = [np.zeros((0, 2))]
+    lost_parts = [np.zeros((0, 2))]
+    unknown_parts = [np.zeros((0, 2))]
     labels = []
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, line_measures, strict=True), 1):

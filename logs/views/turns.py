@@ -89,7 +89,8 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
     known_values = known_values[np.isfinite(known_values)]
     limits = limit_values[np.isfinite(limit_values)]
     shown_limits = limits[_visible_limits(limits, rule, float(np.abs(known_values).max()))]
-    min_value, max_value = float(min([*known_values, *shown_limits])), float(max([*known_values, *shown_limits]))
+    min_value = float(min([*known_values, *shown_limits]))
+    max_value = float(max([*known_values, *shown_limits]))
     margin = _MARGIN * ((max_value - min_value) or 1.0)
     note = ""
     if len(shown_limits) < len(limits):

@@ -94,6 +94,7 @@ def _open_base(
     is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
 
     def open_with_plan(plan_file: Path | None) -> CampaignBase:
+        """Open the campaign base; if the plan file does not exist, plan a path with a progress report."""
         make_base = partial(open_campaign, campaign_target, dispersions, flight_options, plan_file=plan_file)
         if is_planned or (plan_file is not None and plan_file.is_file()):
             return make_base()

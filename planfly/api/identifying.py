@@ -323,6 +323,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
     best, samples = identified.performance()
 
     def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
+        """Return the 2.5 % quantile of the samples, the estimate and the 97.5 % quantile, times a factor."""
         lower, upper = np.percentile(sample_values, [2.5, 97.5])
         return factor * float(lower), factor * float(value[0]), factor * float(upper)
 

@@ -226,11 +226,13 @@ def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> St
     """
 
     def working_time() -> float:
+        """Return the time of the process without the compilation of kernels, s."""
         return time.monotonic() - COMPILE_TIMER.seconds
 
     start = working_time()
 
     def should_stop() -> str:
+        """Return the reason to stop the search now; "" to continue."""
         if stop is not None and stop():
             return "interrupted"
         return "budget" if seconds is not None and working_time() - start >= seconds else ""

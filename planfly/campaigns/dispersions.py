@@ -273,7 +273,8 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
         allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
     parameters = dict(quantity_table)
-    distribution, source = parameters.pop("distribution", None), parameters.pop("source", None)
+    distribution = parameters.pop("distribution", None)
+    source = parameters.pop("source", None)
     _check_distribution(quantity, distribution, name)
     if not isinstance(source, str) or not source.strip():
         allowed = "missing; state the source of the numbers"

@@ -337,6 +337,7 @@ def fly_energy_campaign(
     indices: Iterator[int] = iter(range(goal.flights))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 

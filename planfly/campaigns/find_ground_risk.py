@@ -144,6 +144,7 @@ def fly_for_excursions(
     middle = 0.5 * float(flown.track.time[-1])
 
     def wind_at(places: Floats) -> Floats:
+        """Return the wind at places (n, 3) at the middle of the flight, m/s, (n, 2)."""
         return setup.scenario.wind_velocities(places, np.full(len(places), middle))
 
     falls = _fall_areas(sampled, airframe, wind_at, terrain)
@@ -478,6 +479,7 @@ def _fly_excursions(
     indices: Iterator[int] = iter(range(goal.flights))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 

@@ -203,6 +203,7 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
     indices: Iterator[int] = iter(range(total))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 

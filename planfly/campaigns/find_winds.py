@@ -368,7 +368,8 @@ class _Search:
         """Return the result of the search."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
-        calm_failures, failures = self._calm_failures(boundaries), self._failures_by_direction(boundaries)
+        calm_failures = self._calm_failures(boundaries)
+        failures = self._failures_by_direction(boundaries)
         return WindsResult(
             self.goal,
             boundaries,
@@ -440,6 +441,7 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
     draws, rows = iter(range(count)), dict[int, FlightRow]()
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight in calm air; None once a flight was flyable."""
         has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
         draw = next(draws, None) if has_none_flyable else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
@@ -498,6 +500,7 @@ def _fly_round(
     requested_by_request: dict[FlightRequest, RequestedFlight] = {}
 
     def next_flight_request() -> FlightRequest | None:
+        """Return the request of the next missing flight of the round; None if all are requested."""
         requested_flight = next(remaining_requests, None)
         if requested_flight is None:
             return None

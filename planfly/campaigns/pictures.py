@@ -488,9 +488,11 @@ def _draw_wind_areas(axes: Any, directions: Sequence[ChartDirection], max_speed:
     fine_angles = np.linspace(angle[0], angle[-1], 720)
 
     def interpolate(values: Sequence[float]) -> np.ndarray:
+        """Interpolate values at the directions to the fine grid of angles."""
         return np.interp(fine_angles, angle, values)
 
-    lower, upper = interpolate([point.low for point in circle]), interpolate([point.high for point in circle])
+    lower = interpolate([point.low for point in circle])
+    upper = interpolate([point.high for point in circle])
     boundary = interpolate([point.boundary for point in circle])
     is_known = interpolate([float(point.is_judged) for point in circle]) > 1.0 - 1e-9
     for start, end, mask, colour, alpha in (

@@ -122,7 +122,8 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
     """Draw the figures of a campaign's report; return each with its caption."""
     outcomes = np.array(list(store.outcomes().values()))
-    speed, is_decided = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed")), outcomes != "undecided"
+    speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
+    is_decided = outcomes != "undecided"
     bins = group_by_speed(speed[is_decided], (outcomes == "flyable")[is_decided], summary.goal.confidence)
     counts = [
         (RULE_WORDS[entry.rule].title, place_text(place), count)
@@ -491,7 +492,8 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
         return lines
     unsettled_count = len(counts)
     directions_text = f"{count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'}"
-    flights_text, max_width = count_range_text(counts, "flight"), 2.0 * BOUNDARY_ACCURACY_MPS
+    flights_text = count_range_text(counts, "flight")
+    max_width = 2.0 * BOUNDARY_ACCURACY_MPS
     return [
         *lines,
         f"{word}: {unsettled_count} of {directions_text} too few flights ({flights_text}): each requires at least"
@@ -546,7 +548,8 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed_directions and counts_at_max[k]]
     if not counts:
         return []
-    min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
+    min_count = min(counts)
+    probability_text = f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
         f"no flight failed in {len(counts)} of {count_text(len(winds.boundaries), 'direction')}:"
         f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"

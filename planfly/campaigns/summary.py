@@ -305,7 +305,8 @@ def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tu
     sensitivities = []
     for name, all_values in _drawn_values(base, store).items():
         values = all_values[is_judged]
-        index, p_value = first_order_index(values, margin), chance_probability(values, margin)
+        index = first_order_index(values, margin)
+        p_value = chance_probability(values, margin)
         sensitivities.append(Sensitivity(name, index, rank_slope(values, margin), p_value))
     return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
 

@@ -183,13 +183,12 @@ class LockedTable:
         Raises StoreError for a table of another campaign, or with more flights than requested.
         """
         self._lock_file()
-        execute = self._connection.execute
-        tables = {name for (name,) in execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        tables = {name for (name,) in self._connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if tables:
             stored_settings = _read_settings(self._connection) if "campaign" in tables else {}
             self._check_same_campaign(stored_settings, settings)
             self._repair_file(stored_settings)
-        execute = self._connection.execute
+        execute = self._connection.execute  # a repair opens another connection
         for statement in self._create_statements():
             execute(statement)
         # Refuse the request before its settings are written, because they would stay in the file.

@@ -111,6 +111,7 @@ def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> obje
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:
+        """Return a finite number unchanged, and None for NaN and infinity."""
         return value if math.isfinite(value) else None
 
     return CompareAnswer(

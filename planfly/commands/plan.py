@@ -197,6 +197,7 @@ def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
     is_interrupted = False
 
     def handle_signal(_signal: int, _frame: FrameType | None) -> None:
+        """Note the first Ctrl-C; interrupt the command at the second."""
         nonlocal is_interrupted
         if is_interrupted:
             interrupt(signal.SIGINT)

@@ -69,6 +69,7 @@ def _prediction_answer(result: "Predicted") -> object:
     from planfly.terminal.answers import PredictAnswer, PredictedQuantity
 
     def none_if_nan(value: float) -> float | None:
+        """Return None for NaN, and any other number unchanged."""
         return None if math.isnan(value) else value
 
     quantities = [

@@ -150,10 +150,8 @@ def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
     did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
-    climb_rate, min_climb_rate = (
-        airframe.limits.with_margin().max_climb_and_sink_rates(amsl)[0],
-        MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence),
-    )
+    climb_rate = airframe.limits.with_margin().max_climb_and_sink_rates(amsl)[0]
+    min_climb_rate = MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence)
     if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
@@ -336,10 +334,8 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
         legs.append(leg)
     path, part_margins = np.array(points), margins[legs]
     end_distances = np.array([np.linalg.norm(path - end, axis=1) for end in ends])
-    fraction, nearest_end_margin = (
-        np.minimum(1.0, end_distances.min(axis=0) / _FULL_HEIGHT_DISTANCE_M),
-        end_margins[end_distances.argmin(axis=0)],
-    )
+    fraction = np.minimum(1.0, end_distances.min(axis=0) / _FULL_HEIGHT_DISTANCE_M)
+    nearest_end_margin = end_margins[end_distances.argmin(axis=0)]
     margin_before, margin_after = (
         nearest_end_margin + fraction * (margins_of_side - nearest_end_margin)
         for margins_of_side in ([*part_margins[:1], *part_margins], [*part_margins, *part_margins[-1:]])

@@ -67,7 +67,8 @@ def ensure_local_wind(plan: Plan, airframe: Airframe, search: Callable[[Airframe
     map_ratio = max_ground_speed_ratio(scenario, airframe.limits.airspeed, float(requirements.path.times[-1]))
     while search is not None and ratio < map_ratio:
         path_ratio = _path_ground_speed_ratio(requirements) if searches < _PATH_SEARCHES else ratio
-        ratio, searches = path_ratio if ratio < path_ratio < map_ratio else map_ratio, searches + 1
+        ratio = path_ratio if ratio < path_ratio < map_ratio else map_ratio
+        searches = searches + 1
         other_plan = search(replace(airframe, limits=limits_at_ground_speed(airframe.limits, ratio)))
         if not other_plan.safe:
             break
@@ -105,6 +106,7 @@ def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
     """
 
     def flatten(angles: Floats) -> Floats:
+        """Reduce climb or dive angles (rad) to those at the higher ground speed."""
         return np.where(angles > 0.0, np.arcsin(np.sin(angles) / ratio), angles)
 
     envelope, tracking = limits.envelope, limits.tracking

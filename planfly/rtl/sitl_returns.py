@@ -283,11 +283,12 @@ def _judge_flown_return(
         clearance, lowest_position, *_ = find_nearest_approaches(
             world, _cut_at_nearest_point(target.landing.position, position)
         )
-    record["outcome"] = (
-        RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
-    )
     if math.isnan(clearance):
         record["outcome"] = RETURN_OFF_TERRAIN
+    elif hits_ground or clearance <= 0.0:
+        record["outcome"] = RETURN_GROUND_IMPACT
+    else:
+        record["outcome"] = RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     record["clearance"], record["sphere_distance"], record["threat"] = clearance, approach.outside, approach.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
     remaining_energy = simulated_return.energy_left + simulated_return.energy - used_energy
@@ -342,7 +343,8 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
 
     position: path points, (t, 3) m.
     """
-    end_point, earlier_point = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
+    end_point = position[-1, :2]
+    earlier_point = position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))
     best_target, best_rank = simulated_target, math.inf
     for target in (simulated_target, *_other_targets(world, simulated_target)):

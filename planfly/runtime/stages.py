@@ -104,6 +104,7 @@ def progress(callback: Callable[[str, float, float, str], None]) -> AbstractCont
 
     @contextmanager
     def start_stage(title: str, _kind: str) -> Iterator[Advance]:
+        """Yield a function that passes the progress of a stage to the callback."""
         yield lambda done, total, remark: callback(title, done, total, remark)
 
     return send_progress_to(Receiver(start_stage, lambda line: callback(line, 0.0, 0.0, "")))

@@ -264,6 +264,7 @@ def mission_from_data(data: Json, first: Mission) -> Mission:
     """
 
     def number(value: Any) -> float:
+        """Return a stored number; None stands for NaN."""
         return float("nan") if value is None else float(value)
 
     items = [

@@ -228,7 +228,8 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
     new_positions, renumbered = match_items(previous.items, current.items), {}
     for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
         if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
-            first, last = new_positions.get(first, _REMOVED_POSITION), new_positions.get(last, _REMOVED_POSITION)
+            first = new_positions.get(first, _REMOVED_POSITION)
+            last = new_positions.get(last, _REMOVED_POSITION)
             if _REMOVED_POSITION in (first, last):
                 kind, first, last = _REMOVED_PLACE, number, _REMOVED_POSITION
         renumbered[rule, (kind, first, last)] = result

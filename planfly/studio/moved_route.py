@@ -58,11 +58,9 @@ def update_moved_route(
     points, changed_rows = route.points.copy(), set[int]()
     positions = points["position"]
     for old_item, new_item in pairs:
-        row, old_position, new_position = (
-            rows[new_item.seq],
-            _map_position(old_item, previous_mission, scenario),
-            _map_position(new_item, mission, scenario),
-        )
+        row = rows[new_item.seq]
+        old_position = _map_position(old_item, previous_mission, scenario)
+        new_position = _map_position(new_item, mission, scenario)
         neighbours = [k for k in (row - 1, row + 1) if 0 <= k <= route.legs]
         if old_position is None or new_position is None:
             return None

@@ -153,6 +153,7 @@ async def _run_web_server(server: "Server", listener: socket.socket, stop: Calla
 
         @contextlib.contextmanager
         def capture_signals(self) -> Iterator[None]:
+            """Leave signals to the studio instead of the web server."""
             yield
 
     app = make_app(server, listener.getsockname()[1])

@@ -170,10 +170,8 @@ class Server:
         self._pages.add(page)
         self.first_page_served.set()
         tasks = [asyncio.create_task(self._write_frames(page)), asyncio.create_task(self._judge_drags(page))]
-        messages_task, overflow_task = (
-            asyncio.create_task(self._handle_messages(page)),
-            asyncio.create_task(page.has_overflowed.wait()),
-        )
+        messages_task = asyncio.create_task(self._handle_messages(page))
+        overflow_task = asyncio.create_task(page.has_overflowed.wait())
         try:
             await asyncio.wait((messages_task, overflow_task), return_when=asyncio.FIRST_COMPLETED)
             if overflow_task.done():
@@ -287,6 +285,7 @@ class Server:
             self._ground_frames.clear()
 
             def draw() -> tuple[bytes, ...]:
+                """Draw the terrain, and return the frames with its heights and its picture."""
                 grid = sample_ground_grid(terrain, tuple(east), tuple(north))
                 header = {"east": east, "north": north, "rows": grid.heights.shape[0], "columns": grid.heights.shape[1]}
                 picture = draw_ground(terrain, tuple(east), tuple(north), dark=page.dark)

@@ -165,7 +165,8 @@ def _value_text(finding: Finding) -> str:
     closeness, tolerance = _closeness(finding), finding.tolerance or 0.0
     if finding.limit is not None and closeness < 1.0 and _closeness(finding, tolerance) >= 1.0:
         sign, joint = finding.limit_sign, "less" if finding.at_least else "plus"
-        purpose, tolerance_text = RULE_WORDS[finding.rule].tolerance_purpose, quantity_text(tolerance, finding.unit)
+        purpose = RULE_WORDS[finding.rule].tolerance_purpose
+        tolerance_text = quantity_text(tolerance, finding.unit)
         limit_text = f"{sign} {quantity_text(finding.limit, finding.unit)}, {joint}"
         limit_text += f" {tolerance_text} for {purpose}" if purpose else f" a tolerance of {tolerance_text}"
     return f"{_rule_name(finding)} {value}" + (f" ({limit_text})" if limit_text else "")

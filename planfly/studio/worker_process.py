@@ -323,6 +323,7 @@ def _run_task(pipe: Connection, task: Task) -> Task | None:
     newer_tasks: list[Task | None] = []
 
     def advance(done: float, total: float, remark: str) -> None:
+        """Send the progress of the task; raise Cancelled if a newer task has arrived."""
         if pipe.poll():
             newer_tasks.append(pipe.recv())
             raise Cancelled

@@ -93,6 +93,7 @@ def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advanc
     """Try a verdict's suggestions; return passed ones like `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
+        """Report that suggestions are tried; return False, so that the trials are not aborted."""
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
         return False
 

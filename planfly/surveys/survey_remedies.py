@@ -370,6 +370,7 @@ class _Trials:
         flights: dict[float, _TrialFlight | None] = {}
 
         def is_long_enough(length: float) -> bool:
+            """Return True if all lines are usable with a turn-around distance, or if it exhausts the energy."""
             layout = SurveyLayout(length, stride, lead_in=lead_in)
             flight = flights[length] = self._fly_layout(layout, f"{order_text}turn-arounds of {length:.0f} m")
             if flight is None:
@@ -411,6 +412,7 @@ class _Trials:
         passed_flights: list[_TrialFlight] = []
 
         def passes_with(autopilot: Autopilot) -> bool:
+            """Return True if the flight passes with an autopilot; store the flight in this case."""
             airframe = replace(self._airframe, autopilot=autopilot)
             flight = self._fly_trial(self._setup.mission, airframe, "another parameter of the autopilot")
             if self._is_remedy(flight):
@@ -495,6 +497,7 @@ class _Trials:
         step = math.copysign(candidate.step, candidate.far - start)
 
         def passes_with(value: float, turn_arounds: Sequence[float]) -> bool:
+            """Return True if a turn-around distance passes with a parameter value; store the remedy."""
             autopilot = self._airframe.autopilot.with_parameters(**{candidate.name: value})
             airframe = replace(self._airframe, autopilot=autopilot)
             remedy = self._find_turn_around_with(f"{candidate.name} {value:g}", airframe, turn_arounds)

@@ -23,6 +23,7 @@ def number_parser(keyword: str) -> Callable[[str], Any]:
     allowed_range = RANGES[keyword]
 
     def parse(text: str) -> float:
+        """Return the number in a text; raise ArgumentTypeError if it is not in the allowed range."""
         value: float = math.nan
         if not allowed_range.integer:
             with contextlib.suppress(ValueError):
@@ -178,6 +179,7 @@ def file_completer(*suffixes: str) -> Completer:
     """Return a completer for folders and for files with the given suffixes."""
 
     def propose(prefix: str, **_context: object) -> Iterable[str]:
+        """Return the files with the suffixes, and the folders, that start with a prefix."""
         from argcomplete.completers import FilesCompleter
 
         return FilesCompleter(suffixes)(prefix)

@@ -329,6 +329,7 @@ def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
     stage_ended = threading.Event()
 
     def refresh() -> None:
+        """Refresh the display at intervals until the stage ends."""
         # The reader of the stream may have gone; the work itself handles this error.
         with contextlib.suppress(OSError, ValueError):
             while not stage_ended.wait(_REFRESH_INTERVAL_S):
@@ -429,24 +430,15 @@ class _Lines:
             self._remark = remark
             estimate = self._time_left.estimate(done, total)
             knew_total, self._knows_total = self._knows_total, self._knows_total or total > 0.0
-            estimate_at_start = (
-                ""
-                if knew_total
-                else remark
-                if _states_time_left(remark)
-                else self._time_left.initial_estimate(max(0.0, total - done))
-            )
+            initial_remark = remark
+            if not knew_total and not _states_time_left(remark):
+                initial_estimate = self._time_left.initial_estimate(max(0.0, total - done))
+                initial_remark = _join_nonempty(remark if total > 0.0 else "", initial_estimate)
             if not self._has_started:
-                self._print_first_line(
-                    estimate_at_start
-                    if _states_time_left(remark)
-                    else _join_nonempty(remark if total > 0.0 else "", estimate_at_start)
-                )
+                self._print_first_line(initial_remark)
             elif total > 0.0 and not knew_total:
                 # The first line was printed before the total was known.
-                self._print_and_note_time(
-                    f"{self._title}: {_join_nonempty('' if _states_time_left(remark) else remark, estimate_at_start)}"
-                )
+                self._print_and_note_time(f"{self._title}: {initial_remark}")
             elif estimate and self._time_left.is_due():
                 self._print_and_note_time(
                     f"{self._title}: {_join_nonempty(remark, '' if _states_time_left(remark) else estimate)}"

@@ -47,6 +47,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
     is_ending = False
 
     def handle_signal(number: int, frame: FrameType | None = None) -> None:
+        """Raise `Interrupted` for the first signal, later if compiled code is running."""
         # The first signal interrupts the work; the code that then ends the work must not be interrupted.
         nonlocal is_ending
         if is_ending:
@@ -59,7 +60,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
         interrupt(number)
 
     def raise_signal_again(unraisable: "sys.UnraisableHookArgs") -> None:
-        # The exception was raised in a callback of a library, which dropped it.  Raise the signal again a little later.
+        """Raise a signal again, a little later, if a callback of a library dropped its exception."""
         nonlocal is_ending
         if isinstance(unraisable.exc_value, Interrupted):
             is_ending = False
@@ -125,9 +126,10 @@ def _end_process_after_signal(read_number: Callable[[int], bytes], received: lis
     # Append the number here, too, because a command may have its own signal handlers.
     received.append(number)
     start_time, start_wait_time = time.monotonic(), _processor_wait_time()
-    while (
-        elapsed := time.monotonic() - start_time
-    ) < _MAX_GRACE_S and elapsed - _processor_wait_time() + start_wait_time < grace:
+    while (elapsed := time.monotonic() - start_time) < _MAX_GRACE_S:
+        wait_time = _processor_wait_time() - start_wait_time
+        if elapsed - wait_time >= grace:
+            break
         time.sleep(_RETRY_INTERVAL_S)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")

@@ -116,6 +116,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
     def round_to_1e4(value: float | None) -> float | None:
+        """Return a number rounded to 1e-4; None stays None."""
         return None if value is None else round(value, 4)
 
     return PhotoLineEntry(

@@ -276,6 +276,7 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
     straight_point = previous[:2] + fraction * chord
 
     def is_gentle(step: int) -> bool:
+        """Return True if the turn is gentle enough after a step towards the straight line."""
         bent_points = np.array(
             [previous, [*(corner[:2] + step / _TURN_STEPS * (straight_point - corner[:2])), corner[2]], next_waypoint]
         )

@@ -667,7 +667,8 @@ def arduplane_parameters_text(
     roll_rate = abs(b[p, aileron] / a[p, p]) * aircraft.max_aileron
     pitch_rate = abs(b[q, elevator] / a[q, q]) * aircraft.max_elevator
     roll_gain, pitch_gain = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
-    climb, sink = cruise * math.sin(performance.climb.climb), -cruise * math.sin(performance.idle.climb)
+    climb = cruise * math.sin(performance.climb.climb)
+    sink = -cruise * math.sin(performance.idle.climb)
     radius = turn_radius(cruise, bank)
     values = {
         "AIRSPEED_CRUISE": round(cruise, 1),
@@ -764,7 +765,8 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
     The throttle is that of level flight.
     """
-    throttle, stated = 100.0 * performance.level.throttle, file_parameters.get("TRIM_THROTTLE")
+    throttle = 100.0 * performance.level.throttle
+    stated = file_parameters.get("TRIM_THROTTLE")
     if stated is None or round(throttle) == round(stated):
         return []
     return [
@@ -784,7 +786,8 @@ def _climb_lines(stated: StatedParameters) -> list[str]:
 
 def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str]:
     """Return lines of ``README.md`` on the performance of the model and the speeds of its guidance."""
-    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
+    climb = math.degrees(performance.climb.climb)
+    sink = -math.degrees(performance.idle.climb)
     return [
         f"The model weighs {aircraft.mass * GRAVITY:.1f} N, flies level at {aircraft.airspeed:g} m/s with"
         f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",

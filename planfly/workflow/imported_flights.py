@@ -490,10 +490,8 @@ def _refly_followed_legs(
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
     if draw is not None:
         wind = scenario.wind
-        north, east = (
-            -wind.speed * math.cos(wind.from_course) + draw.wind[0],
-            -wind.speed * math.sin(wind.from_course) + draw.wind[1],
-        )
+        north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]
+        east = -wind.speed * math.sin(wind.from_course) + draw.wind[1]
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
     model, battery = find_aircraft_and_energy(scenario)
     limits = setup.limits

@@ -59,11 +59,9 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     """
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
         return _open_plan(source, options, program)
-    fences, named_world, terrain = (
-        read_named_fences(options.get("fence") or ()),
-        options.get("scenario"),
-        _terrain_option(options),
-    )
+    fences = read_named_fences(options.get("fence") or ())
+    named_world = options.get("scenario")
+    terrain = _terrain_option(options)
     mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
         scenario = load_scenario_with_options(named_world, options, program)
@@ -95,21 +93,18 @@ def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
     """Make the setup of a plan in its own scenario, or of its mission in a named scenario."""
-    fences, named_world, terrain = (
-        read_named_fences(options.get("fence") or ()),
-        options.get("scenario"),
-        _terrain_option(options),
-    )
+    fences = read_named_fences(options.get("fence") or ())
+    named_world = options.get("scenario")
+    terrain = _terrain_option(options)
     if not isinstance(source, Plan):
-        plan, file = read_plan(check_mission_exists(Path(source)), terrain=terrain), str(source)
+        plan = read_plan(check_mission_exists(Path(source)), terrain=terrain)
+        file = str(source)
     else:
         plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
     scenario = fences.add_to_scenario(apply_options(plan.scenario, options, program))
     airframe, seed = load_airframe(scenario), options.get("seed")
-    mission, chosen_seed = (
-        fences.add_to_mission(mission_of_plan(plan, airframe, file)),
-        plan.seed if seed is None else seed,
-    )
+    mission = fences.add_to_mission(mission_of_plan(plan, airframe, file))
+    chosen_seed = plan.seed if seed is None else seed
     if named_world is None:
         return make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
     # The plan's waypoints are in the map coordinates of its own scenario.  Therefore its mission items are flown in

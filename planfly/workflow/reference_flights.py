@@ -76,6 +76,7 @@ def find_passing_parameter(
         current = values[name]
 
         def with_value(value: float, name: str = name) -> bool:
+            """Return True if the flight passes with this value of the parameter."""
             return passes(autopilot.with_parameters(**{name: value}))
 
         # Do not suggest values below the documented range.
@@ -169,6 +170,7 @@ def find_deciding_parameter(
     same_setup = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(autopilot: Autopilot) -> bool:
+        """Return True if the flight passes, with margin, with the parameters of an autopilot."""
         trial_verdict = Trial(replace(same_setup, autopilot=autopilot), aircraft, should_abort).flight_verdict
         return trial_verdict.flies and passes_with_margin(trial_verdict.findings, findings)
 

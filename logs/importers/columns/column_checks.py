@@ -322,7 +322,8 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
     durations = time[lasts] - time[firsts]
     limit = max(_FROZEN_S, _FROZEN_RUNS * float(np.quantile(durations, 0.95))) if len(durations) > 1 else _FROZEN_S
     for k in np.flatnonzero(durations > limit).tolist():
-        start, end = float(time[firsts[k]]), float(time[min(lasts[k] + 1, len(time) - 1)])
+        start = float(time[firsts[k]])
+        end = float(time[min(lasts[k] + 1, len(time) - 1)])
         flight_time = np.count_nonzero((grid > start) & (grid < end)) * _STEP_S
         if flight_time > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
             hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"

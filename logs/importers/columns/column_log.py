@@ -457,7 +457,8 @@ class ColumnLog:
         value changes more often than the stated rate.
         """
         changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
-        rate, stated_rate = changes.sum() / max(1e-9, float(np.ptp(time))), entry.rate or 0.0
+        rate = changes.sum() / max(1e-9, float(np.ptp(time)))
+        stated_rate = entry.rate or 0.0
         if rate > _MAX_RATE_RATIO * stated_rate:
             allowed = f"it changes {rate:.3g} times a second"
             raise self._error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)

@@ -107,7 +107,8 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
     if requirements.setup.autopilot.loiters.steers_to_center:
-        arcs, tightest = requirements.setup.route.arc_radii[ends], requirements.min_radius[ends]
+        arcs = requirements.setup.route.arc_radii[ends]
+        tightest = requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
         loiter_radius = float(arcs.max())
@@ -267,10 +268,8 @@ def step_height(requirements: RouteRequirements, leg: int) -> float | None:
     max_step = float(height_changes[leg])
     for first in range(leg, max(-1, leg - KINK_WAYPOINT_COUNT), -1):
         for last in range(leg, min(requirements.legs, leg + KINK_WAYPOINT_COUNT)):
-            height_change, distance = (
-                float(height_changes[first : last + 1].sum()),
-                float(requirements.runs[first : last + 1].sum()),
-            )
+            height_change = float(height_changes[first : last + 1].sum())
+            distance = float(requirements.runs[first : last + 1].sum())
             if math.atan2(height_change, distance) > limit + PLAN_TOLERANCE_RAD:
                 max_step = max(max_step, height_change)
     return max_step if max_step <= NEGLIGIBLE_STEP_M else None

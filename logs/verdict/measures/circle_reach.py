@@ -58,7 +58,8 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     setup, rules = requirements.setup, requirements.setup.autopilot.loiters
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
         return None
-    altitude, speed = float(requirements.points[-1, 2]), float(requirements.route.leg_airspeeds[-1])
+    altitude = float(requirements.points[-1, 2])
+    speed = float(requirements.route.leg_airspeeds[-1])
     min_radius = max(
         requirements.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
     )

@@ -32,10 +32,8 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
         requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
     )
     for leg, duration in enumerate(leg_durations):
-        speed, altitude = (
-            float(route.leg_airspeeds[leg]),
-            float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
-        )
+        speed = float(route.leg_airspeeds[leg])
+        altitude = float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2]))
         power = power_at(speed, altitude, air_climb_angle(requirements, leg, speed, altitude))
         energies.append(power * float(duration) / 3600.0)
         peak_power = max(peak_power, power) if math.isfinite(power) else math.nan

@@ -52,7 +52,8 @@ def track_path(track: Track) -> GroundPath:
 def straight_path(start: Sequence[float] | Floats, course: float, profile: Profile) -> GroundPath:
     """Return a path on one course (rad) from a start (east and north, m), with the altitudes of a profile."""
     distance, up = np.array(profile, dtype=np.float64).T
-    east, north = start[0] + distance * math.sin(course), start[1] + distance * math.cos(course)
+    east = start[0] + distance * math.sin(course)
+    north = start[1] + distance * math.cos(course)
     return GroundPath(np.stack([east, north, up], axis=1), distance)
 
 

@@ -107,7 +107,9 @@ def _find_outages(time: Floats, margin: Floats) -> tuple[Outage, ...]:
         first, last = float(margin[k]), float(margin[k + 1])
         if math.isnan(first) or math.isnan(last) or (first >= 0.0 and last >= 0.0):
             continue
-        duration, start, end = float(time[k + 1] - time[k]), float(time[k]), float(time[k + 1])
+        duration = float(time[k + 1] - time[k])
+        start = float(time[k])
+        end = float(time[k + 1])
         if first >= 0.0:
             start += duration * first / (first - last)
         elif last >= 0.0:

@@ -135,10 +135,8 @@ def _block_boxes(points: Floats) -> _Boxes:
         for axis in range(3):
             min_coordinate, max_coordinate = math.inf, -math.inf
             for row in range(first, last + 1):
-                min_coordinate, max_coordinate = (
-                    min(min_coordinate, points[row, axis]),
-                    max(max_coordinate, points[row, axis]),
-                )
+                min_coordinate = min(min_coordinate, points[row, axis])
+                max_coordinate = max(max_coordinate, points[row, axis])
             boxes.low[block, axis], boxes.high[block, axis] = min_coordinate, max_coordinate
             diagonal_square += (max_coordinate - min_coordinate) ** 2
         boxes.diagonal[block] = math.sqrt(diagonal_square)
@@ -151,7 +149,8 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
     min_square = 0.0
     max_square = 0.0
     for axis in range(3):
-        lower_offset, upper_offset = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
+        lower_offset = boxes.low[block, axis] - centre[axis]
+        upper_offset = centre[axis] - boxes.high[block, axis]
         outside_distance = max(0.0, lower_offset, upper_offset)
         min_square += outside_distance * outside_distance
         max_offset = max(abs(lower_offset), abs(upper_offset))
@@ -247,7 +246,8 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     """
     if not radius > 0.0 or len(position) < 2:
         return []
-    track, center = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
+    track = read_only(np.ascontiguousarray(position))
+    center = read_only(np.ascontiguousarray(centre))
     closest, entry_fraction, exit_fraction = _sphere_windows(track, center, float(radius))
     rows = np.flatnonzero(exit_fraction > entry_fraction)
     if not rows.size:
@@ -257,7 +257,8 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     first_indices = np.flatnonzero(np.append(True, start[1:] - end[:-1] > SPHERE_STAY_TOLERANCE_S))
     stays: list[Passage] = []
     for indices in np.split(np.arange(rows.size), first_indices[1:]):
-        closest_row, last = rows[indices[np.argmin(closest[rows[indices]])]], rows[indices[-1]]
+        closest_row = rows[indices[np.argmin(closest[rows[indices]])]]
+        last = rows[indices[-1]]
         is_whole = not (last == len(step) - 1 and exit_fraction[last] >= 1.0)
         values = (
             float(start[indices[0]]),

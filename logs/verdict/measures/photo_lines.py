@@ -261,7 +261,8 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
-    first_steps, end_steps = np.floor(edges[:-1]).astype(int)[in_both], np.ceil(edges[1:]).astype(int)[in_both]
+    first_steps = np.floor(edges[:-1]).astype(int)[in_both]
+    end_steps = np.ceil(edges[1:]).astype(int)[in_both]
     marks = np.zeros(count + 1, dtype=np.int64)
     np.add.at(marks, first_steps, 1)
     np.add.at(marks, end_steps, -1)
@@ -481,7 +482,8 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
         overlaps = _overlaps(spacing, camera.along, heights)
         lowest_index = int(np.argmin(overlaps))
         if measure.front is None or overlaps[lowest_index] < measure.front:
-            lowest_spacing, is_slow = float(spacing[lowest_index]), bool(spacing[lowest_index] > line.photo)
+            lowest_spacing = float(spacing[lowest_index])
+            is_slow = bool(spacing[lowest_index] > line.photo)
             measure = replace(
                 measure,
                 front=float(overlaps[lowest_index]),
@@ -538,7 +540,8 @@ def _with_side_overlap(
                     step_middles, (point_along[strip.is_usable] - min_along)[order], values[strip.is_usable][order]
                 )
                 this_line[row] = np.where(is_used, line_values, np.nan)
-        gaps, heights = np.abs(this_line[0] - previous_line[0]), 0.5 * (this_line[1] + previous_line[1])
+        gaps = np.abs(this_line[0] - previous_line[0])
+        heights = 0.5 * (this_line[1] + previous_line[1])
         previous_numbers = np.nan_to_num(previous_line[3], nan=number).astype(int)
         is_neighbor = (ranks[number] - ranks[previous_numbers] == 1) & (
             np.abs(offsets[number] - offsets[previous_numbers]) <= _MAX_NEIGHBOR_SPACINGS * survey.spacing

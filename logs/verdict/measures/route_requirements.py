@@ -76,10 +76,8 @@ class Airspace:
         [2]
         """
         boxes = self.records.zones
-        min_corner, max_corner = (
-            np.minimum(points[:-1], points[1:]) - _BOX_MARGIN_M,
-            np.maximum(points[:-1], points[1:]) + _BOX_MARGIN_M,
-        )
+        min_corner = np.minimum(points[:-1], points[1:]) - _BOX_MARGIN_M
+        max_corner = np.maximum(points[:-1], points[1:]) + _BOX_MARGIN_M
         east = (boxes["west"][:, None] <= max_corner[:, 0]) & (boxes["east"][:, None] >= min_corner[:, 0])
         north = (boxes["south"][:, None] <= max_corner[:, 1]) & (boxes["north"][:, None] >= min_corner[:, 1])
         return np.flatnonzero(~boxes["exclusion"] | (east & north).any(axis=1))
@@ -180,7 +178,8 @@ def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
         return ()
     points, courses, winds, time = route.positions, leg_courses(route.positions), [], 0.0
     for leg, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1).tolist()):
-        middle, airspeed = 0.5 * (points[leg] + points[leg + 1]), float(route.leg_airspeeds[leg])
+        middle = 0.5 * (points[leg] + points[leg + 1])
+        airspeed = float(route.leg_airspeeds[leg])
         wind = setup.scenario.local_wind(middle.tolist(), time + 0.5 * length / airspeed)
         components = wind.components_on_course(float(courses[leg]), float(middle[2]))
         speed = ground_speed(airspeed, *components)
@@ -557,6 +556,7 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
+    """Find the surveys of a setup's mission that are judged by their photo lines."""
     mode = setup.scenario.limits.surveys
     if setup.plan is not None or mode == "path":
         return ()
@@ -614,7 +614,8 @@ def _leg_limits(
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
-        table, course = performance(leg, float(route.leg_airspeeds[leg])), float(courses[leg])
+        table = performance(leg, float(route.leg_airspeeds[leg]))
+        course = float(courses[leg])
         altitudes = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
         speeds[leg] = min(ground_speed_on(table, course, altitude) for altitude in altitudes)
         if any(math.isnan(ground_speed_on(table, course, altitude)) for altitude in altitudes):
@@ -757,17 +758,17 @@ def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     i = leg + 1
     if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arc_radii[i] > 0.0:
         return None
-    turn_length, length = (
-        float(requirements.length_before[i]),
-        float(requirements.radius[i]) * abs(float(requirements.turns[i])),
-    )
+    turn_length = float(requirements.length_before[i])
+    length = float(requirements.radius[i]) * abs(float(requirements.turns[i]))
     if not 0.0 < turn_length < min(requirements.runs[leg : leg + 2]):
         return None
-    slope_before, slope_after = math.tan(requirements.slopes[leg]), math.tan(requirements.slopes[i])
+    slope_before = math.tan(requirements.slopes[leg])
+    slope_after = math.tan(requirements.slopes[i])
     tangent = arc_slope(slope_before, slope_after, turn_length, float(requirements.radius[i]))
     limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
-    limit, speed = float(np.tan(limits).mean()), float(requirements.route.leg_airspeeds[leg])
+    limit = float(np.tan(limits).mean())
+    speed = float(requirements.route.leg_airspeeds[leg])
     missing_height = (abs(tangent) - limit) * length
     return SteepArc(tangent, limit, missing_height) if GRAVITY * missing_height / speed > SPEED_TOLERANCE_MPS else None

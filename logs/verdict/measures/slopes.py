@@ -355,7 +355,8 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     acceleration = np.gradient(velocity, track.time[rows], axis=0)
     climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_measured]
-    commanded_speed, altitude = float(requirements.route.leg_airspeeds[leg]), track.position[rows, 2][is_measured]
+    commanded_speed = float(requirements.route.leg_airspeeds[leg])
+    altitude = track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
     fit = _fit_plane_at_origin(
@@ -401,7 +402,8 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
     """Return the airspeed calculated with the mean wind instead of the gusty wind, m/s."""
     track = aligned.track
     mean_wind = requirements.setup.scenario.wind_velocities(track.position[rows], track.time[rows])
-    east, north = track.velocity[rows, 0] - mean_wind[:, 0], track.velocity[rows, 1] - mean_wind[:, 1]
+    east = track.velocity[rows, 0] - mean_wind[:, 0]
+    north = track.velocity[rows, 1] - mean_wind[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 

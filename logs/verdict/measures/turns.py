@@ -220,7 +220,8 @@ def _course_change(
 
     The angles are in rad.  Return None, None, False if either leg was flown too little.
     """
-    course_before, course_after = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
+    course_before = leg_course(requirements, aligned, i - 1)
+    course_after = leg_course(requirements, aligned, i)
     if course_before is None or course_after is None:
         return None, None, False
     change = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))

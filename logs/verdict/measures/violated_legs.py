@@ -31,7 +31,8 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
         return tuple(range(int(facts["entry leg"]), int(facts["exit leg"]) + 1))
     if finding.rule == "bounds":
         (west, east), (south, north) = scenario.bounds.tolist()
-        min_corner, max_corner = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
+        min_corner = np.array([west, south, scenario.floor])
+        max_corner = np.array([east, north, scenario.ceiling])
         is_outside = np.asarray(
             ((path.points < min_corner - ROUNDING_M) | (path.points > max_corner + ROUNDING_M)).any(axis=1)
         )

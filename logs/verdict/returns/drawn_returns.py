@@ -182,25 +182,22 @@ def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltit
     min_offset = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
     is_safe = meets_return_limits(world, selected_starts)
     # Last safe and last unsafe offset from the flight's altitude, m.
-    last_safe_offset, last_unsafe_offset = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
+    last_safe_offset = np.where(is_safe, 0.0, math.nan)
+    last_unsafe_offset = np.where(is_safe, math.nan, 0.0)
     search_direction = np.where(is_safe, -1.0, 1.0)
     is_unfinished = np.isfinite(min_offset)
     for step in range(1, _MAX_STEPS + 1):
         offsets = np.maximum(search_direction * step * _STEP_M, min_offset)
         is_offset_safe = _are_safe_at_offset(world, selected_starts, offsets, is_unfinished)
-        last_safe_offset, last_unsafe_offset = (
-            np.where(is_unfinished & is_offset_safe, offsets, last_safe_offset),
-            np.where(is_unfinished & ~is_offset_safe, offsets, last_unsafe_offset),
-        )
+        last_safe_offset = np.where(is_unfinished & is_offset_safe, offsets, last_safe_offset)
+        last_unsafe_offset = np.where(is_unfinished & ~is_offset_safe, offsets, last_unsafe_offset)
         is_unfinished &= (is_offset_safe == is_safe) & (offsets > min_offset)
     for _ in range(_HALVING_COUNT):
         is_bracketed = np.isfinite(last_safe_offset) & np.isfinite(last_unsafe_offset)
         midpoints = np.where(is_bracketed, 0.5 * (last_safe_offset + last_unsafe_offset), 0.0)
         is_offset_safe = _are_safe_at_offset(world, selected_starts, midpoints, is_bracketed)
-        last_safe_offset, last_unsafe_offset = (
-            np.where(is_bracketed & is_offset_safe, midpoints, last_safe_offset),
-            np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe_offset),
-        )
+        last_safe_offset = np.where(is_bracketed & is_offset_safe, midpoints, last_safe_offset)
+        last_unsafe_offset = np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe_offset)
     return MinSafeAltitudes(
         selected_starts.time, np.where(np.isfinite(min_offset), selected_starts.rows["up"] + last_safe_offset, math.nan)
     )

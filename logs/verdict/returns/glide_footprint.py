@@ -105,7 +105,8 @@ class _CellBlocks(NamedTuple):
         end_cell = [math.ceil(min(count - 1.0, (limits[1] - origin) / grid.cell)) + 1 for limits, origin, count in axes]
         counts = [max(0, end_cell - start) for start, end_cell in zip(first_cell, end_cell, strict=True)]
         cells_per_side = max(1, math.ceil(max(counts) / _MAX_BLOCKS))
-        west, south = grid.west + (first_cell[1] - 0.5) * grid.cell, grid.south + (first_cell[0] - 0.5) * grid.cell
+        west = grid.west + (first_cell[1] - 0.5) * grid.cell
+        south = grid.south + (first_cell[0] - 0.5) * grid.cell
         return cls(
             west,
             south,

@@ -72,7 +72,8 @@ class GlideMap:
 
     def cell_at(self, east: float, north: float) -> tuple[int, int]:
         """Return the row and the column of the cell at a position (m); the cell may lie off the map."""
-        row, column = round((north - self.south) / self.cell), round((east - self.west) / self.cell)
+        row = round((north - self.south) / self.cell)
+        column = round((east - self.west) / self.cell)
         return row, column
 
     def cell_center(self, row: int, column: int) -> tuple[float, float]:
@@ -102,10 +103,12 @@ def glide_map(
     cell = max(_MIN_CELL_M, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
     if cell > max(_MAX_CELL_M, _MAX_CELL_PIXELS * spacing):
         return None
-    columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
+    columns = math.ceil((east - west) / cell) + 1
+    rows = math.ceil((north - south) / cell) + 1
     max_ground = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
     center_heights = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
-    sphere_bottoms, sphere_tops = np.full(max_ground.shape, math.inf), np.full(max_ground.shape, -math.inf)
+    sphere_bottoms = np.full(max_ground.shape, math.inf)
+    sphere_tops = np.full(max_ground.shape, -math.inf)
     result = GlideMap(west, south, cell, center_heights, max_ground + margin, sphere_bottoms, sphere_tops)
     for center, radius in zip(spheres, radii, strict=True):
         if radius > 0.0:
@@ -155,15 +158,11 @@ def landable_cells(grid: GlideMap) -> Flags:
     # Heights relative to their mean, so that the sums of their squares lose no digits.
     relative_heights = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
     unit_weights = np.ones(offsets.size)
-    height_sums, squared_height_sums = (
-        _square_sums(relative_heights, unit_weights, unit_weights),
-        _square_sums(relative_heights * relative_heights, unit_weights, unit_weights),
-    )
+    height_sums = _square_sums(relative_heights, unit_weights, unit_weights)
+    squared_height_sums = _square_sums(relative_heights * relative_heights, unit_weights, unit_weights)
     distances = np.asarray(offsets * grid.cell, dtype=np.float64)
-    east_moments, north_moments = (
-        _square_sums(relative_heights, unit_weights, distances),
-        _square_sums(relative_heights, distances, unit_weights),
-    )
+    east_moments = _square_sums(relative_heights, unit_weights, distances)
+    north_moments = _square_sums(relative_heights, distances, unit_weights)
     offset_moment = offsets.size * float((offsets**2).sum()) * grid.cell**2
     residuals = squared_height_sums - height_sums**2 / count - (east_moments**2 + north_moments**2) / offset_moment
     is_flat = np.hypot(east_moments, north_moments) / offset_moment <= MAX_LANDING_GRADIENT
@@ -365,7 +364,8 @@ def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, ma
     is_on_map = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
     row, column = row[is_on_map], column[is_on_map]
     floor_altitudes = grid.floor[row, column]
-    sphere_bottoms, sphere_tops = grid.sphere_bottoms[row, column], grid.sphere_tops[row, column]
+    sphere_bottoms = grid.sphere_bottoms[row, column]
+    sphere_tops = grid.sphere_tops[row, column]
     min_altitude[row, column] = np.where(
         (sphere_bottoms < floor_altitudes) & (floor_altitudes < sphere_tops), sphere_tops, floor_altitudes
     )

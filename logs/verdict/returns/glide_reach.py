@@ -55,7 +55,8 @@ def remaining_glide_altitudes(
     The altitude is negative if the destination is out of reach, and -inf if no path leads to one.  The cell is a flat
     index into the map, row by row, as in `logs.verdict.returns.glide_map.GlideAltitudes`; -1 without a path.
     """
-    altitude_left, reached_cells = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
+    altitude_left = np.full(len(starts), -math.inf)
+    reached_cells = np.full(len(starts), -1, dtype=np.int32)
     grid = glide_altitudes.grid
     glider: Record = np.zeros(1, _GLIDER)[0]
     glider.airspeed, glider.bank = airspeed, bank
@@ -178,15 +179,14 @@ def _wind_at_start(start: Record, aircraft: Record, field: Floats) -> tuple[floa
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
     """Return True if the aircraft is on the map, above the cell's minimum altitude, and outside every kill sphere."""
-    i, j = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
+    i = round((state.north - glider.south) / glider.cell)
+    j = round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
         return False
     for m in range(spheres.shape[0]):
-        east_offset, north_offset, up_offset = (
-            state.east - spheres[m, 0],
-            state.north - spheres[m, 1],
-            state.up - spheres[m, 2],
-        )
+        east_offset = state.east - spheres[m, 0]
+        north_offset = state.north - spheres[m, 1]
+        up_offset = state.up - spheres[m, 2]
         if east_offset * east_offset + north_offset * north_offset + up_offset * up_offset < radii[m] * radii[m]:
             return False
     return True
@@ -201,7 +201,8 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 
     slope: height lost per meter on the way to a cell's center.
     """
-    row, column = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
+    row = round((state.north - glider.south) / glider.cell)
+    column = round((state.east - glider.west) / glider.cell)
     best_altitude_left, best_row, best_column = -math.inf, row, column
     for i in range(max(0, row - 1), min(min_altitude.shape[0], row + 2)):
         for j in range(max(0, column - 1), min(min_altitude.shape[1], column + 2)):

@@ -897,7 +897,8 @@ def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
     """Return True if a JSBSim flight can begin at a start: the bank is small, and the airspeed is high enough."""
     place = [float(row[name]) for name in ("east", "north", "up")]
     wind_east, wind_north = world.scenario.wind_velocity(place, float(row["time"]))
-    east, north = float(row["velocity_east"]) - wind_east, float(row["velocity_north"]) - wind_north
+    east = float(row["velocity_east"]) - wind_east
+    north = float(row["velocity_north"]) - wind_north
     airspeed = math.hypot(east, north, float(row["velocity_up"]))
     return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.first_airspeed)
 

@@ -158,10 +158,8 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
     course_change = fraction * move["length"] * move["curvature"]
     course_east, course_north = move["course_east"], move["course_north"]
     speed = move["length"] / np.maximum(1e-9, move["lasts"])
-    east, north = (
-        course_east * np.cos(course_change) + course_north * np.sin(course_change),
-        course_north * np.cos(course_change) - course_east * np.sin(course_change),
-    )
+    east = course_east * np.cos(course_change) + course_north * np.sin(course_change)
+    north = course_north * np.cos(course_change) - course_east * np.sin(course_change)
     climb_rate = (move["climb"] + 2.0 * move["bend"] * fraction) / np.maximum(1e-9, move["lasts"])
     velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
@@ -206,7 +204,8 @@ def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[
     move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
     move = moves[move_numbers]
     fraction = np.clip((times - move["time"]) / np.maximum(1e-9, move["lasts"]), 0.0, 1.0)
-    distance, course_change = fraction * move["length"], fraction * move["length"] * move["curvature"]
+    distance = fraction * move["length"]
+    course_change = fraction * move["length"] * move["curvature"]
     is_curved = move["curvature"] != 0.0
     curvature = np.where(is_curved, move["curvature"], 1.0)
     ahead = np.where(is_curved, np.sin(course_change) / curvature, distance)
@@ -234,10 +233,12 @@ def flown_end(track: Track) -> ReturnStarts:
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     """Return the end of the planned path as the start of a return, in straight flight, with the predicted energy."""
-    course, slope = float(requirements.courses[-1]), math.tan(float(requirements.slopes[-1]))
+    course = float(requirements.courses[-1])
+    slope = math.tan(float(requirements.slopes[-1]))
     speed = float(_ground_speeds(requirements.setup)[-1])
     velocity = speed * np.array([[math.sin(course), math.cos(course), slope]])
-    time, energy = requirements.path.times[-1:], np.array([predicted_energy(requirements)[0]])
+    time = requirements.path.times[-1:]
+    energy = np.array([predicted_energy(requirements)[0]])
     records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
     return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_), np.zeros(1))
 

@@ -312,7 +312,8 @@ def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
         return "the energy used before is unknown"
     if ret.energy_left < 0.0:
         return f"ends with an empty battery, as {quantity_text(ret.energy_used, 'Wh')} are used before it"
-    left_text, reserve_text = quantity_text(ret.energy_left, "Wh"), quantity_text(returns.reserve, "Wh")
+    left_text = quantity_text(ret.energy_left, "Wh")
+    reserve_text = quantity_text(returns.reserve, "Wh")
     uncertain_text = ", but the power is uncertain" if ret.kind == "power" else ""
     return f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
 

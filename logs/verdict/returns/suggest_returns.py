@@ -486,7 +486,8 @@ class _RallySearch:
             )
             for row, candidate in zip(rows[start_indices], candidate_indices.tolist(), strict=True)
         ]
-        starts, limits = self._starts.subset(start_indices), self._limits.subset(start_indices)
+        starts = self._starts.subset(start_indices)
+        limits = self._limits.subset(start_indices)
         self._is_good[start_indices, candidate_indices] = _meets_criterion(
             self._world, starts, targets, limits, _meets_all_limits
         )

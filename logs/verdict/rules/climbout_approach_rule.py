@@ -129,10 +129,8 @@ def climbout_findings(
         launch = _find_launch(requirements)
         course = launch.course
     else:
-        course, distance = (
-            math.atan2(first_point[0] - start[0], first_point[1] - start[1]),
-            math.dist(first_point[:2], start),
-        )
+        course = math.atan2(first_point[0] - start[0], first_point[1] - start[1])
+        distance = math.dist(first_point[:2], start)
         if distance < SAME_POSITION_DISTANCE_M:
             return []
     if math.isnan(ground_altitude):
@@ -288,11 +286,9 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason, check, ok = f"the terrain below {subject} is unknown", "", None
     elif obstacles.is_clear:
-        reason, check, ok = (
-            f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air",
-            "",
-            True,
-        )
+        reason = f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air"
+        check = ""
+        ok = True
     else:
         fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)

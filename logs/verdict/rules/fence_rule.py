@@ -39,6 +39,7 @@ def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
     moves = planned_moves(route_requirements(setup, envelope=False))
 
     def is_entered(zone: Zone) -> bool:
+        """Return True if the planned path violates a zone by more than rounding."""
         return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING_M)
 
     return is_entered
@@ -101,7 +102,8 @@ def _compliance_finding(
     planned_visits, flown_visits: one record for each zone; see `zone_visits`.
     """
     airspace, corridor = requirements.airspace, requirements.setup.corridor
-    count, visits = len(airspace.zones), planned_visits if flown_visits is None else flown_visits
+    count = len(airspace.zones)
+    visits = planned_visits if flown_visits is None else flown_visits
     nearest_zone = int(visits["depth"].argmax())
     margin = -float(visits[nearest_zone].depth)
     reason = f"none of {count} zones is violated" if count > 1 else "the zone is not violated"

@@ -199,10 +199,8 @@ def _find_landing(
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
     climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
     destinations = _go_around_destinations(requirements, waypoint)
-    ground_altitude, terrain_altitude = (
-        setup.route.landing_ground,
-        float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
-    )
+    ground_altitude = setup.route.landing_ground
+    terrain_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
     if (
         climb_height is None
         or ground_altitude is None

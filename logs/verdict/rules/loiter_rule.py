@@ -281,10 +281,8 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possib
     loiter = None if item is None else stated_loiter(item)
     if loiter is None or not loiter.endless:
         return min_radius
-    altitude, airspeed = (
-        float(requirements.points[circle.first, 2]),
-        float(requirements.route.leg_airspeeds[circle.first - 1]),
-    )
+    altitude = float(requirements.points[circle.first, 2])
+    airspeed = float(requirements.route.leg_airspeeds[circle.first - 1])
     bank_ratio = math.tan(requirements.limits.max_bank) / math.tan(requirements.possible_bank) if possible else 1.0
     # Two half laps cover all courses.
     return max(
@@ -341,7 +339,8 @@ def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, cir
     """
     seq = int(requirements.setup.route.items[circle.first])
     loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
-    is_to_altitude, laps = loiter is not None and loiter.to_altitude, _flown_laps(requirements, aligned, circle)
+    is_to_altitude = loiter is not None and loiter.to_altitude
+    laps = _flown_laps(requirements, aligned, circle)
     return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)
 
 
@@ -407,7 +406,8 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
-    speed, bank_text = float(requirements.route.leg_airspeeds[circle.first]), bank_limit_text(requirements.setup)
+    speed = float(requirements.route.leg_airspeeds[circle.first])
+    bank_text = bank_limit_text(requirements.setup)
     need_text = f"at {speed:.0f} m/s and {bank_text} the aircraft needs {min_radius:.0f} m"
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"

@@ -164,7 +164,8 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     ok = False if False in results else None if None in results else True
     # Failures come first, then unknown answers.
     answers.sort(key=lambda answer: (answer.ok is not False, answer.ok is not None))
-    reason, method = "; ".join(answer.reason for answer in answers), "; ".join(answer.method for answer in answers)
+    reason = "; ".join(answer.reason for answer in answers)
+    method = "; ".join(answer.method for answer in answers)
     method = f"one return every {interval:.0f} s of the route, {method}"
     # An unknown answer to a requirement leaves the verdict undecided.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")

@@ -346,10 +346,8 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
     speed, envelope = float(requirements.route.leg_airspeeds[leg]), requirements.setup.envelope
     for altitude in requirements.points[leg : leg + 2, 2].tolist():
         wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
-        slopes_in_wind, slopes_in_calm_air = (
-            envelope.slope_limits(speed, altitude, *wind),
-            envelope.slope_limits(speed, altitude),
-        )
+        slopes_in_wind = envelope.slope_limits(speed, altitude, *wind)
+        slopes_in_calm_air = envelope.slope_limits(speed, altitude)
         if np.isfinite(slopes_in_calm_air).all() and np.isnan(slopes_in_wind).any():
             tailwind, crosswind = wind
             progress = max(0.0, math.sqrt(max(0.0, speed**2 - crosswind**2)) + tailwind)
@@ -535,7 +533,8 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
     stated_names = {} if parameters is None else parameters.by_origin("file")
     if not rate_limit.name or (setup.source is not None and rate_limit.name.split(" ")[0] not in stated_names):
         return math.inf, ""
-    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    speed = float(requirements.route.leg_airspeeds[leg])
+    altitude = float(requirements.points[leg : leg + 2, 2].mean())
     wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     slope = ground_slope(math.asin(min(1.0, rate_limit.rate / speed)), speed, *wind)
     return (math.inf if math.isnan(slope) else slope), rate_limit.name
@@ -552,7 +551,8 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
         or -sign * measure.height_error <= _height_error_limit(measure)
     ):
         return []
-    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    speed = float(requirements.route.leg_airspeeds[leg])
+    altitude = float(requirements.points[leg : leg + 2, 2].mean())
     speeds = requirements.setup.autopilot.speeds
     rate = (speeds.climb_limit if sign > 0.0 else speeds.sink_limit).rate
     calm_slope = math.asin(min(1.0, rate / speed))

@@ -169,7 +169,8 @@ def _find_held_speed(
         return None
     middle_row = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
     speed = float(aligned.track.airspeed[middle_row : rows.stop].astype(np.float64).mean())
-    error, allowed_error = speed - commanded, max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
+    error = speed - commanded
+    allowed_error = max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
     tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[middle_row]))
     if abs(error) <= allowed_error + tolerance or _is_caused_by_vertical_wind(requirements, aligned, leg, error):
         return None
@@ -267,10 +268,8 @@ def _level_speed_range(
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(altitude) for altitude in altitudes]
     # If level flight is impossible at one altitude, NaN remains for the whole leg.
-    min_speed, max_speed = (
-        float(np.max([lower for lower, _ in speeds])),
-        float(np.min([upper for _, upper in speeds])),
-    )
+    min_speed = float(np.max([lower for lower, _ in speeds]))
+    max_speed = float(np.min([upper for _, upper in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
         number = requirements.leg(leg).number

@@ -63,10 +63,8 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():
-            bank, stall_speed = (
-                planned_bank(requirements, corner, speed),
-                min_level_airspeed(requirements, float(requirements.points[corner, 2])),
-            )
+            bank = planned_bank(requirements, corner, speed)
+            stall_speed = min_level_airspeed(requirements, float(requirements.points[corner, 2]))
             margin = _Margin(speed, stall_speed / math.sqrt(math.cos(bank)), stall_speed, bank)
             if (
                 bank > 0.0
@@ -86,7 +84,9 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
     On an arc of radius R, the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A short turn ends
     before the aircraft has rolled in completely: it needs only the bank reached by then.
     """
-    turn, radius, limit = abs(float(requirements.turns[i])), float(requirements.radius[i]), requirements.limits.max_bank
+    turn = abs(float(requirements.turns[i]))
+    radius = float(requirements.radius[i])
+    limit = requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
     # The bank limit's radius belongs to the ground speed of the faster leg.
@@ -110,7 +110,8 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
     """Judge the smallest margin above the stall in a flight; return [] if the margin is never known."""
     track = aligned.track
     width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
-    speed, load = _window_means(track.airspeed, width), _window_means(track.load_factor, width)
+    speed = _window_means(track.airspeed, width)
+    load = _window_means(track.load_factor, width)
     bank = _window_means(np.abs(track.attitude[:, ROLL]), width)
     altitude = _window_means(track.position[:, 2], width)
     envelope = requirements.setup.envelope

@@ -150,7 +150,8 @@ def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Surv
         catch_up_length = _off_altitude_length(requirements, first, last, requirements.legs, CLEARANCE_TOLERANCE_M)
         if not is_tight and not catch_up_length:
             continue
-        points, radii = requirements.points[first : last + 1], requirements.min_radius[first : last + 1]
+        points = requirements.points[first : last + 1]
+        radii = requirements.min_radius[first : last + 1]
         center = points[:, :2].mean(axis=0)
         radius = float(radii[np.isfinite(radii)].max(initial=0.0))
         reach = float(np.hypot(*(points[:, :2] - center).T).max()) + TURN_AROUND_RADII * radius + catch_up_length
@@ -185,11 +186,9 @@ def _off_altitude_length(requirements: RouteRequirements, first: int, last: int,
     """
     altitude, length = float(requirements.points[first, 2]), 0.0
     for leg in range(first, end):
-        start, target, run = (
-            float(requirements.points[leg, 2]),
-            float(requirements.points[leg + 1, 2]),
-            requirements.runs[leg],
-        )
+        start = float(requirements.points[leg, 2])
+        target = float(requirements.points[leg + 1, 2])
+        run = requirements.runs[leg]
         climb, dive = (
             run * math.tan(min(max(limit, 0.0), _MAX_SLOPE_RAD)) for limit in slope_limits(requirements, leg)
         )

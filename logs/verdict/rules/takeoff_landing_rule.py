@@ -110,10 +110,8 @@ def landing_findings(
         route = requirements.setup.route
         if route.rtl_start is not None:
             reason = RTL_NOT_CONTINUED_TEXT
-        end_waypoint, is_return_continued = (
-            requirements.waypoint(requirements.legs),
-            RTL_NOT_CONTINUED_TEXT in " ".join(route.notes),
-        )
+        end_waypoint = requirements.waypoint(requirements.legs)
+        is_return_continued = RTL_NOT_CONTINUED_TEXT in " ".join(route.notes)
         if route.rtl_start is not None and not is_return_continued:
             # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end_waypoint, ok=None, reason=reason, unit="deg")]

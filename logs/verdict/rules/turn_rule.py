@@ -160,7 +160,8 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 
     turn: course change, rad.
     """
-    radius, acceptance = float(requirements.radius[i]), float(requirements.setup.route.points["acceptance_radius"][i])
+    radius = float(requirements.radius[i])
+    acceptance = float(requirements.setup.route.points["acceptance_radius"][i])
     if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
         return []
     offset = fly_by_offset(turn, radius)
@@ -183,7 +184,8 @@ def _sharp_turn_message(
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
         return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
-    speed, bank_text = float(max(requirements.route.leg_airspeeds[i - 1 : i + 1])), bank_limit_text(requirements.setup)
+    speed = float(max(requirements.route.leg_airspeeds[i - 1 : i + 1]))
+    bank_text = bank_limit_text(requirements.setup)
     radius = float(requirements.radius[i])
     if not math.isfinite(radius):
         return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")

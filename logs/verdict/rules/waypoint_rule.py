@@ -37,14 +37,16 @@ def waypoint_findings(
 
 def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
-    condition, offset = acceptance_condition(requirements, i), float(requirements.fly_by_offset[i])
+    condition = acceptance_condition(requirements, i)
+    offset = float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
     elif not requirements.setup.autopilot.turns.follows_path:
         fact = _turn_text(requirements, i, condition)
     elif offset > condition.radius + ROUNDING_M:
-        turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
+        turn = math.degrees(abs(float(requirements.turns[i])))
+        radius = float(requirements.radius[i])
         faults.append(
             message(
                 f"the arc of the {turn:.0f}° corner passes the waypoint {offset:.0f} m away",

@@ -144,7 +144,8 @@ class Instruments:
     def _control_lines(self, k: int, bar_width: int) -> list[str]:
         """Return one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
-        controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
+        controls = self.log.track.controls[k].tolist()
+        commands = self.log.track.commands[k].tolist()
         for (name, limit), deflection, command in zip(self.limits, controls, commands, strict=True):
             is_throttle = name == "throttle"
             max_value = limit if math.isfinite(limit) else math.radians(30.0)

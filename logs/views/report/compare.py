@@ -123,7 +123,8 @@ def _judge_log(log: FlightLog) -> Verdict:
 def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     """Measure a flight; return its values by (name, unit), NaN if unknown."""
     has_position = np.isfinite(track.position).all(axis=1)
-    position, time = np.ascontiguousarray(track.position[has_position]), np.ascontiguousarray(track.time[has_position])
+    position = np.ascontiguousarray(track.position[has_position])
+    time = np.ascontiguousarray(track.time[has_position])
     roll, _, _ = track.attitude.T
     values = {
         ("time in the air", "s"): float(track.time[-1] - track.time[0]),
@@ -228,7 +229,8 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
     array([5., 1.])
     """
     block_starts = np.arange(0, len(track), _BLOCK_POINTS)
-    block_min, block_max = np.minimum.reduceat(track, block_starts), np.maximum.reduceat(track, block_starts)
+    block_min = np.minimum.reduceat(track, block_starts)
+    block_max = np.maximum.reduceat(track, block_starts)
     parts = np.array_split(track, block_starts[1:])
     results = []
     for first in range(0, len(points), _BLOCK_POINTS):

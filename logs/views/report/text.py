@@ -328,7 +328,9 @@ def _rule_row(rule: RuleFindings) -> RuleRow:
     )
     if judged_count < len(rule.findings):
         parts.append(f"{len(rule.findings) - judged_count} not judged")
-    sign, rule_name, counts = f"{_SIGNS[state]} {_WORDS[state]}", rule.words.word, ", ".join(parts)
+    sign = f"{_SIGNS[state]} {_WORDS[state]}"
+    rule_name = rule.words.word
+    counts = ", ".join(parts)
     if rule.closest is None:
         reason = "" if judged_count else rule.findings[0].reason
         return RuleRow(state, sign, rule_name, counts, reason, NOTHING, NOTHING, NOTHING, NOTHING, "")

@@ -415,7 +415,9 @@ class _Posterior:
 
     def log_density(self, points: Floats) -> Floats:
         """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,)."""
-        beta, deviations, has_failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
+        beta = self.coefficients(points)
+        deviations = points - self._prior_mean
+        has_failed = self._outcomes.failed
         predictor = self._terms @ beta.T
         predictor_without_margin = (
             self._outcomes.terms @ beta[:, : self.size].T if self.margin_coefficient else predictor
@@ -423,10 +425,8 @@ class _Posterior:
         # Points with a larger predictor are practically impossible; their logarithm is so large that the other terms
         # would be lost to rounding.
         is_possible = (predictor_without_margin[~has_failed] < _MAX_PREDICTOR).all(axis=0)
-        predictor, predictor_without_margin = (
-            np.where(is_possible, predictor, 0.0),
-            np.where(is_possible, predictor_without_margin, 0.0),
-        )
+        predictor = np.where(is_possible, predictor, 0.0)
+        predictor_without_margin = np.where(is_possible, predictor_without_margin, 0.0)
         log_densities: Floats = -0.5 * (deviations * deviations) @ self._precision
         log_densities += self._link.log_cdf(predictor[has_failed]).sum(axis=0)
         log_densities += self._link.log_survival(predictor[~has_failed & ~self._marginal_passes]).sum(axis=0)
@@ -454,6 +454,7 @@ class _Posterior:
         mean[0] += best_known_wind * np.exp(mode[1])
 
         def constants(points: Floats) -> Floats:
+            """Convert the predictor at the best-known wind, the first coordinate of points, to the constant."""
             changed_points = points.copy()
             changed_points[:, 0] -= best_known_wind * self.coefficients(points)[:, 1]
             return changed_points
@@ -473,10 +474,8 @@ class _Posterior:
         first, second = self._link.derivatives(predictor, self._outcomes.failed)
         if self.margin_coefficient:
             marginal_first, marginal_second = self._link.density_derivatives(predictor)
-            first, second = (
-                np.where(self._marginal_passes, marginal_first, first),
-                np.where(self._marginal_passes, marginal_second, second),
-            )
+            first = np.where(self._marginal_passes, marginal_first, first)
+            second = np.where(self._marginal_passes, marginal_second, second)
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
             terms_without_margin = self._outcomes.terms
@@ -508,6 +507,7 @@ def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
     size = posterior.size
 
     def loss(point: Floats) -> float:
+        """Return the negative log-density of the posterior at a point."""
         return -float(posterior.log_density(point[None])[0])
 
     value = loss(point)

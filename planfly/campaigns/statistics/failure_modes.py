@@ -162,7 +162,8 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
     joint_fit = fit_regression(outcomes, link)
     if not outcomes.marginal.any():
         return _make_mode(link, joint_fit, joint_fit.log_evidence)
-    failure_fit, passed_outcomes = fit_regression(outcomes.as_pass_or_fail(), link), outcomes.margins_given_pass()
+    failure_fit = fit_regression(outcomes.as_pass_or_fail(), link)
+    passed_outcomes = outcomes.margins_given_pass()
     # The separate distribution of the margins may have either link.
     separate_evidence = failure_fit.log_evidence + max(
         fit_regression(passed_outcomes, margin_link, joint_fit).log_evidence for margin_link in LINKS
@@ -269,6 +270,7 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
     ]
 
     def exceeds_fraction(speed: float) -> bool:
+        """Return True if at least the failing fraction is expected to fail in a wind, m/s."""
         success: Floats = np.ones(len(draws))
         for link, predictor, wind_slope in mode_predictors:
             success *= link.survival(predictor + wind_slope * (speed - WIND_ORIGIN_MPS))

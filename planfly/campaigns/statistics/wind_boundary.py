@@ -100,7 +100,8 @@ def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fracti
     while (upper - lower).max() > _BRACKET_WIDTH_MPS:
         speed_between = 0.5 * (lower + upper)
         is_above = bracket_fractions.logarithms(speed_between) > np.log(failing_fraction)
-        lower, upper = np.where(is_above, lower, speed_between), np.where(is_above, speed_between, upper)
+        lower = np.where(is_above, lower, speed_between)
+        upper = np.where(is_above, speed_between, upper)
     speed: Floats = 0.5 * (lower + upper)
     previous_speed = speed - _BRACKET_WIDTH_MPS
     previous_error = all_fractions.logarithms(previous_speed) - np.log(failing_fraction)
@@ -385,7 +386,9 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
     Each flight is chosen as if the previous ones had been flown.
     """
-    fits, max_speed, flown_count = direction.fits(), direction.max_speed, len(direction.draws)
+    fits = direction.fits()
+    max_speed = direction.max_speed
+    flown_count = len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
         for failing_fraction in (_MIN_FAILING_FRACTION, _MAX_FAILING_FRACTION)
