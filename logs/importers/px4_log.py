@@ -88,8 +88,9 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     except MemoryError:
         raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
-        raise LogError(f"{path}: not a readable PX4 log: {_short_message(error)}", file=path) from error
-    return Topics(log, str(path), _damage_of(path))
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise LogError(f"{path}: not a readable PX4 log: {reason}", file=path) from error
+    return Topics(log, str(path), _file_damage(path))
 
 
 class _FormatCheckingFile:
@@ -149,7 +150,7 @@ def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) 
     return Damage(int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), cut)
 
 
-def _damage_of(path: Path) -> Damage:
+def _file_damage(path: Path) -> Damage:
     """Return the damage of a log file."""
     file = MappedFile(path)
     return find_damage(file.data, file.release_memory)
@@ -209,11 +210,6 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
         reading,
         cut,
     )
-
-
-def _short_message(error: Exception) -> str:
-    """Return the first 120 characters of an error's message in one line, or the name of its type."""
-    return " ".join(str(error).split())[:120] or type(error).__name__
 
 
 def _instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:

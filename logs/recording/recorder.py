@@ -325,7 +325,7 @@ class Recorder:
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
     """Yield the content of each chunk of a layout."""
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    # Convert to lists first: reading the fields chunk by chunk costs a microsecond each.
+    # Converting to lists first is faster than reading the fields chunk by chunk, which costs a microsecond each.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
     offsets = layout.channels["offset"].tolist()
     messages = layout.channels["messages"].tolist()

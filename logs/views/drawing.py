@@ -289,7 +289,7 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 def can_share_legend(panels: Sequence[Panel]) -> bool:
     """Return True if all panels can share a legend.
 
-    They can if each look has one meaning and each meaning one look in all panels, and some repeat.
+    This is the case if, in all panels, each look has one meaning and each meaning one look, and some looks repeat.
 
     >>> none = np.zeros(2)
     >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
@@ -485,7 +485,7 @@ def _area_look(look: theme.Look) -> dict[str, Any]:
 
 
 def _draw_area(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
-    """Draw all rings as one path, so that holes stay open."""
+    """Draw the rings of an area as one path, so that the holes of the area stay open."""
     points = np.column_stack([layer.x, layer.y])
     gaps = np.flatnonzero(np.isnan(layer.x))
     rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]

@@ -152,7 +152,7 @@ def open_campaign(
         raise MissionError(message, file=str(plan_file))
     if plan_file is not None and not has_plan_file:
         write_atomically(plan_file, plan_json(plan))
-    return _checked(_make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed)))
+    return _check_base(_make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed)))
 
 
 def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
@@ -165,12 +165,12 @@ def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignB
     scenario, airframe = setup.scenario, airframe_for_setup(setup)
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
     dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
-    return _checked(
+    return _check_base(
         CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
     )
 
 
-def _checked(base: CampaignBase) -> CampaignBase:
+def _check_base(base: CampaignBase) -> CampaignBase:
     """Check and return a base.
 
     Raises PlanflyError if the aircraft cannot fly at the medians of the dispersions, or if the mission has no valid

@@ -97,7 +97,7 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
     for path, table in zip((first, second), tables, strict=True):
         if not len(table["flight"]):
             raise StoreError(f"{path}: no flight of this campaign was flown", file=path)
-    campaigns = [_compared(*values) for values in zip((first, second), tables, settings, strict=True)]
+    campaigns = [_count_outcomes(*values) for values in zip((first, second), tables, settings, strict=True)]
     flyable = _paired_outcomes(*tables)
     only_first = int(np.count_nonzero(flyable[:, 0] & ~flyable[:, 1]))
     only_second = int(np.count_nonzero(flyable[:, 1] & ~flyable[:, 0]))
@@ -120,7 +120,7 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
     )
 
 
-def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> ComparedCampaign:
+def _count_outcomes(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> ComparedCampaign:
     """Count the outcomes of a campaign."""
     outcomes = table["outcome"].tolist()
     tally = Tally(*map(outcomes.count, OUTCOMES))

@@ -258,23 +258,29 @@ class BatteryResult:
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
         """Parts of a flight that decide the battery, the most frequent first."""
-        legs = Counter(row.return_leg if row.is_decided_by_return else -1 for row in self.completed)
-        times = {
-            leg: [row.return_time for row in self.completed if row.is_decided_by_return and row.return_leg == leg]
-            for leg in legs
-        }
-        return tuple(
-            BatteryDecision(count, leg, float(np.median(times[leg])) if leg >= 0 else math.nan)
-            for leg, count in legs.most_common()
-        )
+        # The mission, not a return, decides the flights under -1.
+        times_by_leg: dict[int, list[float]] = {}
+        for row in self.completed:
+            leg = row.return_leg if row.is_decided_by_return else -1
+            times_by_leg.setdefault(leg, []).append(row.return_time)
+        decisions = []
+        for leg, times in sorted(times_by_leg.items(), key=lambda entry: -len(entry[1])):
+            median_time = float(np.median(times)) if leg >= 0 else math.nan
+            decisions.append(BatteryDecision(len(times), leg, median_time))
+        return tuple(decisions)
 
     @property
     def leg_energies(self) -> Floats:
         """Median energy of each leg over the flights, Wh, (legs,)."""
         rows = [row.leg_energies for row in self.completed]
-        legs = max(map(len, rows), default=0)
-        padded = np.array([(*row, *[0.0] * (legs - len(row))) for row in rows]).reshape(len(rows), legs)
-        return np.median(padded, axis=0) if len(rows) else np.zeros(0)
+        if not rows:
+            return np.zeros(0)
+        leg_count = max(map(len, rows))
+        # A leg that a flight did not record took no energy.
+        energies = np.zeros((len(rows), leg_count))
+        for k, row in enumerate(rows):
+            energies[k, : len(row)] = row
+        return np.median(energies, axis=0)
 
 
 def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advance: Advance) -> BatteryResult:

@@ -411,12 +411,12 @@ class GroundRiskResult:
     @property
     def entered_zones(self) -> tuple[str, ...]:
         """Names of the scenario's zones whose area the operational volume meets, at any altitude."""
-        zones = (*self.base.scenario.zones,)
-        areas = (
-            shapely.union_all([shapely.Polygon(outline, holes) for outline, *holes in zone_parts(zone)])
-            for zone in zones
-        )
-        return tuple(zone.name for zone, area in zip(zones, areas, strict=True) if area.intersects(self.volume))
+        names = []
+        for zone in self.base.scenario.zones:
+            parts = [shapely.Polygon(outline, holes) for outline, *holes in zone_parts(zone)]
+            if shapely.union_all(parts).intersects(self.volume):
+                names.append(zone.name)
+        return tuple(names)
 
 
 def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers, advance: Advance) -> GroundRiskResult:

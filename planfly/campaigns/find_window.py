@@ -168,8 +168,12 @@ class WindowResult:
         """
         departures = self.departures if self.asked is None else (self.asked,)
         probability = self.goal.probability
-        opens = [self.is_open(one) if one.is_judged_in_full(probability) else None for one in departures]
-        return True if any(opens) else None if None in opens else False
+        results = [
+            self.is_open(departure) if departure.is_judged_in_full(probability) else None for departure in departures
+        ]
+        if any(results):
+            return True
+        return None if None in results else False
 
     @property
     def best(self) -> Departure | None:
@@ -236,7 +240,7 @@ def fly_departure(
     """Fly one flight of one departure.
 
     index: number of the departure times `flights`, plus the number of the flight.
-    wind: None.
+    wind: always None, because the forecast states the wind of a departure.
     scenarios: for each departure, its scenario in each member of the forecast.
     flights: number of flights of each departure.
     """

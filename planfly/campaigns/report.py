@@ -517,7 +517,7 @@ def _lost_lines(winds: WindsResult) -> list[str]:
 
 
 def _deciding_rules(winds: WindsResult) -> list[str]:
-    """Return the rule that fails most flights of each direction up to its boundary, or "" without failures."""
+    """Return, for each direction, the rule that fails the most flights up to its boundary; "" for none."""
     return [deciding_rule(by_rule) for by_rule in winds.failures] or [""] * len(winds.boundaries)
 
 

@@ -271,7 +271,7 @@ def _rank_rules(
                 lowest = None
             low_margin, unit = _margin_quantile(rule_margins), _margin_unit(store, rule)
             ranked.append(RankedRule(rule, failed_counts.get(rule, 0), lowest, low_margin, unit))
-    return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled(entry))))
+    return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled_margin(entry))))
 
 
 def _margin_unit(store: Store, rule: str) -> str:
@@ -283,7 +283,7 @@ def _margin_unit(store: Store, rule: str) -> str:
     return "" if words.margin is None else words.margin.unit
 
 
-def _scaled(entry: RankedRule) -> float:
+def _scaled_margin(entry: RankedRule) -> float:
     """Return a rule's smallest margin as a multiple of the rule's scale; inf if the margin is unknown."""
     scale = RULE_WORDS[entry.rule].scale
     return math.inf if entry.lowest is None or scale is None else entry.lowest / scale

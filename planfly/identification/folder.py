@@ -200,7 +200,7 @@ def _check_level_flight_at_cruise(identified: Identified, aircraft: Aircraft) ->
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, minimum and maximum airspeed by a log's parameters, as true airspeeds at `AMSL`.
+    """Return cruise, minimum and maximum airspeed from a log's parameters, as true airspeeds at `AMSL`.
 
     The unit is m/s.
 

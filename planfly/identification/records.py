@@ -412,8 +412,10 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
             rows |= (grid >= start) & (grid < end)
     for start, end in log.hovering:
         rows |= (grid >= start) & (grid < end)
-    for number, function in _servo_functions(log).items() if len(log.outputs.time) else ():
-        if function in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
+    if not len(log.outputs.time) or log.parameters.get("Q_ENABLE", 0.0) <= 0.0:
+        return rows
+    for number, function in _servo_functions(log).items():
+        if function in _LIFT_MOTORS:
             rows |= pulses[:, number - 1] > 1100.0
     return rows
 

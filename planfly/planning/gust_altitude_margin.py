@@ -274,7 +274,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard.
+    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard, if at all.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.

@@ -127,7 +127,7 @@ _compiled_units: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels that the ``with`` block needs when it first calls a kernel that is not cached.
+    """Compile all kernels of the ``with`` block as soon as it calls a kernel that is not cached.
 
     The kernels are compiled in two processes before the code continues; if the cache cannot be written, each kernel is
     compiled when it is called.

@@ -6,6 +6,7 @@ studio has written over it.  Options of the command line take precedence over th
 
 import hashlib
 import json
+import math
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -243,14 +244,18 @@ def mission_data(mission: Mission) -> Json:
     NaN becomes None.
     """
 
+    def none_if_nan(number: float) -> float | None:
+        """Return None for NaN, and any other number unchanged."""
+        return None if math.isnan(number) else number
+
     def item_data(item: MissionItem) -> list[Any]:
         """Return the fields of an item, with None for NaN."""
-        numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
-        return [item.seq, item.command, item.frame, *(None if v != v else v for v in numbers), item.autocontinue]
+        numbers = map(none_if_nan, (*item.params, item.lat_deg, item.lon_deg, item.alt))
+        return [item.seq, item.command, item.frame, *numbers, item.autocontinue]
 
     home = mission.home
     return {
-        "home": None if home is None else [home.lat_deg, home.lon_deg, None if home.alt != home.alt else home.alt],
+        "home": None if home is None else [home.lat_deg, home.lon_deg, none_if_nan(home.alt)],
         "items": [item_data(item) for item in mission.items],
     }
 

@@ -9,7 +9,6 @@ import pickle
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -160,7 +159,12 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
-    airframe, seed, stop = request.airframe, request.seed, partial(_stop_reason, time.monotonic() + seconds)
+    airframe, seed, deadline = request.airframe, request.seed, time.monotonic() + seconds
+
+    def stop() -> str:
+        """Return the reason to end the search after the deadline, and "" before it."""
+        return "budget" if time.monotonic() > deadline else ""
+
     # Between two items of a mission, the path must join the leg after the second.
     joins_next_leg = request.ends is not None
     if request.ways > 1:
@@ -171,11 +175,6 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     length = float(np.linalg.norm(np.diff(new_plan.waypoints, axis=0), axis=1).sum())
     clearance = least_height(make_problem(scenario, airframe.limits).certified, new_plan.waypoints)
     return [FrontPlan(new_plan, length, math.nan, clearance, math.nan, math.nan)]
-
-
-def _stop_reason(deadline: float) -> str:
-    """Return the reason to end a search after the deadline, or "" before it.  deadline: monotonic time, s."""
-    return "budget" if time.monotonic() > deadline else ""
 
 
 def with_ends(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:

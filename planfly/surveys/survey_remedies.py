@@ -106,9 +106,9 @@ def find_survey_remedies(
 ) -> TriedRemedies:
     """Find changes with which all photo lines of a survey can be used, by trial flights.
 
-    Of each kind of change, the smallest change that passes is returned.
+    For each kind of change, the smallest change that passes is returned.
 
-    If neither longer turn-around distances nor gates are enough, both are combined; if nothing else is enough, longer
+    If neither longer turn-around distances nor gates are enough, both are combined.  If nothing else is enough, longer
     turn-around distances are combined with another parameter value or a lower airspeed.  There are at most four flights
     for each of about six changes.
 

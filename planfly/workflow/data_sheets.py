@@ -516,8 +516,15 @@ def _parameter_lines(stated: StatedParameters, overridden: Sequence[str]) -> lis
 
     overridden: texts on the parameters that the data sheet overrides.
     """
-    used = [text for text in stated.texts.values() if not any(other.startswith(f"{text} (") for other in overridden)]
-    lines = [f"From the parameter file: {', '.join(used)}.", *_climb_lines(stated)] if used else []
+
+    def is_used(text: str) -> bool:
+        """Return True if the data sheet does not override a parameter."""
+        return not any(overridden_text.startswith(f"{text} (") for overridden_text in overridden)
+
+    used_texts = list(filter(is_used, stated.texts.values()))
+    lines = []
+    if used_texts:
+        lines = [f"From the parameter file: {', '.join(used_texts)}.", *_climb_lines(stated)]
     if overridden:
         lines.append(f"Not used of the parameter file, because the data sheet states it: {', '.join(overridden)}.")
     return ["", *lines] if lines else []

@@ -44,9 +44,9 @@ def make_plan(
 
     All commands use this function, so that they agree on which plan is safe.  A plan may take several searches, which
     share the scenario's budget of evaluations.  In gusts, the plan has few waypoints at which the autopilot may orbit
-    (`planfly.planning.gust_orbits`), and a margin in altitude (`planfly.planning.gust_altitude_margin`).  In a forecast,
-    slopes and turns also hold in the local wind (`planfly.planning.local_wind`).  Departure and approach are added.  If
-    the autopilot loiters at the end of the mission, the certificate names hazards that may be too close to the loiter.
+    (`planfly.planning.gust_orbits`), and a margin in altitude (`planfly.planning.gust_altitude_margin`).  Slopes and
+    turns also hold in the local wind of a forecast (`planfly.planning.local_wind`).  Departure and approach are added.
+    If the autopilot loiters at the end of the mission, the certificate names hazards that may be close to the loiter.
 
     stop: stop condition of `planner.search.plan_path.plan_path`.
     flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.

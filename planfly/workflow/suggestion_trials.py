@@ -99,7 +99,7 @@ def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
     return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
 
 
-def added_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
+def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
     """Return the findings that a change makes worse: they fail, or are no longer decided or judged.
 
     A finding that was not judged before, because the flight ended early, is left out.
@@ -117,7 +117,7 @@ def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[Rema
     They fail or are undecided after the change.  Before, they either were not judged because the flight ended early, or
     failed and are only undecided after the change.
     """
-    added_keys = set(map(finding_key, added_findings(old_verdict, new_verdict)))
+    added_keys = set(map(finding_key, worsened_findings(old_verdict, new_verdict)))
     return tuple(
         RemainingFinding(finding.rule, finding.place, finding.ok is False)
         for _, finding in _newly_open_findings(old_verdict, new_verdict)
@@ -127,7 +127,7 @@ def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[Rema
 
 def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
     """Return True if a finding does not fail after a change, and the change makes no other finding fail."""
-    has_new_failures = any(added.ok is False for added in added_findings(old_verdict, new_verdict))
+    has_new_failures = any(added.ok is False for added in worsened_findings(old_verdict, new_verdict))
     return not has_new_failures and finding_key(finding) not in map(finding_key, new_verdict.failed)
 
 
@@ -139,7 +139,7 @@ def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> b
     new_finding = _worst_findings(new_verdict).get(finding_key(finding))
     if new_finding is not None and (new_finding.ok is not True or _keeps_height_error(finding, new_finding)):
         return False
-    return not added_findings(old_verdict, new_verdict)
+    return not worsened_findings(old_verdict, new_verdict)
 
 
 def _keeps_height_error(old_finding: Finding, new_finding: Finding) -> bool:
@@ -188,19 +188,19 @@ def _smallest_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
     near = [
         suggestion
         for suggestion in suggestions
-        if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _moves_of(suggestion))
+        if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _item_moves(suggestion))
     ]
     return tuple(near or suggestions[:1])
 
 
-def _moves_of(suggestion: Suggestion) -> list[ItemMove]:
+def _item_moves(suggestion: Suggestion) -> list[ItemMove]:
     """Return the moves of items of a suggestion that passed its trial."""
     return [move for change in suggestion for move in change.moves]
 
 
 def _move_distance(suggestion: Suggestion) -> float:
     """Return the largest move of an item, m; 0 if the suggestion moves no item."""
-    return max((math.hypot(move.east, move.north, move.up) for move in _moves_of(suggestion)), default=0.0)
+    return max((math.hypot(move.east, move.north, move.up) for move in _item_moves(suggestion)), default=0.0)
 
 
 def judge_mission_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:

@@ -391,7 +391,7 @@ def _check_force(log: ColumnLog, force: float) -> None:
 
 
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError for an airspeed near zero in flight, or that contradicts ground velocity and heading.
+    """Raise LogError for an airspeed near zero in flight, or one that contradicts velocity and heading.
 
     If the flight has turns, a logged wind that contradicts the wind of the velocity triangle also raises LogError.
     """

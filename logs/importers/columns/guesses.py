@@ -202,7 +202,8 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
 
     Raises LogError for a file that cannot be read, and if no column was recognized.
     """
-    files = {_relative_path(path, target): read_data_file(path) for path in paths}
+    names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
+    files = {name: read_data_file(path) for name, path in zip(names, paths, strict=True)}
     times = [clock for file, data in files.items() for clock in _time_clocks(data, file)]
     clocks: list[_Clock] = []
     for clock in sorted(times, key=lambda clock: -clock.length):
@@ -226,11 +227,6 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
         names = ", ".join(list(next(iter(files.values())).columns)[:12])
         raise LogError(f"{paths[0]}: no column was recognized among {names}; write a table by hand", file=paths[0])
     return _table_text(guesses, alternatives, files)
-
-
-def _relative_path(path: Path, target: Path) -> str:
-    """Return a path relative to the folder of the table, with forward slashes."""
-    return Path(os.path.relpath(path, target.parent)).as_posix()
 
 
 def _plain_name(name: str) -> str:

@@ -383,15 +383,18 @@ class ReturnWorld:
     def unjudged_parts(self) -> tuple[str, ...]:
         """Parts of the returns that cannot be judged, as in `Returns`."""
         behaviour = self.autopilot.returns
-        unsimulated_text = behaviour.unsimulated_text(self.mission)
+        parts = []
+        if unsimulated_text := behaviour.unsimulated_text(self.mission):
+            parts.append(unsimulated_text)
+        if self.has_other_law:
+            parts.append("law")
+        if any(cause.action == "autoland" for cause in self.causes):
+            parts.append("autoland")
+        parts += behaviour.unjudged_texts(self.mission)
         begins_with_landing = any(landing.is_landing for landing in self.landings)
-        return (
-            *([unsimulated_text] if unsimulated_text else []),
-            *(["law"] if self.has_other_law else []),
-            *(["autoland"] if any(cause.action == "autoland" for cause in self.causes) else []),
-            *behaviour.unjudged_texts(self.mission),
-            *(["landing"] if begins_with_landing and any(ending != "circle" for ending in self.endings) else []),
-        )
+        if begins_with_landing and any(ending != "circle" for ending in self.endings):
+            parts.append("landing")
+        return tuple(parts)
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
         """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by its rules."""

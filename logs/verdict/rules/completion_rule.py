@@ -39,9 +39,8 @@ def completion_findings(
         if flown_count < leg_count:
             faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown"))
         faults += _record_faults(aligned)
-    reason = (
-        finding_reason(faults) if faults else f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
-    )
+    success_text = f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
+    reason = finding_reason(faults) if faults else success_text
     return [
         make_finding(
             "completion",

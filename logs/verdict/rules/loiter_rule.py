@@ -107,12 +107,9 @@ def merge_loiter_findings(
 
     for circle in loiter_circles(requirements):
         # If the mission ends on this loiter, its last waypoint belongs to the loiter.
-        last_items = requirements.setup.route.items[circle.last : circle.last + 2]
-        last = (
-            circle.last + 1
-            if joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
-            else circle.last
-        )
+        last_items = requirements.setup.route.items[circle.last : circle.last + 2].tolist()
+        includes_end = joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
+        last = circle.last + 1 if includes_end else circle.last
         corner_findings = remaining_findings(
             ("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)]
         )

@@ -139,7 +139,7 @@ def _flown_messages(
     """
     faults = [*_rate_limit_faults(requirements, leg, measure), *_performance_faults(requirements, leg, measure)]
     need_text = f"; the leg needs {math.degrees(abs(float(requirements.slopes[leg]))):.1f}°"
-    # Said once, with the first of the faults.
+    # The text on the leg's slope is added to the first fault only.
     performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]

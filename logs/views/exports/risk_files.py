@@ -41,7 +41,7 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
     features = [
         {
             "type": "Feature",
-            "properties": {"name": one.name, "height_above_ground_m": _rounded(one.height), **properties},
+            "properties": {"name": one.name, "height_above_ground_m": _round_height(one.height), **properties},
             "geometry": {
                 "type": "MultiPolygon",
                 "coordinates": [
@@ -54,7 +54,7 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"
 
 
-def _rounded(height: float | None) -> float | None:
+def _round_height(height: float | None) -> float | None:
     """Return a height in decimetres, or None."""
     return None if height is None else round(height, 1)
 

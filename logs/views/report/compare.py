@@ -34,7 +34,7 @@ from logs.views.report.page import (
     script_text,
     style_text,
 )
-from logs.views.report.text import NOTHING, number, verdict_badge
+from logs.views.report.text import NOTHING, format_columns, number, verdict_badge
 from logs.views.scene import SceneView, script_json
 from world.arrays import Floats
 from world.files import write_atomically
@@ -280,17 +280,12 @@ def difference_lines(comparison: Comparison) -> list[str]:
       not flyable  not flyable
              36.5         36.5        0.00
     """
-    header = ("", "", *comparison.names, "difference")
-    rows = [header, *difference_rows(comparison)]
-    rows = [(f"{name} ({unit})" if unit else name, *values) for name, unit, *values in rows]
-    widths = [max(len(row[k]) for row in rows) for k in range(4)]
-    lines = [
-        "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for row in rows
-    ]
-    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: unknown"])]
+    rows: list[tuple[str, ...]] = [("", *comparison.names, "difference")]
+    for name, unit, *values in difference_rows(comparison):
+        rows.append((f"{name} ({unit})" if unit else name, *values))
+    lines = [line.rstrip() for line in format_columns(rows)]
+    has_unknown = any(NOTHING in line for line in lines)
+    return [*lines, *comparison.notes, *([f"{NOTHING}: unknown"] if has_unknown else [])]
 
 
 # ----------------------------------------------------------------------

@@ -376,9 +376,9 @@ def refly_lines(reflight: Reflight) -> list[str]:
     stretch = reflight.stretch
     stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
     legs_text = f", legs {leg_numbers[0]} to {leg_numbers[len(reflight.legs) - 1]}"
-    lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(leg_table)]
+    lines = [f"{stretch_text}{legs_text}: flown / simulated", *format_columns(leg_table)]
     if reflight.turns:
-        lines += ["", *_format_columns(turn_table)]
+        lines += ["", *format_columns(turn_table)]
     return [*lines, "", trust_line(reflight)]
 
 
@@ -425,12 +425,11 @@ def _pair_text(pair: tuple[float, float]) -> str:
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 
-def _format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+def format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Align the cells of a table: the first column left, all others right."""
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return [
-        "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        )
-        for row in rows
-    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for first_cell, *cells in rows:
+        right_cells = [cell.rjust(width) for cell, width in zip(cells, widths[1:], strict=True)]
+        lines.append("  ".join([first_cell.ljust(widths[0]), *right_cells]))
+    return lines

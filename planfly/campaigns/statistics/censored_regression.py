@@ -479,7 +479,8 @@ class _Posterior:
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
             terms_without_margin = self._outcomes.terms
-            first, second = self._link.derivatives(self._predictor_without_margin(beta), self._outcomes.failed)
+            predictor = terms_without_margin @ beta[: self.size]
+            first, second = self._link.derivatives(predictor, self._outcomes.failed)
             slope[: self.size] += terms_without_margin.T @ first
             curvature[: self.size, : self.size] += (terms_without_margin * second[:, None]).T @ terms_without_margin
         if self.margin_coefficient:
@@ -491,10 +492,6 @@ class _Posterior:
         slope, curvature = scale * slope, scale[:, None] * curvature * scale
         curvature[1, 1] += slope[1]
         return slope + self._precision * (point - self._prior_mean), curvature + np.diag(self._precision)
-
-    def _predictor_without_margin(self, beta: Floats) -> Floats:
-        """Return the predictor of each flight without the term of its margin, (n,)."""
-        return self._outcomes.terms @ beta[: self.size]
 
 
 def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
@@ -511,6 +508,7 @@ def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
         return -float(posterior.log_density(point[None])[0])
 
     value = loss(point)
+    # Each step is halved until the loss does not increase.
     for _ in range(_MAX_STEPS):
         slope, curvature = posterior.slope_and_curvature(point)
         eigenvalues, axes = np.linalg.eigh(curvature)
