@@ -425,11 +425,12 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         allowed = "not with sitl: a real autopilot flies by its own control laws"
         raise ArgumentError.of_argument("autopilot", autopilot, allowed)
     autopilot_name, _, version = (autopilot or "").partition("-")
+    program_name = None if program is None else program_class_for(program).name
     return {
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": options.get("airspeed"),
-        "autopilot": autopilot_name or None if program is None else program_class_for(program).name,
+        "autopilot": program_name or autopilot_name or None,
         "arduplane_version": version if autopilot_name == "ardupilot" and version else None,
         "px4_version": version if autopilot_name == "px4" and version else None,
         "guidance": options.get("guidance"),

@@ -243,7 +243,7 @@ def track_scene(time_ns: int, positions: Floats) -> bytes:
 
 
 def _encode_update(entity: SceneEntity) -> bytes:
-    """Encode a SceneUpdate with one entity."""
+    """Encode one entity as a SceneUpdate message."""
     return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 

@@ -424,7 +424,7 @@ class Poses:
 
 
 def _change_indices(values: Ints, previous: int) -> Ints:
-    """Return the indices at which non-decreasing values exceed the value before.
+    """Return the indices at which non-decreasing values increase.
 
     previous: value before the first.
     """

@@ -192,7 +192,7 @@ def scenario_map(
 
 
 def map_json(chart: MapChart) -> Json:
-    """Return the map as JSON data, lengths in m; its ground is in the data of the 3-D view."""
+    """Return the map as JSON data, lengths in m; the ground is part of the data of the 3-D view."""
     return {
         "origin": chart.origin,
         "east": numbers(chart.east, 1),

@@ -692,7 +692,7 @@ def _narrow_map(figure: Figure) -> Figure:
 
 
 def _left_title(axes: Axes) -> list[Text]:
-    """Return the left title of a panel as a list of one text; empty without a title."""
+    """Return a list with the left title of a panel; empty without a title."""
     title = axes.get_title("left")
     return [child for child in axes.get_children() if isinstance(child, Text) and title and child.get_text() == title]
 

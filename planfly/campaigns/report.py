@@ -72,6 +72,26 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
     """
     pictures = [draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
+    failure_rows = [
+        (RULE_WORDS[failures.rule].title, place_text(place), count)
+        for failures in summary.by_rule
+        for place, count in failures.places
+    ]
+    worst_rows = []
+    for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True):
+        failures_text = "; ".join(
+            f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failures[:4]
+        )
+        reason = failures_text or row.undecided_text or row.ended
+        worst_rows.append((row.draw.index, row.outcome, reason, closest_text(row), log))
+    dispersion_rows = []
+    for name, table in summary.dispersions.items():
+        if name in QUANTITY_BY_NAME:
+            quantity = QUANTITY_BY_NAME[name]
+            unit = quantity.combine if quantity.combine == "factor" else quantity.unit
+            parameters = {key: value for key, value in table.items() if key not in ("distribution", "source")}
+            parameters_text = ", ".join(f"{key} {value:g}" for key, value in parameters.items())
+            dispersion_rows.append((quantity.title, unit, parameters_text, table["distribution"], table["source"]))
     text = render_page(
         "campaign.html",
         command_name="campaign",
@@ -79,38 +99,11 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         heading="how likely is a flight to succeed",
         answer=summary.estimate.answer,
         lines=lines,
-        failures=[
-            (RULE_WORDS[failures.rule].title, place_text(place), count)
-            for failures in summary.by_rule
-            for place, count in failures.places
-        ],
+        failures=failure_rows,
         flights=summary.estimate.tally.flown,
-        worst=[
-            (
-                row.draw.index,
-                row.outcome,
-                "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failures[:4])
-                or row.undecided_text
-                or row.ended,
-                closest_text(row),
-                log,
-            )
-            for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True)
-        ],
+        worst=worst_rows,
         drawn=summary.dispersions.get("aircraft"),
-        dispersions=[
-            (
-                QUANTITY_BY_NAME[name].title,
-                QUANTITY_BY_NAME[name].combine
-                if QUANTITY_BY_NAME[name].combine == "factor"
-                else QUANTITY_BY_NAME[name].unit,
-                ", ".join(f"{key} {value:g}" for key, value in table.items() if key not in ("distribution", "source")),
-                table["distribution"],
-                table["source"],
-            )
-            for name, table in summary.dispersions.items()
-            if name in QUANTITY_BY_NAME
-        ],
+        dispersions=dispersion_rows,
         pictures=pictures,
         command=command,
         made_of=summary.made_of,

@@ -68,7 +68,7 @@ def battery(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly battery`` for --json."""
     from planfly.campaigns.battery_text import answer_line
     from planfly.terminal.battery_answers import BatteryAnswer, DecisionEntry, finite
 

@@ -168,7 +168,7 @@ def _plan_front(args: argparse.Namespace) -> int:
 def _json_answer(
     plan: "Plan", target: "Path", code: int, risks: tuple[str, ...], dispersed: "DispersedFlights | None"
 ) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly plan`` for --json."""
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
 

@@ -85,7 +85,7 @@ def _last_plan(result: "RunResult") -> "Plan":
 
 
 def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "DispersedFlights | None") -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly run`` for --json."""
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
     rounds = [

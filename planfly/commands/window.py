@@ -70,7 +70,7 @@ def window(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly window`` for --json."""
     from planfly.campaigns.failure_counts import failures_document
     from planfly.campaigns.window_text import answer_line, unjudged_lines
     from planfly.terminal.battery_answers import finite

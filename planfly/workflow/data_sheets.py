@@ -376,7 +376,7 @@ def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, f
 
 
 def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
-    """Return the standard deviation of the log of the cruise power, calibrated on real aircraft.
+    """Return the standard deviation of the logarithm of the cruise power, calibrated on real aircraft.
 
     power: estimated power at cruise, W.
     min_drag_sd: standard deviation of the logarithm of the minimum drag.

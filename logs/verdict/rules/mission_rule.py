@@ -97,21 +97,26 @@ def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
 
     Items that only PX4 refuses are left out, because they do not concern a mission that ArduPlane flies.
     """
-    failures = [[remark for remark in remarks if remark[0] is False] for remarks in remarks_by_check]
-    return [
-        make_finding(
-            "mission",
-            Place("mission", item=item),
-            ok=False,
-            reason=f"{fault.text}{f' (+{len(remarks) - 1} more)' if len(remarks) > 1 else ''}",
-            faults=[fault],
-            source="mission",
-            method="mission items",
+    findings = []
+    for remarks in remarks_by_check:
+        failures = [remark for remark in remarks if remark[0] is False]
+        if not failures:
+            continue
+        _, item, reason = failures[0]
+        fault = reason if isinstance(reason, Message) else message(reason)
+        more_text = f" (+{len(failures) - 1} more)" if len(failures) > 1 else ""
+        findings.append(
+            make_finding(
+                "mission",
+                Place("mission", item=item),
+                ok=False,
+                reason=f"{fault.text}{more_text}",
+                faults=[fault],
+                source="mission",
+                method="mission items",
+            )
         )
-        for remarks in failures
-        for _, item, reason in remarks[:1]
-        for fault in [reason if isinstance(reason, Message) else message(reason)]
-    ]
+    return findings
 
 
 def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
