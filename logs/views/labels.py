@@ -86,9 +86,8 @@ class LabelPlacer:
         width = 0.62 * size * len(text) * DPI / 72.0 + 2 * max(padding, _SIDE_PADDING_PX)
         height = 1.25 * size * DPI / 72.0 + 2 * padding
         best_box, best_cost, best_ring = self._make_box(point_x, point_y, width, height, gap, prefer), math.inf, 0
-        ring_distances: tuple[float, ...] = _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
-        if "bbox" in style:
-            ring_distances = _FRAMED_DISTANCES
+        unframed_distances = _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
+        ring_distances = _FRAMED_DISTANCES if "bbox" in style else unframed_distances
         for ring, distance_in_heights in enumerate(ring_distances):
             for direction_rank, direction in enumerate((prefer, *_DIRECTIONS)):
                 box = self._make_box(point_x, point_y, width, height, gap + distance_in_heights * height, direction)

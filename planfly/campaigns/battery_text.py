@@ -98,12 +98,12 @@ def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
     return [
         (
             "the end of the mission"
-            if one.leg < 0
-            else f"the return that starts at {one.time:.0f} s ({names[one.leg]})",
-            str(one.flights),
-            f"{one.flights / total:.0%}",
+            if decision.leg < 0
+            else f"the return that starts at {decision.time:.0f} s ({names[decision.leg]})",
+            str(decision.flights),
+            f"{decision.flights / total:.0%}",
         )
-        for one in result.decisions
+        for decision in result.decisions
     ]
 
 

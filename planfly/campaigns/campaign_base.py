@@ -146,7 +146,7 @@ def open_campaign(
     has_plan_file = plan_file is not None and plan_file.is_file()
     plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
     if has_plan_file and plan.scenario.to_json() != scenario.to_json():
-        differences = describe_differences(*(flatten_inputs(one.to_json()) for one in (plan.scenario, scenario)))
+        differences = describe_differences(*(flatten_inputs(opened.to_json()) for opened in (plan.scenario, scenario)))
         name = target if isinstance(target, str) else scenario.name
         message = f"{plan_file}: this plan was made for another scenario, not {name}: {differences}"
         raise MissionError(message, file=str(plan_file))

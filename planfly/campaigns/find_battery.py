@@ -155,9 +155,9 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     returns: Returns = judge_returns(
         make_return_world(varied.setup), flown_starts(varied.setup, track, interval), interval
     )
-    kinds = Counter(one.kind for one in returns.each if math.isnan(one.time_to_loiter))
-    lost = [one for one in returns.each if one.kind == "lost"]
-    arriving = [one for one in returns.each if math.isfinite(one.time_to_loiter)]
+    kinds = Counter(ret.kind for ret in returns.each if math.isnan(ret.time_to_loiter))
+    lost = [ret for ret in returns.each if ret.kind == "lost"]
+    arriving = [ret for ret in returns.each if math.isfinite(ret.time_to_loiter)]
     row = replace(
         row,
         unknown_returns=kinds["unknown"] + kinds["low"],
@@ -165,7 +165,7 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     )
     if not lost and not arriving:
         return row
-    worst = lost[0] if lost else max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
+    worst = lost[0] if lost else max(arriving, key=lambda ret: ret.energy_used + ratio * ret.energy)
     worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))
     leg = int(varied.setup.route.leg_numbers_of(track.leg[worst_row : worst_row + 1])[0])
     needed = math.inf if lost else worst.energy_used + ratio * worst.energy

@@ -148,7 +148,7 @@ def fly_for_excursions(
         return setup.scenario.wind_velocities(places, np.full(len(places), middle))
 
     falls = _fall_areas(sampled, airframe, wind_at, terrain)
-    glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
+    glides = shapely.buffer([shapely.LineString(glide_path[:, :2]) for glide_path in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
     deviation = float(shapely.distance(shapely.points(positions[:, :2]), path).max())
@@ -509,7 +509,10 @@ def _best_glide_ratio(base: CampaignBase) -> float:
         raise FlightError(message, file=aircraft.name)
     altitude = float(setup.route.positions[0, 2])
     airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 20)
-    return max(1.0 / float(glide_slopes(model, float(one), altitude, altitude + 1.0).table.min()) for one in airspeeds)
+    return max(
+        1.0 / float(glide_slopes(model, float(airspeed), altitude, altitude + 1.0).table.min())
+        for airspeed in airspeeds
+    )
 
 
 def make_volumes(

@@ -92,9 +92,11 @@ def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAns
         kept_by_own_battery=result.kept,
         decisions=[
             DecisionEntry(
-                flights=one.flights, returns_from_leg=None if one.leg < 0 else one.leg, start_s=finite(one.time)
+                flights=decision.flights,
+                returns_from_leg=None if decision.leg < 0 else decision.leg,
+                start_s=finite(decision.time),
             )
-            for one in result.decisions
+            for decision in result.decisions
         ],
         leg_energies_wh=[round(float(energy), 3) for energy in result.leg_energies],
         conditions=result.base.conditions(),

@@ -80,7 +80,7 @@ def _last_plan(result: "RunResult") -> "Plan":
     """Read the plan of the last round, in the scenario without the limits that were tightened for it."""
     from planner.plan import read_plan
 
-    first, last = (read_plan(one.folder / "plan.json") for one in (result.rounds[0], result.rounds[-1]))
+    first, last = (read_plan(shown_round.folder / "plan.json") for shown_round in (result.rounds[0], result.rounds[-1]))
     return replace(last, scenario=first.scenario)
 
 

@@ -119,7 +119,9 @@ def _rule_summary(rule: RuleFindings) -> str:
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
         # Of several such findings the first stands for all.
-        return "; ".join([rule.count_text, *(f"{one.where}: {one.reason}" for one in rule.passed_otherwise[:1])])
+        return "; ".join(
+            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_otherwise[:1])]
+        )
     value, limit = closest.compared_texts()
     if not value or not limit:
         return rule.count_text

@@ -123,7 +123,7 @@ def stated_parameters(file: Path) -> StatedParameters:
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
     """Return a parameter's value, default and text from an ArduPlane file; None if the file lacks it."""
-    definition = next((one for one in DEFINITIONS.values() if one.name == name), None)
+    definition = next((candidate for candidate in DEFINITIONS.values() if candidate.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
     if name in entries:

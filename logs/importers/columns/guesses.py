@@ -202,8 +202,8 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
 
     Raises LogError for a file that cannot be read, and if no column was recognized.
     """
-    names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
-    files = {name: read_data_file(path) for name, path in zip(names, paths, strict=True)}
+    file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
+    files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
     times = [clock for file, data in files.items() for clock in _time_clocks(data, file)]
     clocks: list[_Clock] = []
     for clock in sorted(times, key=lambda clock: -clock.length):
