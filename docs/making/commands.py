@@ -31,6 +31,7 @@ def command_pages() -> str:
 
 
 def _section(name: str, parser: CommandParser) -> str:
+    """Return the section of one command: description, usage, options and examples."""
     with _wide(76):
         usage = parser.format_usage().strip()
     with _wide(100_000):
@@ -61,4 +62,5 @@ def _definitions(entries: str) -> str:
 
 
 def _escaped(text: str) -> str:
+    """Escape the characters that have a meaning in Markdown."""
     return re.sub(r"([*_<>\[\]|$`])", r"\\\1", text).replace("--", "\\--")
