@@ -127,4 +127,5 @@ def _definitions(entries: list[tuple[str, str]]) -> str:
 
 
 def _escaped(text: str) -> str:
+    """Escape the characters that have a meaning in Markdown."""
     return re.sub(r"([*_<>\[\]|$`])", r"\\\1", text).replace("--", "\\--")

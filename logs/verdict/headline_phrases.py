@@ -32,7 +32,7 @@ def event_phrase(noun: str, finding: Finding) -> str:
 
 
 def shortfall_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)", or with the reason if not below."""
+    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)"; the reason if no value is too low."""
     value, limit = finding.value, finding.effective_limit
     if value is None or limit is None or value >= limit:
         return reason_phrase(noun, finding)
@@ -40,9 +40,10 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)", with the worse of both values.
+    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)".
 
-    If both values are within the limit, return a phrase with the reason.
+    The phrase states the larger of the planned and the flown value.  If both are within the limit, it states the reason
+    instead.
     """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
     worst_value = max(values, key=abs, default=None)
@@ -54,7 +55,7 @@ def excess_phrase(noun: str, finding: Finding) -> str:
 
 
 def slope_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase with the reason if the aircraft can fly no slope on the leg; else `excess_phrase`."""
+    """Return a phrase with the reason if no slope can be flown on the leg, else the `excess_phrase`."""
     return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
 
 
@@ -84,14 +85,15 @@ def missile_phrase(_noun: str, finding: Finding) -> str:
 
 
 def photo_line_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase that compares a line's usable fraction, or the photos' overlap, with the minimum."""
+    """Return a phrase that compares a photo line's usable fraction, or the overlap, with its minimum."""
     return shortfall_phrase(finding.check or noun, finding)
 
 
 def missed_waypoint_phrase(_noun: str, finding: Finding) -> str:
-    """Return a phrase such as "waypoint 3 missed (120 m > 50 m)", without distances if never passed.
+    """Return a phrase such as "waypoint 3 missed (120 m > 50 m)".
 
-    If the finding has a brief reason of its own, the phrase is the place with this reason.
+    The distances are left out if the waypoint was never passed.  If the finding has its own brief reason, the phrase is
+    the place and this reason.
     """
     if finding.flown is not None and finding.brief != finding.reason:
         return f"{place_text(finding.place)} {finding.brief}"

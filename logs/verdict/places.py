@@ -75,7 +75,7 @@ class Place(DocumentConfig):
 
 
 def numbered_place(place: Place) -> Place:
-    """Return a place with its number in the texts as its index: all corners of one loiter are then the same place.
+    """Return a place whose index is its number in texts, so that all corners of a loiter are one place.
 
     >>> numbered_place(Place("waypoint", 11, item=4, number=3)).index
     3

@@ -69,12 +69,12 @@ class RuleWords:
 
     @property
     def word(self) -> str:
-        """The rule's name for people, within a sentence or in a table; `name` is its name in data."""
+        """Name of the rule in sentences and tables; `name` is its name in data."""
         return self.noun or self.name
 
     @property
     def scale(self) -> float | None:
-        """The margin's scale in the margin's unit, or None if the margin ranks no flights."""
+        """Scale of the margin, in its unit; None if flights are not ranked by this margin."""
         return None if self.margin is None else self.margin.scale
 
     @property
@@ -320,7 +320,7 @@ RULE_WORDS: dict[str, RuleWords] = {
 
 
 def rule_word(name: str) -> str:
-    """Return the rule's name for people; a name that is not in `RULE_WORDS` is returned as it is.
+    """Return the name of a rule in texts; a name that is not in `RULE_WORDS` is returned unchanged.
 
     >>> rule_word("departure"), rule_word("slope")
     ('loss of control', 'slope')

@@ -27,7 +27,7 @@ _MAX_STATEMENT_LENGTH = 80
 
 
 def place_text(place: Place) -> str:
-    """Return the name of a place for people.
+    """Return the name of a place in texts.
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
@@ -147,7 +147,7 @@ def change_text(change: Change) -> str:
 
 
 def _other_change_text(change: Change) -> str:
-    """Phrase a change of anything but the path as an instruction."""
+    """Phrase a change of anything other than the path as an instruction."""
     requested_value = change.wanted
     match change.what:
         case "home altitude":
@@ -275,7 +275,9 @@ def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | No
 
 
 def within_tolerance_text(tolerance: float | None, unit: str) -> str:
-    """Return the words for a value beyond its limit that passes.  tolerance: in `unit`; None if it is not known.
+    """Return the phrase for a value that is beyond its limit but passes.
+
+    tolerance: in `unit`; None if it is not known.
 
     >>> within_tolerance_text(0.5, "m/s"), within_tolerance_text(None, "")
     ('within the tolerance of 0.5 m/s', 'within the tolerance')
@@ -284,7 +286,7 @@ def within_tolerance_text(tolerance: float | None, unit: str) -> str:
 
 
 def moves_text(moves: Sequence[ItemMove]) -> str:
-    """List moves of items; items that move alike are named together.
+    """List moves of items; items with the same move are named together.
 
     >>> moves_text([ItemMove(8, -1.96, 48.9, 0.0), ItemMove(9, 0.0, 0.0, -6.5), ItemMove(10, 0.0, 0.0, -6.5)])
     'item 8 48.9 m north and 2 m west, items 9 and 10 6.5 m down'
@@ -387,7 +389,7 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
 
 
 def shorten_statement(statement: str) -> str:
-    """Cut a statement to the maximum length in a headline.
+    """Cut a statement to the maximum length for a headline.
 
     >>> shorten_statement("bank 80° at 3.0 s"), len(shorten_statement("m" * 200))
     ('bank 80° at 3.0 s', 80)
@@ -405,7 +407,7 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def _with_unit(digits: str, unit: str) -> str:
-    """Return the digits of a number with its unit, a counted unit in the singular after 1."""
+    """Join the digits of a number and its unit; a counted unit is in the singular after 1."""
     return digits + (" leg" if (digits, unit) == ("1", "legs") else _unit_suffix(unit))
 
 
@@ -419,7 +421,7 @@ _MAX_DIGITS = 9
 
 
 def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
-    """Return two values with their unit, with enough digits that different values look different.
+    """Format two values with their unit, with enough digits to show that different values differ.
 
     >>> compared_texts(-7.04, -7.02, "deg"), compared_texts(12.0, 15.0, "m")
     (('-7.04°', '-7.02°'), ('12 m', '15 m'))

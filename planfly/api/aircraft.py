@@ -164,7 +164,7 @@ def describe_aircraft(
     """Compute trims, modes, envelope and step responses of an aircraft, and draw them.
 
     name: name of a built-in aircraft, or a folder.
-    motor_braking: True lets the motor brake in descents.
+    motor_braking: True to let the motor brake in descents.
     out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``, in whose name {name} stands for the aircraft's
     name; None writes no pictures.
     overwrite: True replaces existing pictures.

@@ -174,10 +174,10 @@ def export(
 
 
 def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
-    """Return the name of the autopilot that the user names, or that a parameter file is for.
+    """Return the name of the autopilot that the user names, or for which a parameter file was written.
 
-    Return "" for neither.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that is clearly
-    of no autopilot.
+    Return "" without either.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that belongs
+    to no autopilot.
     """
     check_arguments(autopilot=autopilot)
     if autopilot is not None:
@@ -193,7 +193,7 @@ def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Return a source with the autopilot that a .plan is for, and with notes on what the .plan lacks.
+    """Return a source with the autopilot of a .plan, and with notes on what the .plan cannot store.
 
     autopilot: name of the autopilot; "" if the user named none.
     fence: files of fences that the user named.
@@ -247,7 +247,7 @@ def _check_suffix(target: Path) -> None:
 
 
 def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _SourceContent:
-    """Read a log, a plan or a mission, as far as the target files need it.
+    """Read those parts of a log, a plan or a mission that the target files need.
 
     Raises MissionError for options that do not apply to a log, and for targets that need a log.
     """

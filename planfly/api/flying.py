@@ -235,7 +235,7 @@ def fly(
 
 
 def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
-    """Convert a judged flight to its result; a flight that did not start has no log and no flight model."""
+    """Convert a judged flight to a `FlownMission`, without log and flight model if it did not start."""
     log = log if len(flight.track) else None
     program_log = None if log is None or program is None else autopilot_log_path(log, program)
     return FlownMission(
@@ -412,7 +412,7 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
-    """Judge a flight that was flown before.
+    """Judge a recorded flight again.
 
     terrain: elevation file that replaces the terrain of the flight; None keeps the terrain.
     fences: additional fences.

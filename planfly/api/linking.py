@@ -193,8 +193,8 @@ def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Link
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
     """Judge the radio link of a scenario along a track, as the verdict does.
 
-    Without a track, a terrain or a position of the station the finding is undecided, and the result has no link along
-    the path.
+    If the track, the terrain or the position of the station is missing, the finding is undecided, and the result has no
+    link along the path.
     """
     link_of_scenario = setup.scenario.link
     if link_of_scenario is None:

@@ -121,14 +121,14 @@ class ReturnsResult:
 
     @property
     def program_lines(self) -> tuple[str, ...]:
-        """Comparison of the worst returns as flown by the ArduPlane program and by the simulated ArduPlane."""
+        """Lines that compare the worst returns flown by the ArduPlane program and by the simulated ArduPlane."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
 
     @property
     def no_return_line(self) -> str:
-        """Description of the point after which the battery is too low for the return."""
+        """Text on the point after which the battery is too low for a return."""
         return point_of_no_return_text(self.returns)
 
     @property

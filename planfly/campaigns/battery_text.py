@@ -39,7 +39,7 @@ def answer_line(result: BatteryResult) -> str:
 
 
 def _unknown_reason(result: BatteryResult) -> str:
-    """Return why the battery is unknown."""
+    """Return the reason why the smallest battery is unknown."""
     count, completed = len(result.rows), len(result.completed)
     endings = [row.ended for row in result.rows if row.ended != "completed"]
     if unknown := len(result.completed) - len(result.known):
@@ -82,7 +82,7 @@ def battery_lines(result: BatteryResult) -> list[str]:
 
 
 def leg_names(result: BatteryResult) -> list[str]:
-    """Return the name of the legs with each number, as in messages."""
+    """Return the name of each leg as in messages; the legs of one loiter share a name."""
     requirements = route_requirements(result.base.nominal_setup())
     numbers = requirements.setup.route.leg_numbers
     first_legs = np.searchsorted(numbers, np.arange(int(numbers[-1]) + 1)).tolist()
@@ -90,22 +90,25 @@ def leg_names(result: BatteryResult) -> list[str]:
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return the parts that decide the battery, each with its flights and their share, the most frequent first."""
+    """Return a row for each part of a flight that decides the battery: its flights and their share.
+
+    The most frequent part comes first.
+    """
     names, total = leg_names(result), len(result.completed)
     return [
         (
             "the end of the mission"
-            if one.leg < 0
-            else f"the return that starts at {one.time:.0f} s ({names[one.leg]})",
-            str(one.flights),
-            f"{one.flights / total:.0%}",
+            if decision.leg < 0
+            else f"the return that starts at {decision.time:.0f} s ({names[decision.leg]})",
+            str(decision.flights),
+            f"{decision.flights / total:.0%}",
         )
-        for one in result.decisions
+        for decision in result.decisions
     ]
 
 
 def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return each leg with its median energy and its share of the mission's."""
+    """Return a row for each leg: its median energy, and its share of the mission's energy."""
     energies, total = result.leg_energies.tolist(), float(result.leg_energies.sum())
     return [
         (name, f"{energy:.1f} Wh", f"{energy / total:.0%}" if total > 0.0 else "")
@@ -129,7 +132,7 @@ def _own_battery_line(result: BatteryResult) -> str:
 
 
 def _mass_lines(result: BatteryResult) -> list[str]:
-    """Return the mass of the aircraft with the found battery."""
+    """Return a line on the mass of the aircraft with the found battery."""
     if result.goal.specific_energy is None:
         return ["the same mass is assumed for every capacity (--specific-energy states the battery's energy per mass)"]
     if not math.isfinite(result.capacity):

@@ -57,7 +57,7 @@ class CampaignComparison:
 
     @property
     def answer(self) -> Literal["more likely", "less likely", "no difference shown"]:
-        """Answer by the interval: flights of the second campaign are more or less likely to be flyable, or neither."""
+        """Answer by the interval: second campaign more likely flyable, less likely flyable, or neither."""
         if self.difference.interval.low > 0.0:
             return "more likely"
         return "less likely" if self.difference.interval.high < 0.0 else "no difference shown"
@@ -86,7 +86,7 @@ class CampaignComparison:
 
 
 def campaign_table(path: Path) -> Path | None:
-    """Return the file of a campaign's table for the campaign's folder or for the file itself; None for another path."""
+    """Return the table file of a campaign, given its folder or the file itself; None for any other path."""
     if path.is_dir():
         path /= CAMPAIGN_DATABASE
     return path if path.name == CAMPAIGN_DATABASE and path.is_file() else None
@@ -108,7 +108,8 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
     pairs = _paired_rows(*tables)
     flyable = np.column_stack([table["outcome"][rows] == "flyable" for table, rows in zip(tables, pairs, strict=True)])
     compared_rows = pairs if len(flyable) else [np.arange(len(table["flight"])) for table in tables]
-    campaigns = [_compared(*values) for values in zip((first, second), tables, compared_rows, settings, strict=True)]
+    sources = zip((first, second), tables, compared_rows, settings, strict=True)
+    campaigns = [_count_outcomes(*source) for source in sources]
     only_first = int(np.count_nonzero(flyable[:, 0] & ~flyable[:, 1]))
     only_second = int(np.count_nonzero(flyable[:, 1] & ~flyable[:, 0]))
     counts = [(campaign.tally.flyable, campaign.tally.flown) for campaign in campaigns]
@@ -130,10 +131,10 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
     )
 
 
-def _compared(
+def _count_outcomes(
     path: Path, table: Mapping[str, NDArray[Any]], compared_rows: NDArray[np.intp], settings: Mapping[str, Any]
 ) -> ComparedCampaign:
-    """Return the counts of a campaign.
+    """Count the outcomes of a campaign.
 
     compared_rows: rows of the table, (n,), whose failures are counted by rule.
     """
@@ -155,7 +156,7 @@ def _compared(
 def _paired_rows(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]) -> list[NDArray[np.intp]]:
     """Return the rows of the flights that both campaigns have, (n,) for each campaign.
 
-    n is 0 if the draws of any of these flights differ, because then the flights are no pairs.
+    n is 0 if the draws of any of these flights differ, because the flights are then not paired.
     """
     _, first_rows, second_rows = np.intersect1d(first["flight"], second["flight"], return_indices=True)
     for name in ("seed", *NAMES):
@@ -165,7 +166,7 @@ def _paired_rows(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray
 
 
 def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]], pairs: int) -> list[str]:
-    """Return remarks on the flights that are compared, and on assumptions of the interval that do not hold."""
+    """Return remarks on the compared flights, and on assumptions of the interval that do not hold."""
     notes = []
     counts = [len(table["flight"]) for table in tables]
     if pairs and pairs < max(counts):
@@ -182,7 +183,7 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
 
 
 def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:
-    """Return a remark if the test and the interval, which decides the answer, disagree on a difference; otherwise [].
+    """Return a remark if the test contradicts the interval, which decides the answer; otherwise [].
 
     >>> _disagreement_notes(ProportionDifference(0.1, Interval(0.02, 0.3), 0.04), is_paired=True)
     []

@@ -92,7 +92,7 @@ def resumed_goal(
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
     """Create the table of a campaign in a folder, or open it to resume the campaign.
 
-    Raises StoreError, also if the table has more flights than the goal.
+    Raises StoreError for a table that cannot be used, or that has more flights than the goal.
     """
     settings = {
         "name": base.name,
@@ -115,8 +115,8 @@ def fly_campaign(
 ) -> Estimate:
     """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
-    Flights are counted in the order of their indices, so that answer and table do not depend on the speed of the
-    workers; flights after the deciding flight are deleted. Flights completed before an error or Ctrl-C stay in the
+    Flights are counted in the order of their indices, and flights after the deciding flight are deleted.  Answer and
+    table therefore do not depend on the speed of the workers.  Flights completed before an error or Ctrl-C stay in the
     table.
     """
     estimator = Estimator(goal)
@@ -175,7 +175,7 @@ class _ProgressReport:
     def report(self, tally: Tally, is_last: bool = False) -> None:
         """Report flights, probability of success with its bounds, rate of flights and remaining time.
 
-        is_last: True reports even if no report is due.
+        is_last: True to report even if no report is due.
         """
         if self._advance is None or not tally.flown or not (self._rate.is_due() or is_last):
             return

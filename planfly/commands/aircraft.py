@@ -310,7 +310,8 @@ def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
         f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {aircraft.airspeed_max:g} m/s"
     )
     if uncertainty is not None:
-        climb_sd, descent_sd = math.degrees(uncertainty.climb_sd), math.degrees(uncertainty.descent_sd)
+        climb_sd = math.degrees(uncertainty.climb_sd)
+        descent_sd = math.degrees(uncertainty.descent_sd)
         print(
             f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
             f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
@@ -363,7 +364,8 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         f" {math.degrees(aircraft.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
-        climb_sd, descent_sd = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
+        climb_sd = math.degrees(envelope.climb_sd)
+        descent_sd = math.degrees(envelope.descent_sd)
         print(
             f"  accuracy from {envelope.source}: climb ± {climb_sd:.1f} deg, descent ± {descent_sd:.1f}, fastest level"
             f" flight ± {envelope.fastest_sd:.1f} m/s, power within a factor of {math.exp(envelope.power_sd):.2f}"
@@ -442,6 +444,7 @@ def _angle_pair_text(climb: float, descent: float) -> str:
     """Return two angles (rad) as text in degrees, such as "5.2 / 8.0"; "-" replaces NaN."""
 
     def angle_text(angle: float) -> str:
+        """Return an angle (rad) in degrees as text; "-" for NaN."""
         return "-" if math.isnan(angle) else f"{math.degrees(angle):.1f}"
 
     return f"{angle_text(climb)} / {angle_text(descent)}"

@@ -69,7 +69,7 @@ def battery(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly battery`` for --json."""
     from planfly.campaigns.battery_text import answer_line
     from planfly.terminal.battery_answers import BatteryAnswer, DecisionEntry, finite
 
@@ -93,9 +93,11 @@ def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAns
         kept_by_own_battery=result.kept,
         decisions=[
             DecisionEntry(
-                flights=one.flights, returns_from_leg=None if one.leg < 0 else one.leg, start_s=finite(one.time)
+                flights=decision.flights,
+                returns_from_leg=None if decision.leg < 0 else decision.leg,
+                start_s=finite(decision.time),
             )
-            for one in result.decisions
+            for decision in result.decisions
         ],
         leg_energies_wh=[round(float(energy), 3) for energy in result.leg_energies],
         conditions=result.base.conditions(),

@@ -125,7 +125,7 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
 
 
 def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly check`` with several autopilots for --json."""
     from planfly.terminal.verdict_answers import VerdictsDocument
 
     documents = {name: verdict.document() for name, verdict in verdicts.items()}
@@ -133,7 +133,7 @@ def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, 
 
 
 def _verdict_answer(verdict: "Verdict", returns: "ReturnSummary", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly check`` for --json."""
     from planfly.terminal.verdict_answers import CheckAnswer, count_returns
 
     document = verdict.document()

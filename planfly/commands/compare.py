@@ -80,7 +80,7 @@ def _compare_campaigns(args: argparse.Namespace) -> int:
 
 
 def _campaigns_answer(comparison: "CampaignComparison") -> object:
-    """Return the answer of the command on two campaigns for --json."""
+    """Return the answer of ``planfly compare`` on two campaigns for --json."""
     from planfly.terminal.answers import ChangedRule, CompareCampaignsAnswer, ComparedCampaignEntry
 
     return CompareCampaignsAnswer(
@@ -109,10 +109,11 @@ def _campaigns_answer(comparison: "CampaignComparison") -> object:
 
 
 def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly compare`` for --json."""
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:
+        """Return a finite number unchanged, and None for NaN and infinity."""
         return value if math.isfinite(value) else None
 
     return CompareAnswer(

@@ -80,6 +80,7 @@ def export(args: argparse.Namespace) -> int:
     code = INCOMPLETE if result.loss else FLYABLE
 
     def json_answer() -> object:
+        """Return the answer of ``planfly export`` for --json."""
         from planfly.terminal.answers import ExportAnswer, ExportedFile
 
         pairs = zip(result.files, result.contents, strict=True)

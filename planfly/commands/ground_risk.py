@@ -87,7 +87,7 @@ def ground_risk(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "GroundRiskResult", code: int) -> "GroundRiskAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly ground-risk`` for --json."""
     from planfly.campaigns.ground_risk_text import answer_line
     from planfly.terminal.ground_risk_answers import GroundRiskAnswer, PopulationEntry
 

@@ -94,7 +94,7 @@ def _guess_columns(args: argparse.Namespace) -> int:
 
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly import`` for --json."""
     from planfly.terminal.answers import ImportAnswer
 
     return ImportAnswer(
@@ -146,7 +146,7 @@ def refly(args: argparse.Namespace) -> int:
 
 
 def _refly_answer(result: "Reflown", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly refly`` for --json."""
     from planfly.terminal.answers import ReflyAnswer
 
     return ReflyAnswer(exit_code=code, lines=list(result.lines), files=[str(file) for file in result.files])

@@ -90,7 +90,7 @@ def link(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly link`` for --json."""
     from logs.verdict.conditions import judging_conditions
     from logs.verdict.returns.returns_text import headline
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry

@@ -74,6 +74,7 @@ def new(args: argparse.Namespace) -> int:
     print(f"next      planfly run {shlex.quote(str(file))}")
 
     def json_answer() -> object:
+        """Return the answer of ``planfly new`` for --json."""
         from planfly.terminal.answers import NewAnswer
 
         return NewAnswer(exit_code=code, file=str(file), safe=plan.safe, waypoints=len(plan.waypoints))

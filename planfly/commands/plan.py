@@ -104,7 +104,7 @@ def _algorithms_help() -> str:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan a path, and write the plan file; return 4 if the plan is not safe, or does not hold in its flights."""
+    """Plan a path, and write the plan file; return 4 if the plan is not safe, or fails in its flights."""
     _check_replanning(args)
     check_flights_option(args, "front")
     if args.front is not None:
@@ -170,7 +170,7 @@ def _plan_front(args: argparse.Namespace) -> int:
 def _json_answer(
     plan: "Plan", target: "Path", code: int, risks: tuple[str, ...], dispersed: "DispersedFlights | None"
 ) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly plan`` for --json."""
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
 
@@ -199,6 +199,7 @@ def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
     is_interrupted = False
 
     def handle_signal(_signal: int, _frame: FrameType | None) -> None:
+        """Note the first Ctrl-C; interrupt the command at the second."""
         nonlocal is_interrupted
         if is_interrupted:
             interrupt(signal.SIGINT)

@@ -65,10 +65,11 @@ def predict(args: argparse.Namespace) -> int:
 
 
 def _prediction_answer(result: "Predicted") -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly predict`` for --json."""
     from planfly.terminal.answers import PredictAnswer, PredictedQuantity
 
     def none_if_nan(value: float) -> float | None:
+        """Return None for NaN, and any other number unchanged."""
         return None if math.isnan(value) else value
 
     quantities = [

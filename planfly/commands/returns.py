@@ -119,7 +119,7 @@ def returns(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly returns`` for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,

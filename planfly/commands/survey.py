@@ -116,7 +116,7 @@ def _camera_option(result: "SurveyResult") -> str:
 
 
 def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly survey`` for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,

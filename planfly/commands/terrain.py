@@ -76,6 +76,7 @@ def terrain(args: argparse.Namespace) -> int:
     print(f"next      planfly fly MISSION --terrain {shlex.quote(str(result.file))}")
 
     def json_answer() -> object:
+        """Return the answer of ``planfly terrain`` for --json."""
         from planfly.terminal.answers import TerrainAnswer
 
         return TerrainAnswer(

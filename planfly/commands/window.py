@@ -51,8 +51,8 @@ def add_window_parser(command_line: LineParser) -> None:
 def window(args: argparse.Namespace) -> int:
     """Find the departures; return the exit code.
 
-    The exit code is 0 if the asked departure is open (or any, if none is asked), 4 if not, and 3 if it is not judged
-    in full.
+    The exit code is 0 if the requested departure is open (or any departure if none is requested), 4 if not, and 3 if it
+    is not judged in full.
     """
     from logs.verdict.conditions import flown_lines
     from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
@@ -70,7 +70,7 @@ def window(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly window`` for --json."""
     from planfly.campaigns.failure_counts import failures_document
     from planfly.campaigns.window_text import answer_line, unjudged_lines
     from planfly.terminal.battery_answers import finite

@@ -88,7 +88,7 @@ def return_summary(
 
 
 def return_law_lines(setup: FlightSetup) -> list[str]:
-    """Return lines on the autopilot whose returns are simulated, its path, and the parts that are not judged.
+    """Return lines on the autopilot whose returns are simulated, their path, and their unjudged parts.
 
     Return [] for a mission without a home.
     """

@@ -49,10 +49,12 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
         summary += f"; {unknown_count} {verb} outside the terrain data and cannot be judged"
     if usable_count + unknown_count == len(measures):
         return summary
-    fractions = [
-        -1.0 if measure is None else math.inf if is_line_unknown(measure) else measure.usable for measure in measures
-    ]
-    worst_index = min(range(len(fractions)), key=lambda k: fractions[k])
+    judged_fractions = {
+        k: -1.0 if measure is None else measure.usable
+        for k, measure in enumerate(measures)
+        if not is_line_unknown(measure)
+    }
+    worst_index = min(judged_fractions, key=lambda k: judged_fractions[k])
     measure = measures[worst_index]
     return (
         f"{summary}; line {worst_index + 1} is the worst:"
@@ -153,7 +155,7 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     """Describe the loss at the ends of the lines.
 
-    The loss shows the turn-around distance that would be needed.
+    This loss indicates the turn-around distance that would be needed.
     """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
@@ -161,10 +163,8 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
             f"no part of the {count_text(len(lines), 'line')}, {survey.spacing:.0f} m apart, can be used, "
             "because there is no room to turn"
         )
-    start, end = (
-        max(measure.lost_at_start for measure in usable_lines),
-        max(measure.lost_at_end for measure in usable_lines),
-    )
+    start = max(measure.lost_at_start for measure in usable_lines)
+    end = max(measure.lost_at_end for measure in usable_lines)
     text = (
         f"lines lose at most {start:.0f} m at their start and {end:.0f} m at their end;"
         f" the longest line is {max(measure.length for measure in usable_lines):.0f} m long"

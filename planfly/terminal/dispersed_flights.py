@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def check_flights_option(args: argparse.Namespace, excluded: str) -> None:
     """Raise an error, before anything is planned, if ``--flights`` cannot be flown.
 
-    excluded: name of the option with which no dispersed flights are flown.
+    excluded: name of the option that cannot be combined with dispersed flights.
     """
     if args.flights is None:
         return
@@ -37,9 +37,9 @@ def fly_dispersed(args: argparse.Namespace, plan: "Plan") -> "DispersedFlights |
 
 
 def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -> "DispersedFlights":
-    """Return the answer for --json.
+    """Return the answer of dispersed flights for --json.
 
-    remedy_texts: what would raise the probability.
+    remedy_texts: texts on changes that would raise the probability.
     """
     from planfly.campaigns.failure_counts import failures_document
     from planfly.planning.expected_failures import HOLDING_PROBABILITY
@@ -63,7 +63,7 @@ def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -
 
 
 def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> list[str]:
-    """Return the lines for a terminal."""
+    """Return the answer of dispersed flights as lines for a terminal."""
     from planfly.campaigns.failure_counts import failure_lines
     from planfly.campaigns.summary import deciding_lines, undecided_lines
 

@@ -49,7 +49,7 @@ def call_api(function: Callable[..., Result], args: argparse.Namespace, **overri
 def add_result_options(
     parser: CommandParser, out: str = "", placeholder: str = "DIR", *, json: bool = True, junit: bool = False
 ) -> None:
-    """Add the options for output files and for the amount of printed text.
+    """Add the options for output files and for how much text is printed.
 
     out: help text of --out, or "" for a command without this option.
     placeholder: placeholder for the value of --out.
@@ -271,7 +271,7 @@ def add_flight_options(parser: CommandParser) -> None:
 
 
 def add_flights_option(group: OptionGroup) -> None:
-    """Add the option for dispersed flights of the finished plan."""
+    """Add the option --flights, for dispersed flights of the finished plan."""
     group.add_argument(
         "--flights",
         metavar="N",
@@ -295,9 +295,9 @@ def add_log_rate_option(group: OptionGroup) -> None:
 
 
 def add_imported_log_options(parser: CommandParser) -> None:
-    """Add the options for information that another program's log may lack.
+    """Add the options for data that another program's log may lack.
 
-    They state its mission, flight number and altitude datum.
+    The options state the log's mission, flight number and altitude datum.
     """
     group = parser.add_group("an autopilot's log")
     option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
@@ -353,11 +353,12 @@ def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
 def watch_stop_signals() -> Iterator[Callable[[], bool]]:
     """Catch SIGINT and SIGTERM while the block runs.
 
-    Yields a function that returns True after either signal.
+    Yields a function that returns True once one of the two signals has arrived.
     """
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:
+        """Note that a signal to stop has arrived."""
         nonlocal should_stop
         should_stop = True
 

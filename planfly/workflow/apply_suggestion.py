@@ -37,7 +37,7 @@ _MIN_MOVE_SHARE = 0.2
 
 
 def can_apply(suggestion: Suggestion) -> bool:
-    """Return True if every change of a suggestion can be made by moving items of a mission.
+    """Return True if every change of a suggestion can be made by editing the items of a mission.
 
     >>> from logs.verdict.places import FLIGHT, Place
     >>> can_apply((Change("length", Place("leg", 1), 300.0, 400.0, "m"),))
@@ -177,11 +177,11 @@ class _EditedMission:
         return index is not None and self.mission.items[index].command in LANDINGS
 
     def move_items(self, waypoints: Sequence[int], offset: Floats, *, along_approach: bool = False) -> None:
-        """Move the items of waypoints, except landings, each item once.
+        """Move the items of waypoints, except landings; an item with several waypoints is moved once.
 
         offset: east, north and up, m.
-        along_approach: True for a move along the final approach, which a landing sequence allows.
-        Raises MissionError for a move to a side of an item of a landing sequence.
+        along_approach: True for a move along the final approach, the only direction in which items of a landing
+            sequence may move.  Raises MissionError for any other horizontal move of such an item.
         """
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
@@ -225,7 +225,7 @@ def _changed_leg(change: Change, route: Route) -> int:
 
 
 def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Lengthen a leg by moving only its end along the leg's course, or the start of a leg that ends with a landing."""
+    """Lengthen a leg by moving its end along its course, or its start if the leg ends with a landing."""
     leg = _changed_leg(change, edited.route)
     start, end = edited.current_position(leg), edited.current_position(leg + 1)
     step = end[:2] - start[:2]
@@ -279,6 +279,7 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
     straight_point = previous[:2] + fraction * chord
 
     def is_gentle(step: int) -> bool:
+        """Return True if the turn is gentle enough after a step towards the straight line."""
         bent_points = np.array(
             [previous, [*(corner[:2] + step / _TURN_STEPS * (straight_point - corner[:2])), corner[2]], next_waypoint]
         )
@@ -308,14 +309,14 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Set the altitude of home, above which the altitudes of items are stated."""
+    """Set the altitude of home, relative to which the altitudes of items are stated."""
     if edited.mission.home is not None and edited.mission.home.alt != change.wanted:
         edited.mission = replace(edited.mission, home=replace(edited.mission.home, alt=change.wanted))
         edited.is_changed = True
 
 
 def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
-    """State the altitudes of items below ground relative to home, with the same numbers."""
+    """Change the altitude frame of items below ground to "above home", keeping their numbers."""
     scenario, mission = edited.requirements.setup.scenario, edited.mission
     below_ground, _ = misread_altitudes(mission, scenario.origin, scenario.terrain)
     items = list(mission.items)
@@ -348,7 +349,7 @@ def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) ->
 
 
 def _end_with_loiter(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Turn the last waypoint into a loiter without end, which keeps the autopilot from returning by itself."""
+    """Turn the last waypoint into a loiter without end, so that the autopilot does not return by itself."""
     index = None if change.place.index is None else edited.item_index(change.place.index)
     if index is not None:
         items = list(edited.mission.items)

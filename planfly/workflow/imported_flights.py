@@ -208,7 +208,7 @@ def _choose_scenario_and_place_mission(
 def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
     """Return the scenario with the log's mean wind, and a description of the source of the wind.
 
-    The wind of the scenario stays if the options state a wind or the log contains none.
+    The wind of the scenario is kept if the options state a wind or the log contains none.
     """
     if options.get("wind") is not None:
         return scenario, "as given"
@@ -279,7 +279,7 @@ def _sha256(path: Path) -> str:
 
 
 def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note a log that begins or ends in flight, or has too few positions; empty for a complete log."""
+    """Describe what an incomplete log lacks: its start, its end, or positions; empty for a complete log."""
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -292,7 +292,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note a throttle that has the same value in all rows, as in the log of a glider; empty otherwise."""
+    """Note that the throttle is the same in all rows, as in the log of a glider; empty if it varies."""
     throttle = flight.raw.series.get("throttle")
     if throttle is None or len(throttle.values) < 2 or np.ptp(throttle.values) > 0.0:
         return ()
@@ -300,7 +300,7 @@ def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note the other flights in the log; empty if there are no other flights."""
+    """Note the other flights in the log; empty if there are none."""
     if flight.count == 1:
         return ()
     other_flights = ", ".join(
@@ -419,8 +419,8 @@ def fly_draws(
 
     Returns the comparisons with the log.
 
-    A draw is a sampled variant of the aircraft in a sampled wind.  A draw with which the aircraft cannot start, or
-    flies none of the legs, is left out.
+    A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if the aircraft cannot start with
+    it, or flies none of the legs.
 
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
@@ -444,8 +444,8 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
 
     It begins where the first segment of the flight reached this altitude.
 
-    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  A mission without
-    a take-off, and a segment that never reached this altitude, are returned unchanged.
+    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  The setup is
+    returned unchanged if the mission has no take-off, or if the segment never reached this altitude.
     """
     source, route, mission, scenario = setup.source, setup.route, setup.mission, setup.scenario
     first = next((item for item in mission.items if item.seq == route.items[0]), None)
@@ -491,10 +491,8 @@ def _refly_followed_legs(
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
     if draw is not None:
         wind = scenario.wind
-        north, east = (
-            -wind.speed * math.cos(wind.from_course) + draw.wind[0],
-            -wind.speed * math.sin(wind.from_course) + draw.wind[1],
-        )
+        north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]
+        east = -wind.speed * math.sin(wind.from_course) + draw.wind[1]
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
     model, battery = find_aircraft_and_energy(scenario)
     limits = setup.limits
@@ -531,7 +529,7 @@ def _refly_followed_legs(
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
-    """Return the sequence of legs followed in each segment of a flight, most legs first.
+    """Return the legs followed in each segment of a flight; the segment with the most legs comes first.
 
     Raises LogError if the flight followed no leg of its mission.
     """

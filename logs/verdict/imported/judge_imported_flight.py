@@ -107,7 +107,7 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
 
 
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return a line for each rule with unjudged findings: their number and the first reason.
+    """Return one line for each rule that has unjudged findings: their number and the first reason.
 
     The number is left out if none of the rule's findings was judged.
     """
@@ -162,7 +162,7 @@ _MAX_LISTED_RANGES = 6
 
 
 def missing_text(missing: MissingItems) -> str:
-    """Describe the unjudged part of a mission, and the items that the log lacks.
+    """Describe which part of a mission is not judged, and which items the log lacks.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
     'not judged beyond item 6: items 7 to 13 of 14 are not in the log or ignored'
@@ -296,7 +296,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
 
 
 def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Describe the mission items, or the part of the flight, that are missing in the log; return "" if none is."""
+    """Describe missing mission items or a missing part of the flight; return "" if the log is complete."""
     if missing is not None:
         return missing_text(missing)
     parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
@@ -329,7 +329,7 @@ def _undecided_part_text(findings: Sequence[Finding]) -> str:
 
 
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
-    """Judge one stretch, and number its legs and waypoints as in the whole route."""
+    """Judge one stretch; number the legs and waypoints in its findings as in the whole route."""
     findings = []
     for finding in track_findings(legs.requirements, legs.aligned):
         checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
@@ -340,9 +340,9 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
 
 
 def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
-    """Return a finding for each rule that judged nothing because the log lacks its data.
+    """Return an unjudged finding for each rule for which the log lacks the data.
 
-    Only rules with `LogNeeds.reports_missing` are reported.
+    Rules without `LogNeeds.reports_missing` are left out.
     """
     findings = []
     for rule in RULES.values():
@@ -423,9 +423,10 @@ def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
 
 
 def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Return a finding, marked as not judged if it concerns the last waypoint, which was not reached, or its leg.
+    """Mark a finding as not judged if it concerns a last waypoint that was not reached, or its leg.
 
-    On the leg to that waypoint, only rules that need the whole leg are marked, and a finding that fails still fails.
+    On the leg to that waypoint, only findings of rules that need the whole leg are marked.  A failed finding stays
+    failed.
     """
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
@@ -454,7 +455,7 @@ def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding
 
 
 def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches: keep one for each rule, place and check, a failure before a pass."""
+    """Merge the findings of all stretches; for each rule, place and check keep a failure rather than a pass."""
     merged: dict[tuple[str, Place, str], Finding] = {}
     for findings in findings_by_stretch:
         for finding in findings:

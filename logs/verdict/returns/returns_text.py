@@ -224,7 +224,7 @@ def point_of_no_return_text(returns: Returns) -> str:
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List the events that make the aircraft return, that make it land, and that do neither, in up to three lines.
+    """List, in up to three lines, the events that cause a return, those that cause a landing, and the others.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -236,7 +236,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     """
 
     def setting_text(cause: Cause) -> str:
-        """Return the parameter of an event and its value in brackets."""
+        """Return the parameter that decides on an event, and its value, in brackets."""
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
     returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.is_return]
@@ -256,7 +256,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 def describe_landing(returns: Returns) -> list[str]:
     """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
 
-    For an autopilot other than ArduPlane, return its sentence on the path of an RTL.
+    For any other autopilot than ArduPlane, the line is its text on the path of an RTL.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return ends in a loiter at its target']
@@ -320,7 +320,8 @@ def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
         return "the energy used before is unknown"
     if ret.energy_left < 0.0:
         return f"ends with an empty battery, as {quantity_text(ret.energy_used, 'Wh')} are used before it"
-    left_text, reserve_text = quantity_text(ret.energy_left, "Wh"), quantity_text(returns.reserve, "Wh")
+    left_text = quantity_text(ret.energy_left, "Wh")
+    reserve_text = quantity_text(returns.reserve, "Wh")
     uncertain_text = ", but the power is uncertain" if ret.kind == "power" else ""
     return f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
 

@@ -94,7 +94,7 @@ class _Obstacles(NamedTuple):
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, altitude: float) -> tuple[float, float]:
     """Return the maximum climb slope on a course (rad) at an altitude (m AMSL), m per m.
 
-    The first value is the nominal slope, the second the slope reduced by the uncertainty of the aircraft's model.
+    The first value is the nominal slope.  The second is the slope reduced by the uncertainty of the aircraft's model.
     """
     speed, limits = float(requirements.route.leg_airspeeds[leg]), requirements.limits
     max_slope, certain_slope = (
@@ -112,7 +112,8 @@ def climbout_findings(
 ) -> list[Finding]:
     """Judge the climb from home to the first waypoint.
 
-    Return [] without a home or terrain, if that waypoint is over home, or for a take-off that is vertical or flown.
+    Return [] if home or the terrain is missing, if that waypoint is over home, if the take-off is vertical, or if it
+    was flown.
     """
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not has_ground_paths(requirements) or home is None or terrain is None:
@@ -130,10 +131,8 @@ def climbout_findings(
         launch = _find_launch(requirements)
         course = launch.course
     else:
-        course, distance = (
-            math.atan2(first_point[0] - start[0], first_point[1] - start[1]),
-            math.dist(first_point[:2], start),
-        )
+        course = math.atan2(first_point[0] - start[0], first_point[1] - start[1])
+        distance = math.dist(first_point[:2], start)
         if distance < SAME_POSITION_DISTANCE_M:
             return []
     if math.isnan(ground_altitude):
@@ -169,7 +168,7 @@ def climbout_findings(
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: bool) -> Finding:
-    """Return a finding that a climb-out or an approach is not judged.
+    """Return the finding that a climb-out or an approach is not judged.
 
     is_undecided: True if this finding leaves the verdict undecided.
     """
@@ -198,7 +197,7 @@ class _Launch(NamedTuple):
 def _find_launch(requirements: RouteRequirements) -> _Launch:
     """Return the launch on the scenario's course, or along the first leg if the scenario states no course.
 
-    The length and slope are those of the first leg if it lies on the launch course, otherwise inf and 0.
+    If the first leg lies on the launch course, the launch has the leg's length and slope, otherwise inf and 0.
     """
     stated_launch = requirements.setup.scenario.launch
     first_leg = _Launch(
@@ -231,7 +230,7 @@ def _take_off_climb(
     altitudes: tuple[float, float],
     slope: float,
 ) -> _Climb:
-    """Return the climb of a take-off with a slope (m per m).
+    """Return the take-off climb with a given slope (m per m).
 
     start: east and north of home, m.
     altitudes: altitudes of the ground at home and of the end of the take-off, m AMSL.
@@ -289,11 +288,9 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason, check, ok = f"the terrain below {subject} is unknown", "", None
     elif obstacles.is_clear:
-        reason, check, ok = (
-            f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air",
-            "",
-            True,
-        )
+        reason = f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air"
+        check = ""
+        ok = True
     else:
         fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
@@ -311,7 +308,7 @@ def _launch_finding(
 ) -> Finding:
     """Judge the climb of a mission that takes off, towards its next waypoint or on a launch course.
 
-    steepest, gentlest: the steepest climb, and the climb that every aircraft of this model flies at least.
+    steepest, gentlest: the steepest climb, and the least climb that this aircraft can be relied on to fly.
     start: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
     certain_slope: steepest climb reduced by the uncertainty of the aircraft's model, m per m.
     """
@@ -353,7 +350,7 @@ def _launch_finding(
 
 
 def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: float) -> str:
-    """Describe the slope of a climb, and its end if it is beyond the item that the climb leads to.
+    """Describe the slope of a climb, and where the climb ends if that is beyond its item.
 
     end_height: height of the take-off's end above home, m.
     """
@@ -368,7 +365,7 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
 
 
 def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
-    """Return a clause on the part of the steepest climb that is certain; slopes in m per m."""
+    """Return a clause on the slope that is certain, if it is less than the steepest; slopes in m per m."""
     certain_text = _degrees_text(max(0.0, certain_slope))
     return f"; the steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
@@ -505,7 +502,10 @@ def _item_text(place: Place) -> str:
 
 
 def _clearance_text(obstacles: _Obstacles) -> str:
-    """Describe the minimum height above ground on a path without obstacles; "no obstacle" if no height was checked."""
+    """Describe the minimum height above ground on a path without obstacles.
+
+    The text is "no obstacle" if no height was checked.
+    """
     return (
         "no obstacle"
         if math.isinf(obstacles.clearance)
@@ -516,7 +516,7 @@ def _clearance_text(obstacles: _Obstacles) -> str:
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
-    """Make the finding on a climb-out or an approach; `outcome` is its reason."""
+    """Make the finding on a climb-out or an approach, with `outcome` as its reason."""
     return make_finding(
         rule,
         place,

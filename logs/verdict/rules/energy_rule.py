@@ -49,8 +49,8 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    The energy at which a battery failsafe leaves the mission is the limit if it is smaller.  An endless jump fails.  A
-    guessed battery is not judged, and neither is an energy that may exceed the limit if the model's power is uncertain.
+    If a battery failsafe aborts the mission earlier, the energy used up to then is the limit.  An endless jump fails.
+    Nothing is judged if the battery is guessed, or if the model's power is too uncertain.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -109,8 +109,8 @@ def energy_findings(
 def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     """Return the energy that a flight may use, Wh, the limit's source, and a clause on a battery failsafe.
 
-    The clause is "" if the reserve is reached before any failsafe's charge.  The share of one of several batteries in
-    the used charge is unknown, so their failsafes set no limit.
+    The clause is "" if the reserve is reached before any failsafe acts.  With several batteries, their failsafes set no
+    limit, because the share of each battery in the used charge is unknown.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
@@ -130,14 +130,17 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
 
 
 def _max_energy_text(max_energy: float, source: str) -> str:
-    """Return a clause on the upper end of the needed energy, Wh.  source: source of the aircraft's power."""
+    """Return a clause on the most energy that the flight may need, Wh.
+
+    source: source of the aircraft's power.
+    """
     return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
-    """Return a fault if a jump is endless, with the number of rounds for which the usable energy (Wh) lasts.
+    """Return a fault if a jump is endless, with the number of rounds that the usable energy (Wh) permits.
 
-    energy_ratio: ratio of the energy as flown to the prediction; 1 if it is not known.
+    energy_ratio: ratio of the flown energy to the predicted energy; 1 if it is not known.
     """
     route = requirements.setup.route
     if route.endless_jump is None:
@@ -241,9 +244,10 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
 
 
 def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> Message | None:
-    """Return a message if the battery may last only for the return before the mission ends; None if it lasts longer.
+    """Return a message if the battery's remaining time may trigger a return before the mission ends, else None.
 
-    The remaining time is that at the end of the mission, and the return the longest: both are bounds for all times.
+    The test compares the shortest remaining time, which is at the end of the mission, with the time of the longest
+    return.  It thus covers all times of the mission.
     """
     failsafe = requirements.setup.autopilot.checks.return_time_failsafe
     if failsafe is None:
@@ -265,10 +269,10 @@ def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> M
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a voltage failsafe may act before the battery is down to its reserve; return "" if it does not.
+    """Explain why a voltage failsafe may act before the battery is down to its reserve; otherwise return "".
 
-    The voltage of a battery under load is not simulated.  A healthy battery with its reserve left has more than
-    `EMPTY_CELL_VOLTAGE_V` in each cell; the number of cells follows from `NOMINAL_CELL_VOLTAGE_V`.
+    The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
+    `EMPTY_CELL_VOLTAGE_V` in each cell.  The number of cells is calculated with `NOMINAL_CELL_VOLTAGE_V`.
     """
     setup = requirements.setup
     if math.isfinite(failsafe.remaining_fraction):
