@@ -481,8 +481,8 @@ def suggest_flying_higher(
     """Suggest flying a leg higher above the ground.
 
     Other suggestions come first where they apply: another altitude of home, if home is that far below the ground;
-    heights above home, if items are below the ground but would be above it with heights above home.  Over varied ground,
-    following the terrain is also suggested.
+    heights above home, if items are below the ground but would be above it with heights above home.  Over varied
+    ground, following the terrain is also suggested.
     """
     if finding.limit is None or finding.margin is None:
         return ()
