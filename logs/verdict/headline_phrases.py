@@ -35,12 +35,12 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)", with the worse of both values.
+    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)", with the value of the margin, or else the worse one.
 
-    If both values are within the limit, return a phrase with the reason.
+    If the value is within the limit, return a phrase with the reason.
     """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
-    worst_value = max(values, key=abs, default=None)
+    worst_value = max(values, key=abs, default=None) if finding.margin is None else finding.value
     limit = finding.effective_limit
     if limit is None or worst_value is None or abs(worst_value) <= abs(limit):
         return reason_phrase(noun, finding)

@@ -77,6 +77,7 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
+    is_plan_steep = bool(faults)
     arc_faults = _steep_arc_faults(requirements, leg, measure)
     ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
     if ground is not None:
@@ -104,6 +105,10 @@ def _leg_finding(
     if measure is not None and not measure.is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
+    # The plan decides if the leg fails by it, as the reason states.
+    compared_slope, tolerance = planned_slope, PLAN_TOLERANCE_RAD
+    if fit is not None and not is_plan_steep:
+        compared_slope, tolerance = fit.value, fit.tolerance
     return make_finding(
         "slope",
         requirements.leg(leg),
@@ -115,8 +120,8 @@ def _leg_finding(
         limit=math.degrees(sign * limit),
         at_least=sign < 0.0,
         source=source,
-        tolerance=math.degrees(PLAN_TOLERANCE_RAD if fit is None else fit.tolerance),
-        margin=math.degrees(limit - sign * (planned_slope if fit is None else fit.value)),
+        tolerance=math.degrees(tolerance),
+        margin=math.degrees(limit - sign * compared_slope),
         unit="deg",
         method=method,
         check=check,
@@ -467,10 +472,10 @@ def _flown_faults(
     if fit is not None:
         flown_slope = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
-            limit_text = _no_progress_text(requirements, leg) if limit == 0.0 else ""
-            faults["slope"] = message(
-                f"flown at {flown_slope:+.1f}°, {limit_text or f'steeper than the limit of {math.degrees(limit):.1f}°'}"
-            )
+            limit_deg, tolerance_deg = math.degrees(limit), math.degrees(fit.tolerance)
+            limit_text = f"steeper than the limit of {limit_deg:.1f}° with its tolerance of {tolerance_deg:.1f}°"
+            no_progress_text = _no_progress_text(requirements, leg) if limit == 0.0 else ""
+            faults["slope"] = message(f"flown at {flown_slope:+.1f}°, {no_progress_text or limit_text}")
         elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):
