@@ -603,6 +603,23 @@ def test_one_place_has_one_suggestion(page: Browser) -> None:
     assert len(places) == len(set(places))
 
 
+# The progress of a plan on the planner's two buttons, after either of them was pressed.
+PRESSED = """import('/panel.js').then(({ Panel }) => {
+  const buttons = ['1', '6'].map((ways) => document.querySelector(`#panel-plan [data-job=plan][data-ways="${ways}"]`));
+  return [1, 6].map((waysAsked) => {
+    const panel = Object.assign(Object.create(Panel.prototype), { waysAsked });
+    panel.working({ job: 'plan', share: 0, text: '' }, false);
+    const shares = buttons.map((one) => one.dataset.share || null);
+    panel.stopped('plan');
+    return shares;
+  });
+})"""
+
+
+def test_of_two_buttons_of_one_work_the_pressed_one_shows_its_progress(page: Browser) -> None:
+    assert page.value(PRESSED) == [["0 %", None], [None, "0 %"]]
+
+
 def test_stop_and_a_mended_error_are_said(page: Browser) -> None:
     page.value("document.getElementById('tab-verdict').click()")
     message = "document.getElementById('message')"
