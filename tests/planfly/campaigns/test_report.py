@@ -273,6 +273,8 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     write_winds(tmp_path, base, ESTIMATED, "planfly winds x")
     page = (tmp_path / "winds.html").read_text()
     # Of a direction that is known, and of one whose interval ends beyond.
+    # On a narrow screen its cells are broken into lines, and nothing is cut.
+    assert "td.n, th.n, td.u { white-space: normal; }" in page[page.index("@media (max-width: 44rem)") :]
     assert '<td class="n">7.0 m/s</td><td class="n">6.5 to 7.5</td>' in page
     assert '<td class="n">over 20 m/s</td><td class="n">18.0 to over 20</td>' in page
     write_winds(tmp_path, base, FOUND, "planfly winds x")
