@@ -509,9 +509,8 @@ def _lost_lines(winds: WindsResult) -> list[str]:
         for number in winds.lost[:10]
     )
     return [
-        f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died; they"
-        " count as not flyable:"
-        f" {flight_texts}"
+        f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died; they count"
+        f" as not flyable: {flight_texts}"
     ]
 
 

@@ -127,15 +127,13 @@ def test_flights_are_counted_by_wind() -> None:
     first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(ESTIMATED)[1] == (
-        "by the best estimate, flyable with P >= 0.9 in wind up to 7.0 m/s from 0° (the lowest; 6.5 to"
-        " 7.5 m/s at 95 %),"
-        " and up to over 20 m/s from 270° (the highest)"
+        "by the best estimate, flyable with P >= 0.9 in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95"
+        " %), and up to over 20 m/s from 270° (the highest)"
     )
     alike = replace(ESTIMATED, boundaries=(*(WindBoundary(20.0, 18.0 + k, 20.0, True) for k in (1, 0, 1, 1)),))
     assert wind_lines(alike)[1] == (
-        "by the best estimate, flyable with P >= 0.9 in wind up to over 20 m/s from 90° (the lowest;"
-        " 18.0 to over 20 m/s"
-        " at 95 %)"
+        "by the best estimate, flyable with P >= 0.9 in wind up to over 20 m/s from 90° (the lowest; 18.0 to over 20"
+        " m/s at 95 %)"
     )
 
 
