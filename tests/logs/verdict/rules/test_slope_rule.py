@@ -278,9 +278,8 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
         assert told == [("full throttle", 20.0, "s")]
         assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
         assert verdict.headline == (
-            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because"
-            " the aircraft's limits are uncertain;"
-            " an aircraft from a data sheet"
+            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because the"
+            " aircraft's limits are uncertain; an aircraft from a data sheet"
         )
         assert verdict.levels[0].undecided
 
