@@ -321,7 +321,7 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Return a message on a leg's planned slope, which exceeds its limit, and on the limit."""
+    """Return a message on a leg's planned slope, which is too steep, and on its limit."""
     planned_slope = float(requirements.slopes[leg])
     verb = "climbs" if planned_slope >= 0.0 else "descends"
     slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
@@ -340,9 +340,10 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
 
 
 def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
-    """State ground speed and wind if the aircraft cannot climb or descend on a leg against the wind; otherwise "".
+    """State ground speed and wind if the aircraft makes no progress in a climb or descent; otherwise "".
 
-    The horizontal part of the airspeed on the steepest climb or descent is then not larger than the headwind.
+    This is the case if the horizontal part of the airspeed, on the steepest climb or descent, is not larger than the
+    headwind.
     """
     speed, envelope = float(requirements.route.leg_airspeeds[leg]), requirements.setup.envelope
     for altitude in requirements.points[leg : leg + 2, 2].tolist():

@@ -212,7 +212,7 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     limits, wind = setup.scenario.limits, setup.scenario.wind
 
     def angle(value: float | str) -> str:
-        """Return a limit on an angle as text, or that the aircraft's limit applies."""
+        """Return a limit on an angle as text, or a text which states that the aircraft's limit applies."""
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
     wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
@@ -277,7 +277,7 @@ def mission_notes(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Return facts on the energy drawn from the battery, other than the amount in `flight_sentence`."""
+    """Return facts on the energy drawn from the battery, except the amount that `flight_sentence` states."""
     if track is None or len(track) == 0:
         return []
     used_energy = float(track.energy[-1])

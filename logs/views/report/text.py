@@ -81,7 +81,7 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
 
     None and non-finite values become an en dash.
 
-    digits: number of decimals, if all numbers of a column need the same.
+    digits: number of decimals, for columns in which all numbers need the same number.
     """
     if value is None or not math.isfinite(value):
         return NOTHING
@@ -148,7 +148,7 @@ def headline_without_answer(badge: Badge, headline: str) -> str:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text: failed, then those that leave the verdict open, passed, not judged.
+    """Return all findings as text, in this order: failed, undecided, passed, not judged.
 
     Within each state, the order of the verdict is kept.
 
@@ -183,7 +183,7 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
 def first_remedy(verdict: Verdict) -> FindingRow | None:
     """Return the first failed finding with a remedy, or None if none has one.
 
-    A ground contact comes before all others.
+    A finding on ground contact comes before all others.
     """
     worst = [rule.failed[0] for rule in verdict.present().failed_rules]
     # A ground contact ended the flight; the sort keeps the order of the others.
