@@ -20,6 +20,7 @@ from logs.verdict.returns.suggest_returns import Remedy
 from logs.verdict.wording import quantity_text
 from world.frames import to_geo
 from world.scenario import Scenario
+from world.wording import count_text
 
 # Texts for the outcome of one return, and of several returns.
 _SINGULAR_TEXTS: dict[Kind, str] = {
