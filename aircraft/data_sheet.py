@@ -563,9 +563,8 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
     sheet: the sheet with missing values filled in.
     drag: function that returns the drag in level flight (N) at an airspeed (m/s).
 
-    The performance is the climb and the top speed in the returned sheet. The performance is the climb and the top speed
-    in the returned sheet. Raises FlightError, with the feasible range of a stated value, if no propeller meets the
-    sheet.
+    The performance is the climb and the top speed in the returned sheet. Raises FlightError, with the feasible range of
+    a stated value, if no propeller meets the sheet.
     """
     try:
         return _size_any_motor(stated_sheet, sheet, drag)

@@ -143,6 +143,7 @@ def ground_height(heights: Heights, to_pixel: PolyMapRecord, east: float, north:
 def _ground_heights(
     heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats
 ) -> Floats:  # pragma: no cover
+    """Return the ground height at n positions, m AMSL, (n,)."""
     ground_heights = np.empty(east.size)
     for k in range(east.size):
         ground_heights[k] = ground_height(heights, to_pixel, east[k], north[k])

@@ -139,4 +139,5 @@ def _parse_entry(line: str, where: TextLine) -> Entry:
 
 
 def _shorten(text: str) -> str:
+    """Return a text in quotes, at most 40 characters long."""
     return repr(text if len(text) <= 40 else text[:37] + "...")

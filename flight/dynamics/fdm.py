@@ -92,6 +92,7 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
             os.dup2(cpp_file.fileno(), 1)
 
             def text() -> str:
+                """Return what has been printed so far."""
                 cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
                 return cpp_output + python_output.getvalue()
 

@@ -352,6 +352,7 @@ def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_ban
     """
 
     def limit_in_rad(value: float | str) -> float | None:
+        """Return an angle limit in rad; None for a limit that is a word."""
         return None if isinstance(value, str) else math.radians(value)
 
     scenario_limits = scenario.limits

@@ -307,16 +307,18 @@ def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, 
 
 
 @inlined
-def _shift_towards_missile(z: float, altitude_change: float, below: float, above: float) -> float:
+def _shift_towards_missile(start_height: float, altitude_change: float, below: float, above: float) -> float:
     """Return the height of a segment's start above a missile, reduced by the tracking error, m.
 
     The segment is shifted towards the missile by up to the tracking error.
 
+    start_height: height of the segment's start above the missile, m.
     altitude_change: altitude change of the segment up to its closest point, m.
+    below, above: vertical tracking error, m.
     """
-    height = z + altitude_change
-    shift = min(height, below) if height > 0.0 else max(height, -above)
-    return z - shift
+    closest_height = start_height + altitude_change
+    shift = min(closest_height, below) if closest_height > 0.0 else max(closest_height, -above)
+    return start_height - shift
 
 
 @inlined

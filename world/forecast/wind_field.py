@@ -226,6 +226,7 @@ def interpolate_field(
 def _interpolate_points(
     field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
 ) -> Floats:
+    """Return the wind and its altitude at n points, (n, 3), by `interpolate_field`."""
     found = np.empty((seconds.size, 3))
     for k in range(seconds.size):
         east, north, altitude = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])

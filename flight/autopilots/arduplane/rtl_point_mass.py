@@ -138,6 +138,7 @@ def fly_returns(
     min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
 
     def fly(k: int, positions: Floats, result: Record) -> None:
+        """Simulate the RTL from start k, and fill its positions and its result."""
         fly_stages(
             starts[k],
             stages[k],

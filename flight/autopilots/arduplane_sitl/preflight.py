@@ -56,6 +56,7 @@ class Preflight(Conversation):
 
 
 def _home_item(home: Home) -> MissionItem:
+    """Return home as mission item 0."""
     return MissionItem(
         0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt
     )

@@ -32,6 +32,7 @@ def arduplane_launch(
     """
 
     def prepare(folder: Path) -> Launch:
+        """Write the program's defaults into a folder, and return its command line."""
         text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
         (folder / _DEFAULTS_FILE).write_text(text, encoding="ascii")
         start_position = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
