@@ -94,7 +94,7 @@ def adapted_period(
     track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
     track_proximity: 0 far from the track, 1 on the track.
     """
-    # Without wind or curvature nothing limits the period from above.
+    # Without wind or curvature the period is that of a straight track.
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
     damping = parameters.npfg_damping
