@@ -172,7 +172,7 @@ class PhysicsPort:
         return data
 
     def _send(self, data: bytes) -> None:
-        """Send bytes to the program; send nothing before its first datagram."""
+        """Send bytes to the program, if there are any."""
         if not data:
             return
         try:
