@@ -277,7 +277,7 @@ def friction_accelerations(
     acceleration, angular_acceleration: accelerations without friction, relative to the earth.
     """
     inverse_mass, inverse_inertia = 1.0 / frame.mass, matrix_of(frame.inverse_inertia)
-    # Entry j of row i: acceleration at contact j along direction j for a unit friction force i; the matrix is symmetric.
+    # Entry j of row i: acceleration at contact j along direction j for a unit friction force i (symmetric).
     for i in range(count):
         friction = frictions[i]
         direction = vector_of(friction.direction)

@@ -476,6 +476,7 @@ def _add_slopes(
     for i in range(path.shape[0] - 1):
         dx, dy, altitude_change = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
         horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        # Kind 0 is the climb limit, kind 1 the dive limit, and kind 2 the minimum length.
         for kind in range(3):
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0

@@ -298,7 +298,7 @@ def _steer(
 ) -> bool:
     """Set the setpoints of bank, pitch and throttle for one tick.
 
-    Return True once an RTL to a landing flies the landing sequence, and not the climb before it.
+    Return True once an RTL to a landing flies the landing sequence instead of the climb before it.
     """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)
