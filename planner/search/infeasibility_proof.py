@@ -266,6 +266,7 @@ def _reaches_destination(
         while range_index + 1 < range_counts[i, j] and range_bottoms[i, j, range_index + 1] < point[2]:
             range_index += 1
         ends[k] = (i * rows + j) * range_limit + range_index
+    # Depth-first search over open ranges; ranges of neighbouring columns are connected if they overlap.
     is_visited = np.zeros(range_bottoms.size, dtype=np.bool_)
     stack = np.empty(range_bottoms.size, dtype=np.int64)
     stack[0], stack_size = ends[0], 1
