@@ -448,7 +448,7 @@ def scenario_from_spec(
 def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
     """Return a scenario file's data with absolute paths.
 
-    The paths are those of the aircraft's folder, the parameter file and the forecast.
+    The paths lead to the aircraft's folder, the parameter file and the forecast.
 
     base: folder of relative paths.
     """

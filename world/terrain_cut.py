@@ -296,7 +296,7 @@ class _PlacedTile(NamedTuple):
 
 
 def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Return the grid of a one-degree tile, with longitudes that match those of an area.
+    """Return the grid of a one-degree tile, with longitudes that match the longitudes of an area.
 
     Longitudes are shifted by multiples of 360 degrees.
 

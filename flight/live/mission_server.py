@@ -125,7 +125,7 @@ def from_message(message: Any, source: str) -> MissionItem:
 
 
 def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
-    """Return the mission in uploaded lists, and the offset between its item numbers and those of stations.
+    """Return the mission in uploaded lists, and the offset between its item numbers and the stations' numbers.
 
     As in ArduPilot, item 0 is home if it is a waypoint with an altitude above mean sea level or without parameters. The
     `mission` plugin of MAVSDK sends no home, and its waypoints are relative and have a radius.

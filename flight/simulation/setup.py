@@ -338,7 +338,7 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: those of the scenario, and those of the aircraft where it states none.
+    """Return the limits of a path: the scenario's limits, or the aircraft's limits where it states none.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.

@@ -70,7 +70,7 @@ def highest_level_flight(data: ProblemArrays) -> float:
     """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
     Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if both
-    slope limits are those of the aircraft, as in `planner.evaluation.leg_constraints`.
+    slope limits are the aircraft's limits, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):

@@ -206,7 +206,7 @@ def corner_point(
     radius: radius of the turn, m.
     sample: number of the sample.
 
-    The height of a sample is that of the leg, or of the arc between its tangent points.
+    A sample has the height of the leg, or of the arc between its tangent points.
     """
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in

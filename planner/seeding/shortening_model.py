@@ -344,7 +344,7 @@ def _add_missiles(
 ) -> float:
     """Add the distances between legs and missiles to the model; return their contribution to the merit.
 
-    These are the first constraints. The parameters are those of `lagrangian`.
+    These are the first constraints. See `lagrangian` for the parameters.
     """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):

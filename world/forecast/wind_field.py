@@ -94,7 +94,7 @@ class WindField:
     ) -> Floats:
         """Return the wind at n points, m/s, east and north, and the altitude at which it applies, (n, 3).
 
-        The altitude (m AMSL) is that of the point, limited to the levels of the field at the point.
+        The altitude (m AMSL) is the point's altitude, limited to the levels of the field at the point.
 
         seconds: (n,) s, or one value, as all arguments.
         latitudes, longitudes: deg.

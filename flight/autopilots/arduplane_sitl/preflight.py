@@ -24,7 +24,7 @@ class Preflight(Conversation):
     """Conversation with one running ArduPlane."""
 
     def identify(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read those of the named parameters that it has.
+        """Identify the autopilot, and read the named parameters; skip parameters that it lacks.
 
         Raises FlightError if the vehicle is not a fixed wing.
         """

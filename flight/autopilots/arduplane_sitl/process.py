@@ -147,7 +147,7 @@ def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
 
 
 def load_user_parameters(setup: FlightSetup) -> dict[str, float]:
-    """Return the user's parameters: those of the scenario's parameter file, and those of its RTL settings.
+    """Return the user's parameters from the scenario's parameter file and from its RTL settings.
 
     The result includes parameters that are assumed for a mission with a landing, because ArduPlane would otherwise not
     arm.

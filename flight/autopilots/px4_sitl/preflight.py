@@ -34,7 +34,7 @@ class Px4Preflight(Conversation):
     """Conversation with one running PX4."""
 
     def identify(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read those of the named parameters that it has.
+        """Identify the autopilot, and read the named parameters; skip parameters that it lacks.
 
         Raises FlightError if the autopilot is not PX4.
         """

@@ -49,7 +49,7 @@ class UploadedMission:
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """Return the mission to upload for a setup; altitudes are AMSL, except those of rally points.
+    """Return the mission to upload for a setup; altitudes are AMSL, except at rally points.
 
     A mission that begins and ends on the ground is uploaded unchanged.
     """
