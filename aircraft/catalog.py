@@ -149,7 +149,7 @@ def load_aircraft(name: str) -> Aircraft:
         suggestion = did_you_mean(name, names)
         # A folder is only recognized by a slash in its name.
         suggestion = suggestion or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
-        allowed = f"known names: {', '.join(names)}; a folder needs a slash"
+        allowed = f"built-in aircraft: {', '.join(names)}; a folder is written with a slash, such as ./mine"
         message = f"no aircraft called {name!r}{suggestion} ({allowed})"
         raise FlightError(message, file=name, allowed=allowed)
     return read_aircraft(_ROOT / name)
@@ -218,8 +218,8 @@ def _missing_metadata_advice(folder: Path) -> str:
     if not models:
         return ""
     return (
-        f": next to its JSBSim model ({', '.join(models[:3])}) the folder needs {folder.name}.toml;"
-        f" planfly aircraft --new FOLDER makes a folder with all files"
+        f": the folder has a JSBSim model ({', '.join(models[:3])}), but also needs {folder.name}.toml;"
+        " planfly aircraft --new FOLDER makes a folder with all files"
     )
 
 

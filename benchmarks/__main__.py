@@ -32,7 +32,7 @@ TARGET = Path("runs") / "bench.json"
 
 
 def main() -> None:
-    """Measure the parts asked for and keep what the file holds of the others."""
+    """Measure the requested parts; keep the stored results of the others."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("parts", nargs="*", default=[], help=f"of {', '.join(PARTS)}; default: all")
     parser.add_argument("--runs", type=int, default=15, help="seeds of each whole planner run")

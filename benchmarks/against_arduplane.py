@@ -126,7 +126,7 @@ def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airfra
 def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
     """Return an airframe whose plans climb more steeply than ArduPlane's plans in turbulence.
 
-    The throttle then saturates now and then, which is the hardest case for the law.
+    The throttle then saturates at times, which is the hardest case for the control law.
     """
     limits, parameters = airframe.limits, airframe.autopilot.parameters
     assert limits.tracking is not None
@@ -144,7 +144,7 @@ def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
 
 
 def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
-    """Return cross-track distance (m right) and altitude (n,) at each step along every leg, of the rows abeam of it."""
+    """Return cross-track distance (right positive) and altitude at each step along every leg, m, (n,) each."""
     across, up = [], []
     begin = 0
     for start, course, run in zip(*_legs(setup), strict=True):
@@ -164,6 +164,7 @@ def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
 
 
 def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
+    """Measure the flight at each inner corner of a route."""
     starts, courses, runs = _legs(setup)
     found = []
     for i in range(1, len(runs)):
@@ -197,7 +198,7 @@ def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
 
 
 def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
-    """Fly one random plan with both."""
+    """Fly one random plan with ArduPlane and with its model."""
     setup, airframe = random_setup(seed, steep=steep)
     law = fly_to_end(Flight(setup, airframe.aircraft))
     assert isinstance(setup.autopilot, ArduPlane)
@@ -218,6 +219,7 @@ def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
 
 
 def _differences(values: Floats) -> tuple[float, float]:
+    """Return the RMS and the largest absolute value of differences."""
     return math.sqrt(float((values**2).mean())), float(np.abs(values).max())
 
 
@@ -257,6 +259,7 @@ def kept_flight(compared: Compared, setup: FlightSetup) -> dict[str, Any]:
 
 
 def _print(one: Compared, seconds: float) -> None:
+    """Print one comparison, with the time that it took, s."""
     pairs = zip(one.law.corners, one.real.corners, strict=True)
     over = " ".join(f"{law.turn_deg:.0f}°:{law.overshoot:.1f}/{real.overshoot:.1f}" for law, real in pairs)
     (law_low, law_high), (low, high) = one.law.height_error, one.real.height_error

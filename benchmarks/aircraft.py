@@ -20,7 +20,7 @@ PUBLISHED_CONSTANTS = np.array([22.62885, 130.88368, 5.29474, -36.11239])
 
 
 def against_the_book() -> dict[str, float]:
-    """Return the worst relative errors of trim, modes, published trim and constants, on a flat non-rotating planet."""
+    """Return the worst relative errors of trim, modes, published trim and constants, over a flat planet."""
     aerosonde = load_aircraft("aerosonde")
     world = reference.BookAtmosphere()
     trims, modes = [], []

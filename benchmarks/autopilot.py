@@ -59,16 +59,19 @@ def autopilot_cost(make_flight: Callable[[int], SitlFlight], seed: int) -> Autop
 
 
 def run() -> dict[str, Any]:
-    """Print and return the figures of the median flight, by the programs' names."""
+    """Print and return the figures of the median flight, by name of the program."""
     aerosonde = load_aircraft("aerosonde")
 
     def mission(seed: int) -> FlightSetup:
+        """Make the setup of the mission with a seed."""
         return setup_maker(aerosonde)(standard(), wind=(5.0, 250.0), turbulence="light", seed=seed)
 
     def arduplane(program: Path, seed: int) -> SitlFlight:
+        """Make a flight of the mission by ArduPlane's program."""
         return AutopilotFlight(mission(seed), aerosonde, arduplane_program(program), {})
 
     def px4(program: Path, seed: int) -> SitlFlight:
+        """Make a flight of the mission by PX4's program."""
         autopilot = Px4Sitl(Px4Parameters.load(aerosonde), binary=program)
         return Px4Flight(replace(mission(seed), autopilot=autopilot), aerosonde, autopilot)
 

@@ -205,6 +205,7 @@ def measure_paths(terrain: Path, seeds: int) -> None:
         print(f"paths by {name}: {EVALUATIONS:,} evaluations, {seeds} seeds; median, worst")
 
         def cost(rows: Floats, decode: Callable[[Floats, Floats], Floats] = decode) -> Floats:
+            """Make the function of a BBOB problem: the error of points."""
             return np.asarray(path_costs(decode(rows, ground), ground, CYLINDERS))
 
         for model in MODELS:
@@ -223,22 +224,27 @@ def functions(seed: int) -> dict[str, Cost]:
     scales = 10.0 ** (6.0 * np.arange(VARIABLES) / (VARIABLES - 1))
 
     def turned(points: Floats) -> Floats:
+        """Shift and rotate points."""
         return np.asarray((points - bottom) @ turn)
 
     def rosenbrock(points: Floats) -> Floats:
+        """Return Rosenbrock's function of points."""
         z = turned(points) * 0.4 + 1.0
         return np.asarray((100.0 * (z[:, 1:] - z[:, :-1] ** 2) ** 2 + (z[:, :-1] - 1.0) ** 2).sum(axis=1))
 
     def rastrigin(points: Floats) -> Floats:
+        """Return Rastrigin's function of points."""
         z = turned(points)
         return np.asarray((z**2 + 10.0 * (1.0 - np.cos(2.0 * np.pi * z))).sum(axis=1))
 
     def ackley(points: Floats) -> Floats:
+        """Return Ackley's function of points."""
         z = turned(points) * 6.0
         ripples = np.exp(np.cos(2.0 * np.pi * z).mean(axis=1))
         return np.asarray(20.0 * (1.0 - np.exp(-0.2 * np.sqrt((z**2).mean(axis=1)))) + math.e - ripples)
 
     def griewank(points: Floats) -> Floats:
+        """Return Griewank's function of points."""
         z = turned(points) * 120.0
         waves = np.cos(z / np.sqrt(np.arange(1, VARIABLES + 1))).prod(axis=1)
         return np.asarray((z**2).sum(axis=1) / 4000.0 - waves + 1.0)
@@ -258,6 +264,7 @@ def bbob_functions(seed: int) -> dict[str, Cost]:
     from cocoex import BareProblem
 
     def cost(number: int) -> Cost:
+        """Return the costs of paths, decoded from rows of variables."""
         problem = BareProblem("bbob", number, VARIABLES, seed)
         least = float(problem.best_value())
         return lambda points: np.array([problem(point) for point in points]) - least
@@ -272,7 +279,10 @@ def by_model(model: Model, cost: Cost, seed: int) -> float:
 
 
 def by_cmaes(cost: Cost, seed: int) -> float:
-    """Return the smallest value of `cmaes.CMA` from the centre, a sixth of the box wide, with random restarts."""
+    """Return the smallest value that `cmaes.CMA` finds, starting at the centre, with random restarts.
+
+    The initial distribution is a sixth of the box wide.
+    """
     from cmaes import CMA
 
     bounds, rng = np.tile([-5.0, 5.0], (VARIABLES, 1)), np.random.default_rng(seed)

@@ -46,6 +46,7 @@ def run() -> dict[str, Any]:
     steps = round(seconds * FDM_HZ)
 
     def bare() -> None:
+        """Step JSBSim alone, without guidance."""
         fdm = Fdm(airframe.aircraft, rate_hz=FDM_HZ)
         trim = fdm.start(36.5, -84.2, 600.0, 0.0, airframe.airspeed)
         fdm.write(np.array(trim.commands()))
@@ -97,6 +98,7 @@ def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int 
     log = folder / "flight.mcap"
 
     def fly(every: int) -> None:
+        """Fly and record every n-th row."""
         with Recorder(log, setup, every=every, batch=BATCH_S) as recorder:
             ended = ""
             for block in simulate(Flight(setup, airframe.aircraft)):

@@ -38,6 +38,7 @@ def main() -> None:
 
 
 def _compare(kind: str, name: str, law: float, real: float, ratios: dict[str, list[float]]) -> None:
+    """Print the value of the model, of the real autopilot, and their ratio, and store the ratio."""
     if not math.isfinite(law / real):
         # Left before its distance from the centre had settled.
         return

@@ -69,15 +69,18 @@ class Errors:
 
 @cache
 def aerosonde() -> Aircraft:
+    """Return the Aerosonde."""
     return load_aircraft("aerosonde")
 
 
 @cache
 def maker() -> MakeSetup:
+    """Return the function that makes setups for the Aerosonde."""
     return setup_maker(aerosonde())
 
 
 def errors_of(flown: SimulatedFlight) -> Errors:
+    """Return the tracking errors of a flight, without its first seconds."""
     kept = flown.track.time > SETTLING
     cross = flown.track.cross_track[kept].astype(np.float64)
     height = flown.track.height_error[kept].astype(np.float64)
@@ -86,10 +89,12 @@ def errors_of(flown: SimulatedFlight) -> Errors:
 
 
 def _rms(values: Floats) -> float:
+    """Return the root mean square of values."""
     return math.sqrt(float((values**2).mean()))
 
 
 def _most(values: NDArray[Any]) -> float:
+    """Return the largest absolute value."""
     return float(np.abs(values).max())
 
 
@@ -113,14 +118,17 @@ def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: f
 
 
 def calm() -> Errors:
+    """Fly the standard mission in calm air."""
     return errors_of(fly_to_end(Flight(maker()(standard()), aerosonde())))
 
 
 def steady(seeds: Sequence[int]) -> list[Errors]:
+    """Fly the standard mission in steady wind, once for each seed."""
     return [errors_of(fly_to_end(Flight(windy(seed, turbulence="none"), aerosonde()))) for seed in seeds]
 
 
 def moderate(seeds: Sequence[int], guidance_hz: int = 60) -> list[Errors]:
+    """Fly the standard mission in wind and moderate turbulence, once for each seed."""
     setups = [replace(windy(seed), guidance_hz=cast("Any", guidance_hz)) for seed in seeds]
     return [errors_of(fly_to_end(Flight(setup, aerosonde()))) for setup in setups]
 
@@ -138,6 +146,7 @@ def anywhere(seeds: Sequence[int]) -> list[Errors]:
 
 
 def mismatched(seeds: Sequence[int]) -> dict[str, list[Errors]]:
+    """Fly aircraft that differ from their model, once for each kind of difference and seed."""
     # The same slopes for all, although at a lower voltage the motor gives up to a quarter less climb.
     return {
         name: [errors_of(fly_to_end(Flight(windy(seed), aerosonde(), variation=variation))) for seed in seeds]
@@ -218,7 +227,7 @@ def loop_cost(
     ardupilot: bool = False,
     engine: EngineChoice = "auto",
 ) -> LoopCost:
-    """Compare the CPU time of the closed loop with bare JSBSim, without the set-up, in the median round.
+    """Compare the CPU time of the closed loop with JSBSim alone, without the set-up, in the median round.
 
     Both step the same configuration at the same rate, in turns of ten seconds of flight, so that both are slowed down
     alike on a busy machine.
@@ -270,7 +279,7 @@ def demo_setup() -> FlightSetup:
 
 
 def engine_cost(setup: FlightSetup, rounds: int = 5) -> EngineCost:
-    """Fly a setup in both engines in turns, without its start, and require that both give the same bytes."""
+    """Measure a setup's flight in both engines, without its start, and check that both give equal bytes."""
     spent: dict[EngineChoice, list[float]] = {"jsbsim": [], "auto": []}
     tracks: dict[EngineChoice, bytes] = {}
     seconds = 0.0
@@ -319,6 +328,7 @@ def rows(seeds: int = 20) -> dict[str, float]:
     found: dict[str, float] = {}
 
     def tracking(name: str, flights: Sequence[Errors]) -> None:
+        """Add the rows of the tracking errors of some flights."""
         for key in ("cross_rms", "height_rms"):
             found[f"{name}: {key}, median"] = float(np.median([getattr(item, key) for item in flights]))
         for key in ("cross_max", "height_max", "worst"):

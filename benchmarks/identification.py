@@ -156,6 +156,7 @@ def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]
     climb, found = np.degrees(best.climb)
 
     def within(true: Floats, draws: Floats) -> bool:
+        """Return True if the true value is within the 95 % interval of the draws."""
         low, high = np.percentile(draws, [2.5, 97.5])
         return bool(low <= true[0] <= high)
 
@@ -237,6 +238,7 @@ def one_variant(seed: int, repeats: int, shorts: int, factor: float, *, missions
 
 
 def main() -> None:
+    """Identify drawn aircraft from simulated logs, and print the errors."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=1001)
     parser.add_argument("--count", type=int, default=10)

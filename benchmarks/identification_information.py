@@ -148,7 +148,7 @@ def halves(precision: Floats, slopes: Floats, known: Flags) -> dict[str, float]:
 
 
 def stated(base: BaseModel, estimate: Estimate) -> dict[str, float]:
-    """Return half the intervals that an estimate states itself."""
+    """Return half the widths of the intervals that an estimate states."""
     best = performance(base, estimate.values, _CRUISE_MPS, DENSITY)
     drawn = performance(base, draw_aircraft(estimate), _CRUISE_MPS, DENSITY)
     ends = [np.percentile(values, [2.5, 97.5]) for values in (drawn.sink, drawn.power, np.degrees(drawn.climb))]
@@ -161,6 +161,7 @@ def stated(base: BaseModel, estimate: Estimate) -> dict[str, float]:
 
 
 def one_seed(seed: int) -> dict[str, Any]:
+    """Compute the intervals of one drawn aircraft for each kind of noise."""
     truth = drawn_truth(seed)
     values = true_values(truth)
     prior = load_aircraft("aerosonde")
@@ -207,6 +208,7 @@ def one_seed(seed: int) -> dict[str, Any]:
 
 
 def main() -> None:
+    """Print the intervals for each seed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs="+", default=[7001, 7002, 7003])
     parser.add_argument("--out", default="build/information.json")

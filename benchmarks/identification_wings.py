@@ -144,6 +144,7 @@ def one_variant(name: str, seed: int, repeats: int) -> dict[str, Any]:
 
 
 def _errors(found: tuple[float, float, float] | None, true: tuple[float, float, float]) -> dict[str, float]:
+    """Return the errors of climb (deg), sink and power (percent); NaN if the wing cannot fly."""
     if found is None:
         return {"climb_deg": math.nan, "sink_percent": math.nan, "power_percent": math.nan}
     return {
@@ -154,6 +155,7 @@ def _errors(found: tuple[float, float, float] | None, true: tuple[float, float, 
 
 
 def main() -> None:
+    """Identify drawn flying wings from simulated logs, and print the errors."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--first", type=int, default=7301)
     parser.add_argument("--count", type=int, default=3)

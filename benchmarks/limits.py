@@ -67,11 +67,13 @@ class Limit:
 
     @property
     def optimistic(self) -> float:
+        """Excess of the prediction over the flown limit, in the limit's unit."""
         less = self.flown - self.predicted
         return less if self.kind == "leg" else -less
 
     @property
     def conservative(self) -> float:
+        """Shortfall of the prediction, relative to the flown limit."""
         return -self.optimistic / self.flown
 
 
@@ -132,17 +134,20 @@ def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_fr
     low = np.array([0.0, 0.0, AMSL])
 
     def leg(slope: float) -> Floats:
+        """Return the waypoints of a mission with a leg of a slope."""
         run = 1200.0 * aircraft.airspeed / 25.0
         first, second = low, low + 0.8 * run * along
         return np.array([first, second, second + run * (along + np.array([0.0, 0.0, direction * math.tan(slope)]))])
 
     def holds(slope: float) -> bool:
+        """Return True if a flight holds a slope, m per m."""
         flown = fly_to_end(Flight(made_setup(leg(slope), aircraft, wind, wind_from), aircraft))
         return flown.ended == "completed" and _held(flown.track, aircraft.airspeed, direction)
 
     setup = made_setup(leg(0.05), aircraft, wind, wind_from)
 
     def predict(amsl: float) -> float:
+        """Return the predicted limit at an altitude, m AMSL."""
         return setup.limits.slopes(COURSE, amsl)[0 if direction > 0.0 else 1]
 
     flown = bisect(holds, 0.3 * predict(AMSL), 1.6 * predict(AMSL))
@@ -152,6 +157,7 @@ def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_fr
 
 
 def _held(track: Track, airspeed: float, direction: float) -> bool:
+    """Return True if a flight held airspeed and slope on its leg."""
     rows = track.leg == 1
     width = round(5.0 / float(np.median(np.diff(track.time))))
     speed = track.airspeed[rows].astype(np.float64) - airspeed
@@ -168,10 +174,12 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
     straight = 60.0 * aircraft.airspeed
 
     def points(leg: float) -> Floats:
+        """Return the waypoints of a mission with a leg of a length (m) between two turns."""
         runs = np.array([straight, leg, straight])[:, None]
         return np.array([0.0, 0.0, AMSL]) + np.vstack([np.zeros(3), np.cumsum(runs * directions, axis=0)])
 
     def fly(leg: float) -> Track | None:
+        """Fly a mission with a leg of a length, m; return its track, or None if it ended early."""
         with flown_with(replace(load_gains(aircraft), arc_slowing_max=0.0)):
             flown = fly_to_end(Flight(made_setup(points(leg), aircraft, wind, wind_from), aircraft))
         return (
@@ -186,6 +194,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
     bank = min(max(_held_bank(apart), BANK) + BANK_HELD, MAX_BANK)
 
     def holds(leg: float) -> bool:
+        """Return True if a flight with a leg of a length (m) keeps the bank and its legs."""
         track = fly(leg)
         return track is not None and _held_bank(track) <= bank and float(np.abs(track.cross_track).max()) <= CROSS_HELD
 

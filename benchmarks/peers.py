@@ -231,6 +231,7 @@ def _time_to(item: Found, ratio: float, never: float) -> float:
 
 
 def _print_row(problem: str, name: str, item: Found, known: float) -> None:
+    """Print the result of a planner on a problem."""
     print(
         f"  {problem:<13}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
         f"{item.length_ratio / known:>8.4f}{item.seconds:>8.2f}{item.checks:>9}{100 * item.callback_share:>8.0f}%"
@@ -247,6 +248,7 @@ def solve_with_planfly(task: Task, seed: int) -> Found:
     trace: list[tuple[float, float]] = []
 
     def see(path: Floats) -> None:
+        """Add a certified path to the trace if it is shorter than all earlier ones."""
         length = task.length_ratio(path)
         if (not trace or length < trace[-1][1]) and is_safe(task.certificate(path)):
             trace.append((time.process_time() - started, length))

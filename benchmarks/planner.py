@@ -174,6 +174,7 @@ def whole_searches(seeds: int) -> dict[str, Any]:
 
 
 def _searches_of(task: Task, algorithm: str, seeds: int) -> dict[str, Any]:
+    """Search a problem with each seed, and return times and results."""
     limits = task.problem.limits
     plan_path(task.scenario, limits, seed=1, algorithm=algorithm)
     safe, seconds, first, most = [], [], [], 0

@@ -100,6 +100,7 @@ def _score_rates(
     null, alone, identified = score_predictions(estimate_model(earlier, base), judged, base, "base").predictions
 
     def by_axis(values: Iterable[float]) -> dict[str, float]:
+        """Return rounded values by the name of their axis."""
         return {name: round(value, 3) for name, value in zip(AXES, values, strict=True)}
 
     return {

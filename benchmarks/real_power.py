@@ -112,11 +112,13 @@ _NAMES = ("tail_drag", "wing_drag", "aspect_power", "loss_mass", "avionics")
 
 
 def _to_vector(prior: PowerPrior) -> Floats:
+    """Return the coefficients as a vector; positive ones as logarithms."""
     values = {name: getattr(prior, name) for name in _NAMES}
     return np.array([math.log(value) if name in _POSITIVE else value for name, value in values.items()])
 
 
 def _from_vector(values: Floats) -> PowerPrior:
+    """Return the coefficients from a vector; the inverse of `_to_vector`."""
     pairs = zip(_NAMES, values.tolist(), strict=True)
     return PowerPrior(**{name: math.exp(value) if name in _POSITIVE else value for name, value in pairs})
 
@@ -126,6 +128,7 @@ def fit_prior(known: list[RealAircraft], drags: tuple[MeasuredDrag, ...] = DRAGS
     mean, deviations = _to_vector(PRIOR), np.array([getattr(PRIOR_SD, name) for name in _NAMES])
 
     def residuals(values: Floats) -> Floats:
+        """Return the errors of powers, drags and coefficients, in standard deviations."""
         prior = _from_vector(values)
         predicted = [predict_power(prior, real) for real in known]
         power_errors = [math.log(power / real.power) / sd for (power, sd), real in zip(predicted, known, strict=True)]

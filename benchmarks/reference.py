@@ -94,6 +94,7 @@ def numpy_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 
 @njit
 def _bilinear_at(heights: NDArray[np.float32], col: float, row: float) -> float:
+    """Return the height at pixel coordinates; NaN outside the raster."""
     rows, cols = heights.shape
     if not (
         -EDGE_TOLERANCE <= col <= cols - 1 + EDGE_TOLERANCE and -EDGE_TOLERANCE <= row <= rows - 1 + EDGE_TOLERANCE
@@ -108,6 +109,7 @@ def _bilinear_at(heights: NDArray[np.float32], col: float, row: float) -> float:
 
 @njit
 def _exposures_at(threats: Records, point: Floats, out: Floats) -> None:
+    """Add the kill and detection exposure at a point to `out`."""
     for k in range(threats.shape[0]):
         unit = threats[k]
         d2 = (point[0] - unit.east) ** 2 + (point[1] - unit.north) ** 2 + (point[2] - unit.up) ** 2
@@ -212,6 +214,7 @@ def _prefers(u: Floats, v: Floats, columns: Ints, goals: Floats, ends: Ints) -> 
 
 @njit
 def _count_preferred(scores: Floats, columns: Ints, goals: Floats, ends: Ints) -> Ints:
+    """Count, for each row of scores, the rows that are preferred to it."""
     out = np.zeros(scores.shape[0], dtype=np.int64)
     for u in range(scores.shape[0]):
         for v in range(scores.shape[0]):

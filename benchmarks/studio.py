@@ -271,6 +271,7 @@ def measure_memory(folder: Path) -> None:
 
 
 def _sheet(socket: Any) -> dict[str, Any]:
+    """Return the next message of the kind "sheet" from a websocket."""
     while True:
         data = socket.recv(timeout=60)
         if isinstance(data, str) and data.startswith('{"kind":"sheet"'):

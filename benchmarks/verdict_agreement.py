@@ -108,6 +108,7 @@ def main() -> None:
 
 
 def _ordinary(first: int, count: int) -> None:
+    """Count the ordinary missions that the model's verdict refuses."""
     refused = 0
     for seed in range(first, first + count):
         made = ordinary_mission(seed)

@@ -31,7 +31,7 @@ _FINE_INTERVAL_S = 0.1
 
 
 def timed(words: str, work: Callable[[], Result]) -> tuple[Result, float]:
-    """Do a piece of work twice, and print and return the time of the second pass."""
+    """Do a piece of work twice; print and return the time of the second pass."""
     work()
     begun = perf_counter()
     result = work()
@@ -41,7 +41,7 @@ def timed(words: str, work: Callable[[], Result]) -> tuple[Result, float]:
 
 
 def fresh_places(flown: planfly.FlownMission, every: float, count: int) -> ReturnStarts:
-    """Return places of the flight away from the places at every ``every`` seconds."""
+    """Return places of the flight that differ from those at intervals of ``every`` seconds."""
     starts = flown_starts(flown.setup, flown.track, _FINE_INTERVAL_S)
     off = np.abs((starts.time / every + 0.5) % 1.0 - 0.5) * every
     unseen = np.flatnonzero(off > 0.4 * every)

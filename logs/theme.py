@@ -269,9 +269,13 @@ def replace_colours_by_css_variables(svg: str) -> str:
     """
     variable_by_colour = {text: f"ground-{k}" for k, text in reversed(list(enumerate(GROUND)))}
     variable_by_colour |= {colour(name): name for name in reversed((*PAGE, *LOOKS))}
-    return _HEX.sub(
-        lambda match: f"var(--{variable_by_colour[match[0]]})" if match[0] in variable_by_colour else match[0], svg
-    )
+
+    def replace_colour(match: re.Match[str]) -> str:
+        """Return the variable of a matched colour; a colour without a variable is kept."""
+        variable = variable_by_colour.get(match[0])
+        return match[0] if variable is None else f"var(--{variable})"
+
+    return _HEX.sub(replace_colour, svg)
 
 
 # Pixels of a page to a point of print, and plotly.js' names of markers.

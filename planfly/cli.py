@@ -72,7 +72,8 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
 def _run_command(argv: Sequence[str] | None) -> int:
     """Parse the command line, run its command, and return the exit code.
 
-    An error is written to the files of --json and --junit, so that none of an earlier run is taken for this one's.
+    An error is also written to the files of --json and --junit, so that files of an earlier run are not mistaken for
+    this run's.
     """
     parser = build_parser()
     try:
@@ -101,7 +102,10 @@ def _exit_code_and_text(error: BaseException, parser: CommandParser | None = Non
     parser: parser of the command, whose options replace keywords in the text of a PlanflyError.
     """
     if isinstance(error, PlanflyError):
-        code = FAULT if isinstance(error, CrashError) or _is_machine_error(error.__cause__) else BAD_INPUT
+        # Errors of the machine are, for example, too many open files or a disk error.
+        cause = error.__cause__
+        is_machine_error = isinstance(cause, OSError) and cause.errno in _MACHINE_ERRORS
+        code = FAULT if isinstance(error, CrashError) or is_machine_error else BAD_INPUT
         return code, str(error) if parser is None else error_text(error, parser)
     if isinstance(error, OSError):
         return FAULT, f"{error.filename or 'file'}: {error.strerror or error}"
@@ -109,11 +113,6 @@ def _exit_code_and_text(error: BaseException, parser: CommandParser | None = Non
         text = str(error)
         return FAULT, f"too little memory: {text}" if text and "bad_alloc" not in text else "too little memory"
     return 128 + error.number if isinstance(error, Interrupted) else INTERRUPTED, "interrupted"
-
-
-def _is_machine_error(cause: BaseException | None) -> bool:
-    """Return True if an error of the machine caused an error, such as too many open files or a disk error."""
-    return isinstance(cause, OSError) and cause.errno in _MACHINE_ERRORS
 
 
 def _report_error(code: int, message: object) -> int:

@@ -278,6 +278,7 @@ def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given
 
     @functools.wraps(function)
     def with_defaults(*args: _Taken.args, **keywords: _Taken.kwargs) -> _Given:
+        """Check the arguments, add the defaults of missing options, and call the function."""
         for name in keywords:
             if name not in signature.parameters:
                 hint = did_you_mean(name, signature.parameters)
@@ -416,17 +417,20 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
     >>> flight_entries({"autopilot": "ardupilot-4.6"})["arduplane_version"]
     '4.6'
     """
-    aircraft, params, autopilot = options.get("aircraft"), options.get("params"), options.get("autopilot")
+    aircraft = options.get("aircraft")
+    params = options.get("params")
+    autopilot = options.get("autopilot")
     check_arguments(autopilot=autopilot)
     if program is not None and autopilot is not None:
-        allowed = "not with sitl: a real autopilot flies by its own control laws"
+        allowed = "cannot be combined with `sitl`: a real autopilot flies by its own control laws"
         raise ArgumentError.of_argument("autopilot", autopilot, allowed)
     autopilot_name, _, version = (autopilot or "").partition("-")
+    program_name = None if program is None else program_class_for(program).name
     return {
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": options.get("airspeed"),
-        "autopilot": autopilot_name or None if program is None else program_class_for(program).name,
+        "autopilot": program_name or autopilot_name or None,
         "arduplane_version": version if autopilot_name == "ardupilot" and version else None,
         "px4_version": version if autopilot_name == "px4" and version else None,
         "guidance": options.get("guidance"),

@@ -27,7 +27,7 @@ class NamedFences:
     rally: tuple[MissionItem, ...] = ()
 
     def add_to_mission(self, mission: Mission) -> Mission:
-        """Return the mission with fence and rally points added; warnings state that its own ones still apply."""
+        """Add fence and rally points to a mission; warnings state that those of the mission still apply."""
         if not self.items and not self.rally:
             return mission
         warnings = mission.warnings

@@ -7,7 +7,7 @@ from logs.verdict.rules.fence_rule import make_zone_test
 
 
 def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
-    """Return a plan's mission with a fence, and notes on what the fence leaves out.
+    """Return a plan's mission with a fence, and notes on shapes that the fence omits.
 
     The fence is made from the threats, the area and the zones of the scenario.
 
@@ -21,6 +21,7 @@ def add_plan_fence(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     is_entered_zone = make_zone_test(setup)
 
     def is_entered_shape(shape: tuple[MissionItem, ...]) -> bool:
+        """Return True if the planned path violates a zone of a fence shape."""
         return any(is_entered_zone(zone) for zone in fence_zones(shape, setup.scenario.origin))
 
     return with_fences(setup.mission, setup.scenario, is_entered_shape)

@@ -52,7 +52,8 @@ def threat_tables(threats: Any) -> list[dict[str, Any]]:
 
 def _rows_of_columns(columns: Mapping[str, np.ndarray[Any, Any]]) -> list[dict[str, Any]]:
     """Return the rows of a mapping of columns."""
-    if len({column.shape for column in columns.values()}) > 1 or any(column.ndim != 1 for column in columns.values()):
+    distinct_shapes = {column.shape for column in columns.values()}
+    if len(distinct_shapes) > 1 or any(len(shape) != 1 for shape in distinct_shapes):
         shapes = ", ".join(f"{name} of shape {column.shape}" for name, column in columns.items())
         raise ArgumentError.of_argument("threats", shapes, "expected columns (n,) of equal length")
     values = [column.tolist() for column in columns.values()]

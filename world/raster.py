@@ -196,7 +196,8 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     if not file.is_file():
         suffixes, names = _or_list(SUFFIXES), ", ".join(sorted(EMBEDDED))
         raise TerrainError(
-            f"{file}: terrain path: no such file (a {suffixes} file, or one of: {names}){did_you_mean(path, EMBEDDED)}",
+            f"{file}: no such elevation file (expected a {suffixes} file, or the name of a built-in"
+            f" terrain: {names}){did_you_mean(path, EMBEDDED)}",
             file=file,
         )
     try:

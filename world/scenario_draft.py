@@ -144,7 +144,10 @@ def _survey_ground(
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
         for (keyword, position), endpoint in zip(positions.items(), endpoints, strict=True):
             if not ((bounds[:, 0] + _EDGE_M <= endpoint) & (endpoint <= bounds[:, 1] - _EDGE_M)).all():
-                message = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
+                message = (
+                    f"outside the terrain or within {_EDGE_M:g} m of its edge; {raster.name} covers"
+                    f" {cover_text(raster)}"
+                )
                 raise ArgumentError.of_argument(keyword, position, message, shown=_position_text(position))
         try:
             require_covered(raster, origin, bounds)

@@ -41,7 +41,7 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         for name in ("speed_mps", "from_deg", "gradient"):
             if name in wind:
                 raise ScenarioError.at(
-                    source, f"wind.{name}", wind[name], "not with wind.forecast, which states the wind"
+                    source, f"wind.{name}", wind[name], "not allowed with wind.forecast, which states the wind"
                 )
     spec = check_scenario(data, source)
     if "aircraft" in spec.flight.model_fields_set:

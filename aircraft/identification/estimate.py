@@ -108,7 +108,8 @@ class Estimate:
         """
         fractions = self.log_fractions().tolist()
         return tuple(
-            f"{parameter.title}: its interval stays as assumed before the logs; fly {parameter.show}"
+            f"{parameter.title}: the logs hardly determine it, so its assumed interval remains; to"
+            f" determine it, fly {parameter.show}"
             for parameter, fraction in zip(PARAMETERS, fractions, strict=True)
             if fraction < MIN_LOG_FRACTION
         )

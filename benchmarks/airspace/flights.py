@@ -50,7 +50,7 @@ class Flown:
 
 
 def kept_by(scenario: Scenario, position: Floats) -> Kept:
-    """Compute the margins of positions (n, 3) to a scenario's band and zones directly from the tables of its file."""
+    """Compute the margins of positions (n, 3) to a scenario's band and zones from its tables."""
     terrain, limits = scenario.terrain, scenario.limits
     assert terrain is not None
     assert limits.max_height_m is not None

@@ -42,7 +42,7 @@ _TURBULENCE = ("none", "light")
 
 
 def airspace_scenario(number: int) -> Scenario:
-    """Return the scenario of this number: its first draw with a path of the grid search."""
+    """Return the scenario of this number: the first draw in which the grid search finds a path."""
     draw = 0
     while True:
         scenario = draw_scenario(number, draw)

@@ -57,6 +57,7 @@ def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
     indices = iter(range(flights))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 
@@ -67,7 +68,7 @@ def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
 
 
 def over_simulate(base: CampaignBase, flights: int = 20) -> float:
-    """Return the median CPU time of a campaign's flight relative to `simulate` alone, over some flights."""
+    """Return the median CPU time of a campaign's flight, relative to `simulate` alone."""
     fly_one(base, 0)
     ratios = []
     for index in range(1, flights + 1):

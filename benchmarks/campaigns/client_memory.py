@@ -26,7 +26,7 @@ _WAYPOINTS = 14
 
 
 def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
-    """A made flight with a shape of a real one's size; of no duration, so that none is flown again for its log."""
+    """Return a synthetic flight row as large as a real one, with duration 0, so that no log is flown."""
     row = made_flight(base, index, wind)
     random = np.random.default_rng(index)
     clearance = random.uniform(50.0, 300.0, STATION_COUNT).astype(np.float32)
@@ -35,7 +35,7 @@ def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) 
 
 
 def lead(flights: int, folder: Path) -> None:
-    """Lead a campaign of so many flights, from its first to its report."""
+    """Run a campaign with a number of synthetic flights, including its report."""
     base = open_campaign("jacksboro-air", default_dispersions(), {"seed": 1})
     goal = Goal(None, False, flights, 0.95)
     with open_store(base, goal, folder, resume=False) as store:
@@ -44,7 +44,7 @@ def lead(flights: int, folder: Path) -> None:
 
 
 def client_memory(flights: int) -> float:
-    """Largest resident size of a client of so many flights, MB."""
+    """Return the largest resident size of a client for a number of flights, MB."""
     command = [sys.executable, "-m", "benchmarks.campaigns.client_memory", str(flights)]
     return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1])
 

@@ -63,6 +63,7 @@ def mission_of(seed: int, aircraft: str) -> FieldMission:
 
 
 def _energy(made: FieldMission) -> float:
+    """Return the battery energy of a mission's flight, Wh."""
     airframe = load_airframe(made.scenario)
     return float(
         fly_to_end(Flight(make_setup(made.scenario, airframe, made.mission, 1), airframe.aircraft)).track.energy[-1]
@@ -70,11 +71,13 @@ def _energy(made: FieldMission) -> float:
 
 
 def _judged(setup: FlightSetup, airframe: Airframe, hz: Literal[60, 120]) -> Verdict:
+    """Fly a setup at a step rate, and return the verdict."""
     flown = fly_to_end(Flight(replace(setup, fdm_hz=hz), airframe.aircraft))
     return judge_flight(setup, flown.track, flown.ended)
 
 
 def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
+    """Return the setup of a mission without gusts, in a wind of a speed, m/s."""
     old = made.scenario.wind
     wind = Wind(speed, old.from_course, old.gradient if speed else 0.0, "none", None, old.reference_amsl)
     table = made.scenario.spec.wind.model_copy(update={"speed_mps": speed, "turbulence": "none"})
@@ -84,6 +87,7 @@ def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
 
 
 def _max_distance(setup: FlightSetup, airframe: Airframe) -> float:
+    """Return the largest distance between the flights at both step rates at the same time, m."""
     one, other = (_flown(setup, airframe, hz) for hz in (120, 60))
     rows = min(len(one.track), len(other.track))
     # The flights may differ by one tick in length.
@@ -93,6 +97,7 @@ def _max_distance(setup: FlightSetup, airframe: Airframe) -> float:
 
 
 def _flown(setup: FlightSetup, airframe: Airframe, hz: int) -> SimulatedFlight:
+    """Fly a setup at a step rate."""
     return fly_to_end(Flight(replace(setup, fdm_hz=cast("Any", hz)), airframe.aircraft))
 
 
@@ -114,6 +119,7 @@ def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False
 
 
 def _each(seeds: range, aircraft: str) -> Iterator[StepRates]:
+    """Yield the comparison for each seed."""
     for seed in seeds:
         yield compare(seed, aircraft)
 

@@ -36,7 +36,7 @@ def sobol_draw(dispersions: Dispersions, seed: int, index: int) -> Draw:
 
 
 def fly_sobol(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
-    """Fly one of them by its index; wind: mean wind in the scenario's place."""
+    """Fly one Sobol sample by its index; wind: mean wind instead of the scenario's wind."""
     draw = sobol_draw(base.dispersions, base.seed, index)
     varied = vary_flight(base, draw, wind)
     flown = fly_and_judge(varied.setup, off_nominal=varied.off_nominal, reference="never")

@@ -40,6 +40,7 @@ def fit_probit(speeds: Floats, failed: NDArray[np.bool_]) -> tuple[float, float]
     """Return the wind of 50 % failures and the width of the normal distribution, m/s, of greatest likelihood."""
 
     def loss(parameters: Floats) -> float:
+        """Return the negative log-likelihood of scaled mean and logarithm of the width."""
         z = (speeds / GOAL.most - parameters[0]) / np.exp(parameters[1])
         likelihood = norm.logcdf(z[failed]).sum() + norm.logsf(z[~failed]).sum()
         return float(0.5 * ((parameters[0] - 1.0) ** 2 + (parameters[1] + 2.0) ** 2) / _PRIOR_WIDTH**2 - likelihood)

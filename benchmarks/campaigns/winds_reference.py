@@ -53,7 +53,7 @@ _SEED = 77
 
 
 def demo(seed: int) -> CampaignBase:
-    """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
+    """Return the demo's campaign base, with dispersions but for the mean wind; seed: seed of the draws."""
     base = open_campaign("jacksboro-air", default_dispersions().without(SEARCHED_QUANTITIES), {"seed": 1})
     return replace(base, seed=seed)
 
@@ -72,9 +72,11 @@ def sobol_share_at(base: CampaignBase, wind: GivenWind) -> Tally:
 def _count_outcomes(
     base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tally], bool], fly: FlyOne
 ) -> Tally:
+    """Fly until `ends` returns True for the outcomes so far, or up to `most` flights."""
     indices, flown = iter(range(most)), Tally(0, 0, 0)
 
     def next_request() -> FlightRequest | None:
+        """Return the next request; None if the outcomes decide or all flights are requested."""
         index = None if ends(flown) else next(indices, None)
         return None if index is None else FlightRequest(index, wind)
 
@@ -131,10 +133,10 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
 
 
 def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
-    """Return how often another reference of the same size would have its boundary within 0.5 m/s of this one.
+    """Return the probability that another reference has its boundary within 0.5 m/s of this one.
 
-    Simulated with the most likely distribution of this reference as the truth; a reference with a single wind is
-    treated as certain.
+    The other reference has the same size.  The most likely distribution of this reference is taken as the truth.  A
+    reference with a single wind is treated as certain.
     """
     if len({one["speed"] for one in points}) == 1:
         return 1.0
@@ -151,6 +153,7 @@ def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
 
 
 def _enough_fly(points: list[dict[str, Any]]) -> bool:
+    """Return True if the fraction of flyable flights at points reaches the target."""
     return sum(one["flyable"] for one in points) >= GOAL.target * sum(one["flights"] for one in points)
 
 

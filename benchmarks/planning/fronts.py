@@ -93,6 +93,7 @@ class Contest:
         return np.asarray(kept[order])
 
     def _is_safe(self, path: Floats) -> bool:
+        """Return True if a path is certified and no missile reaches it."""
         made = certify(self.task.problem, path)
         return made.ok and made.kill_distance > 0.0
 
@@ -119,7 +120,7 @@ def make_contest(scenario: Scenario, front: Front) -> Contest:
 
 
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
-    """Plan planfly's front of a problem; return it with its contest and its row."""
+    """Plan a front with planfly; return it with its contest and its row."""
     scenario = _scenario(name)
     limits = load_airframe(scenario).limits.with_margin()
     began = time.process_time()

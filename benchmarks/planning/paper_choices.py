@@ -66,6 +66,7 @@ def _longer(share: float) -> Callable[[Space, int], Encoding]:
     """Return a polar encoding with steps of up to this multiple of the mean leg."""
 
     def encode(space: Space, waypoints: int) -> Encoding:
+        """Make the polar encoding with longer steps."""
         encoding, upper = polar_encoding(space, waypoints), polar_encoding(space, waypoints).upper.copy()
         upper[0::3] *= 0.5 * share
         return replace(encoding, upper=upper)
@@ -77,6 +78,7 @@ def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
     """Return a polar encoding with turning angles up to a limit in degrees."""
 
     def encode(space: Space, waypoints: int) -> Encoding:
+        """Make the polar encoding with wider turning angles."""
         encoding = polar_encoding(space, waypoints)
         lower, upper = encoding.lower.copy(), encoding.upper.copy()
         lower[1::3], upper[1::3] = -math.radians(degrees), math.radians(degrees)
@@ -119,9 +121,11 @@ def searched(choice: Choice, threats: int, seed: int) -> tuple[bool, float]:
     encoding = choice.encode(space, table.waypoints)
 
     def score(vectors: Floats) -> Floats:
+        """Return the scores of paths by the paper's definition."""
         return score_table(*paper_scores(problem.search, np.ascontiguousarray(encoding.decode(vectors))))
 
     def rank(scores: Floats) -> Ints:
+        """Return the ranks of scores by the levels of the choice."""
         return ranks(scores, choice.levels)
 
     rng = stream(seed, PLANNER)

@@ -111,7 +111,7 @@ def safe_plans(fresh: int) -> Iterator[tuple[str, Plan]]:
 
 
 def hold(name: str, plan: Plan, flights: int, workers: int) -> Held:
-    """Fly the campaign of one plan."""
+    """Fly a campaign of one plan."""
     began = time.perf_counter()
     result = planfly.campaign(plan, flights=flights, workers=workers)
     tally = result.summary.estimate.tally

@@ -271,6 +271,7 @@ def plan_public(
     evaluated = 0
 
     def counted(vectors: Floats) -> Floats:
+        """Return the costs of vectors, and count the evaluations."""
         nonlocal evaluated
         evaluated += len(vectors)
         return costs(vectors)

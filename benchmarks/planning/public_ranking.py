@@ -112,6 +112,7 @@ def by_minion(name: str, cost: CountedCost, seed: int) -> None:
     bounds = list(zip(cost.instance.lower.tolist(), cost.instance.upper.tolist(), strict=True))
 
     def costs(vectors: Any) -> list[float]:
+        """Return the costs of vectors; inf once the budget is spent."""
         # An exception must not pass through the package's compiled loop.
         return [math.inf] * len(vectors) if cost.spent >= cost.budget else cost(vectors).tolist()
 

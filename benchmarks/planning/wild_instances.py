@@ -61,6 +61,7 @@ def _ground(peaks: Floats, places: Floats) -> Floats:
 
 
 def _terrain(peaks: Floats) -> dict[str, Any]:
+    """Return the terrain table of a scenario with some peaks."""
     if not len(peaks):
         return {"kind": "flat", "amsl_m": 0.0}
     names = ("east_m", "north_m", "height_m", "sigma_m")

@@ -93,6 +93,7 @@ def _shifted(free: Flags, i: int, j: int) -> Flags:
 
 
 def _shifted_numbers(number: NDArray[np.int64], i: int, j: int) -> NDArray[np.int64]:
+    """Return the numbers of cells that are shifted by i rows and j columns."""
     return number + i * number.shape[1] + j
 
 
@@ -115,6 +116,7 @@ def _taut(scenario: Scenario, points: Floats) -> Floats:
 
 
 def _is_visible(scenario: Scenario, points: Floats, a: int, b: int) -> bool:
+    """Return True if the line between two points of a route is open."""
     return string_is_open(scenario, points[a], points[b])
 
 

@@ -132,10 +132,12 @@ _missions: list[tuple[Aircraft, Case]] = []
 
 
 def _begin(aircraft: Aircraft, trained: Sequence[Case]) -> None:
+    """Store the missions in a worker process."""
     _missions[:] = [(aircraft, case) for case in trained]
 
 
 def _cost(task: tuple[Gains, int]) -> float:
+    """Return the cost of one mission with some gains, in a worker process."""
     gains, number = task
     aircraft, case = _missions[number]
     return cost(aircraft, gains, case)

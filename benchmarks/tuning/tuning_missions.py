@@ -56,6 +56,7 @@ def cases(aircraft: Aircraft, make: MakeSetup, seed: int, numbers: Iterable[int]
 
 
 def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
+    """Make one mission of a seed by its number."""
     random = np.random.default_rng([seed, number])
     # The radius of a turn is proportional to the square of the speed.
     scale = (aircraft.airspeed / 25.0) ** 2
@@ -76,6 +77,7 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
     shares = random.uniform(*TIGHT_LEGS, size=LEGS)
 
     def made(lengths: Floats, climbed: Floats) -> FlightSetup:
+        """Make the setup of legs with these lengths, m, and slopes, rad."""
         return make(
             _way(courses, climbed, lengths, steepest[1]),
             speeds=speeds.tolist(),
@@ -99,7 +101,7 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
 def _way(courses: Floats, slopes: Floats, runs: Floats, climb: float) -> Floats:
     """Return the waypoints (w, 3) of these legs.
 
-    Below `LOW` legs climb (rad, at most), to stay above the ground.
+    A leg that begins below `LOW` climbs, at most at the angle `climb` (rad), to stay above the ground.
     """
     waypoints = [np.array([0.0, 0.0, START_AMSL])]
     for course, slope, run in zip(courses, slopes, runs, strict=True):

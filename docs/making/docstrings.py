@@ -7,7 +7,7 @@ _NAMED = re.compile(r"^([a-z]\w*(?:, [a-z]\w*)*): (.*)$")
 
 
 def as_rst(lines: Iterable[str]) -> list[str]:
-    """Return the lines with each such entry as a list item and its name in bold."""
+    """Return the lines with each argument's entry as a list item and the argument's name in bold."""
     out: list[str] = []
     named = False
     for line in lines:

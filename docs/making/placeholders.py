@@ -38,9 +38,10 @@ BUILT: dict[str, Callable[..., str]] = {"names": public_names}
 
 
 def filled(text: str, *, built: bool = False) -> str:
-    """Return a page with its tables as the code is now.  built: True for the page that Sphinx lays out.
+    """Return a page with its tables updated from the code.
 
-    Raises KeyError for an unknown table, and ValueError for one without an end.
+    built: True for the page that Sphinx lays out.  Raises KeyError for an unknown table, and ValueError for one without
+    an end.
     """
     if len(_BEGIN.findall(text)) != len(_PLACE.findall(text)):
         raise ValueError("a table has no end: <!-- end of NAME --> on a line of its own")
@@ -48,6 +49,7 @@ def filled(text: str, *, built: bool = False) -> str:
 
 
 def _table(found: re.Match[str], built: bool) -> str:
+    """Return the placeholder with the table that it names."""
     name, words = found["name"], found["words"]
     make = BUILT.get(name, MAKERS[name]) if built else MAKERS[name]
     made = make(*words.split()).strip("\n")

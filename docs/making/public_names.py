@@ -60,7 +60,7 @@ def public_names() -> str:
 
 
 def name_tables() -> str:
-    """One table per kind, with the first sentence of each name's docstring."""
+    """Return one table per kind, with the first sentence of each name's docstring."""
     parts = []
     for kind, title in _TITLES.items():
         names = [name for name in dict.fromkeys((*_ORDER, *planfly.__all__)) if kind_of(name) == kind]

@@ -17,7 +17,7 @@ def schema_tables(command: str) -> str:
 
 def _table(schema: dict[str, Any]) -> str:
     rows = [
-        f"| `{name}` | {_type(one)} | {one.get('description', '').replace('|', '/')} |"
+        f"| `{name}` | {_type(one)} | {' '.join(one.get('description', '').split()).replace('|', '/')} |"
         for name, one in schema.get("properties", {}).items()
     ]
     return "| field | type | meaning |\n|---|---|---|\n" + "\n".join(rows)

@@ -4,5 +4,5 @@ from logs.recording.state_channel import FIELDS
 
 
 def state_fields() -> str:
-    """Names in the order of the message."""
+    """Return the names of the state's fields in the order of the message."""
     return ", ".join(f"`{name}`" for name in ["row", *(field.name for field in FIELDS)])

@@ -2,7 +2,6 @@
 
 import ast
 import math
-import re
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -12,14 +11,16 @@ from logs.verdict.rules.registry import RULES
 
 ROOT = Path(__file__).parents[2]
 VERDICT = ROOT / "logs" / "verdict"
-_HEADING = re.compile(r"^# [A-Z][^.]*$")
+# Characters.  A longer text before the first stop of a comment is a sentence, not a unit.
+MAX_UNIT_LENGTH = 60
 
 
 class Tolerance(NamedTuple):
-    """A constant: its name, its formatted value, its meaning, and the heading above it."""
+    """A constant: its name, its formatted value and unit, its meaning, and the heading above it."""
 
     name: str
     value: str
+    unit: str
     text: str
     heading: str
 
@@ -44,12 +45,14 @@ def tolerance_list() -> tuple[Tolerance, ...]:
         if line.startswith("#"):
             comment.append(line[1:].strip())
         elif number in starts:
-            # A constant without a comment shares that of the one above.
-            text = " ".join(comment) or out[-1].text
+            text = " ".join(comment)
             for name, expression in _assigned(starts[number]):
                 angle = "radians" in expression or "math.pi" in expression
                 meaning = text.removeprefix("rad.").strip() if angle else text
-                out.append(Tolerance(name, _shown(getattr(tolerances, name), angle), meaning, heading))
+                unit, _, after = meaning.partition(".  ")
+                has_unit = not angle and after and len(unit) <= MAX_UNIT_LENGTH
+                shown = _shown(getattr(tolerances, name), angle)
+                out.append(Tolerance(name, shown, unit if has_unit else "", after if has_unit else meaning, heading))
         elif not line:
             if comment:
                 heading = " ".join(comment)
@@ -69,13 +72,15 @@ def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
 
 
 def _table(rows: list[Tolerance]) -> str:
-    body = "\n".join(f"| `{one.name}` | {one.value} | {one.text.replace('|', '/')} |" for one in rows)
-    return f"| constant | value | meaning and source |\n|---|---|---|\n{body}"
+    body = "\n".join(f"| `{one.name}` | {one.value} | {one.unit} | {one.text.replace('|', '/')} |" for one in rows)
+    return f"| constant | value | unit | meaning and source |\n|---|---|---|---|\n{body}"
 
 
 def rule_tolerances(rule: str) -> str:
-    """Return the table of the tolerances that a rule and its measures judge with."""
-    return _table([one for one in tolerance_list() if one.name in RULES[rule].tolerances])
+    """Return the names and values of the tolerances that a rule and its measures judge with."""
+    rows = [one for one in tolerance_list() if one.name in RULES[rule].tolerances]
+    body = "\n".join(f"| `{one.name}` | {one.value} |" for one in rows)
+    return f"| constant ([meaning](#all-tolerances)) | value |\n|---|---|\n{body}"
 
 
 def all_tolerances() -> str:

@@ -72,5 +72,7 @@ def choose_release_for_file(
     version = stated or nearest_release(versions, (major, minor))
     if version == found.release:
         return version, ()
-    because = ", as named" if stated else ", the nearest release that planfly simulates"
-    return version, (f"{params} is of {title} {found.release} ({found.evidence}): {version} flies it{because}",)
+    because = "because it was named" if stated else "the nearest release that planfly has"
+    return version, (
+        f"{params} is of {title} {found.release} ({found.evidence}), but {version} is simulated, {because}",
+    )

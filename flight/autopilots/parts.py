@@ -619,6 +619,7 @@ class Candidate(NamedTuple):
     far: value to try that is furthest from the present value, within the range of the reference.
     unit: unit of step and value.
     least: minimum value that may be suggested; the steps start there if the present value is lower.
+    others: names of parameters with the same present value that are changed together with it.
     """
 
     name: str
@@ -626,6 +627,12 @@ class Candidate(NamedTuple):
     far: float
     unit: str
     least: float = -math.inf
+    others: tuple[str, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """Names of all parameters that are changed."""
+        return " and ".join((self.name, *self.others))
 
 
 class TrackingErrorFunction(Protocol):

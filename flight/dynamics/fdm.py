@@ -5,21 +5,14 @@ never reports an error: after a NaN, below ground or after a crash it continues.
 reads.
 """
 
-import contextlib
-import io
 import itertools
 import math
-import os
 import struct
-import sys
-import tempfile
-import threading
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import jsbsim
 import numpy as np
@@ -56,94 +49,7 @@ from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder
 from world.kernels import Record, field_names
-
-# ----------------------------------------------------------------------
-# Suppression of JSBSim's output.
-
-
-# Maximum size of JSBSim's output that is read, bytes.
-_MAX_PRINTED_BYTES = 2**20
-# Held while standard output is suppressed: two threads would each keep the other's replacement.
-_SILENCE_LOCK = threading.RLock()
-
-
-@contextmanager
-def silence() -> Iterator[Callable[[], str]]:
-    """Suppress standard output in this context, because JSBSim prints a banner at every debug level.
-
-    JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. The context yields a function that
-    returns the output of both. Both outputs belong to the process, so only one thread at a time suppresses them. What
-    other threads print meanwhile is not suppressed.
-    """
-    with _SILENCE_LOCK:
-        yield from _suppressed_output()
-
-
-def _suppressed_output() -> Iterator[Callable[[], str]]:
-    """Suppress standard output, and yield a function that returns it; see `silence`."""
-    sys.stdout.flush()
-    saved_descriptor = os.dup(1)
-    try:
-        with (
-            tempfile.TemporaryFile() as cpp_file,
-            _stream_to(saved_descriptor, sys.stdout) as others,
-            contextlib.redirect_stdout(_ThreadOutput(others, sys.stdout)) as python_output,
-        ):
-            os.dup2(cpp_file.fileno(), 1)
-
-            def text() -> str:
-                """Return what has been printed so far."""
-                cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
-                return cpp_output + python_output.getvalue()
-
-            yield text
-    finally:
-        os.dup2(saved_descriptor, 1)
-        os.close(saved_descriptor)
-
-
-class _ThreadOutput(io.StringIO):
-    """Stream that keeps the text of the thread that created it, and passes on the text of other threads.
-
-    others: stream that receives the text of other threads.
-    stdout: standard output, which receives this text once `others` is closed.
-    """
-
-    def __init__(self, others: TextIO, stdout: TextIO) -> None:
-        super().__init__()
-        self._thread, self._others, self._stdout = threading.get_ident(), others, stdout
-
-    def write(self, text: str) -> int:
-        """Keep the text of this thread, and pass on the text of any other thread."""
-        if threading.get_ident() == self._thread:
-            return super().write(text)
-        try:
-            count = self._others.write(text)
-            self._others.flush()
-        except ValueError:
-            # A print that began while the output was suppressed, and ends after it.
-            return self._stdout.write(text)
-        return count
-
-
-@contextmanager
-def _stream_to(saved_descriptor: int, stdout: TextIO) -> Iterator[TextIO]:
-    """Yield a stream that writes to standard output without file descriptor 1.
-
-    saved_descriptor: another descriptor for the file to which descriptor 1 belonged.
-    stdout: standard output, which is yielded if it does not write to descriptor 1, as in a notebook.
-    """
-    try:
-        writes_to_descriptor = stdout.fileno() == 1
-    except (AttributeError, OSError, ValueError):
-        writes_to_descriptor = False
-    if not writes_to_descriptor:
-        yield stdout
-        return
-    encoding, errors = stdout.encoding, stdout.errors
-    with open(saved_descriptor, "w", encoding=encoding, errors=errors, closefd=False) as stream:
-        yield stream
-
+from world.silent_output import silence
 
 # ----------------------------------------------------------------------
 # Valid start of a flight: on the globe except its poles, in the air and below the tropopause.

@@ -108,7 +108,9 @@ class PropertyAccess:
         node = self._manager.get_node(name) if self._manager.hasNode(name) else None
         if node is None:
             raise FlightError(
-                f"{self._model_file}: property {name} is needed and not defined", file=self._model_file, field=name
+                f"{self._model_file}: the model does not define the property {name}, which planfly needs",
+                file=self._model_file,
+                field=name,
             )
         return node
 

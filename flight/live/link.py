@@ -345,16 +345,16 @@ def check_access(access: Access) -> None:
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
     Traceback (most recent call last):
-    world.errors.FlightError: bind 0.0.0.0:14551: reaches beyond this machine; give `sign_key` or `allow`, ...
+    world.errors.FlightError: bind 0.0.0.0:14551: other machines can reach this address; give `sign_key` or ...
     """
     for name, (host, port) in (("bind", access.bind), *(("to", address) for address in access.to)):
         if is_loopback(host) or access.key is not None:
             continue
         if name == "bind" and not access.allowed:
-            allowed = "reaches beyond this machine; give `sign_key` or `allow`, or bind to 127.0.0.1"
+            allowed = "other machines can reach this address; give `sign_key` or `allow`, or bind to 127.0.0.1"
             raise FlightError.of_argument(name, f"{host}:{port}", allowed)
         if name == "to" and host not in access.allowed:
-            allowed = f"reaches beyond this machine; give `sign_key`, or `allow` {host}"
+            allowed = f"is on another machine; give `sign_key`, or `allow` {host}"
             raise FlightError.of_argument(name, f"{host}:{port}", allowed)
     remote_addresses = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
     if remote_addresses and is_loopback(access.bind[0]):

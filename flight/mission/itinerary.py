@@ -57,7 +57,7 @@ ENDLESS_LOITER_TIME_S = 60.0
 # Note on items after a mission's end.
 NEVER_REACHED = "never reached"
 # Note on a landing item whose landing is not simulated.
-LANDING_NOTE = "not flown to the ground; the flight ends above it at the last height"
+LANDING_NOTE = "not flown to the ground; the flight ends above the landing point, at the altitude of the previous item"
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,20 +336,20 @@ def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryB
     """Add open items and notes where an autopilot runs fewer jumps or commands than the mission has."""
     jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
     if len(jumps) > _MAX_COUNTED_JUMPS:
-        text = f"flown, where ArduPlane passes over jumps beyond the first {_MAX_COUNTED_JUMPS} that it meets"
+        text = f"flown, but ArduPlane skips jumps beyond the first {_MAX_COUNTED_JUMPS}"
         builder.add_open_item(f"DO_JUMP: {text}", jumps[_MAX_COUNTED_JUMPS], px4=False)
     elif len(jumps) > _MAX_COUNTED_JUMPS_SMALL_BOARD:
-        board_text = f"a board with little memory passes over jumps beyond {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
+        board_text = f"a board with little memory skips jumps beyond the first {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
         builder.notes.arduplane.add(f"{len(jumps)} jumps: {board_text}")
     if _MAX_JUMPS_IN_A_ROW in steps.jump_chains:
-        text = f"DO_JUMP: flown, where PX4 ends the mission at {_MAX_JUMPS_IN_A_ROW} jumps in a row"
+        text = f"DO_JUMP: flown, but PX4 ends the mission after {_MAX_JUMPS_IN_A_ROW} jumps in a row"
         builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW], arduplane=False)
     if _MAX_JUMPS_IN_A_ROW_ARDUPLANE in steps.jump_chains:
-        text = f"DO_JUMP: flown, where ArduPlane ends the mission at {_MAX_JUMPS_IN_A_ROW_ARDUPLANE} jumps in a row"
+        text = f"DO_JUMP: flown, but ArduPlane ends the mission after {_MAX_JUMPS_IN_A_ROW_ARDUPLANE} jumps in a row"
         builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW_ARDUPLANE], px4=False)
     if steps.long_command_chain >= 0:
         count_text = f"{_MAX_COMMANDS_IN_A_ROW_ARDUPLANE} commands without a waypoint"
-        text = f"{count_text}: flown, where ArduPlane ends the mission"
+        text = f"{count_text}: flown, but ArduPlane ends the mission"
         builder.add_open_item(text, steps.long_command_chain, px4=False)
 
 
@@ -539,7 +539,7 @@ class _ItineraryBuilder:
             self._fly_item(step.target)
         else:
             for item in step.commands[1:]:
-                text = f"{command_name(item.command)}: not run, as no waypoint follows it"
+                text = f"{command_name(item.command)}: not run, because no waypoint follows it"
                 self.notes.arduplane.add(text, item.seq)
         for item in arduplane_commands[1:]:
             if item.command == Command.DO_SET_HOME:
@@ -614,13 +614,11 @@ class _ItineraryBuilder:
 
     def _note_wait(self, item: MissionItem) -> None:
         """Add a note for an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not wait."""
-        self.notes.arduplane.add("autocontinue is 0: the flight continues, as ArduPlane does", item.seq)
+        self.notes.arduplane.add("autocontinue is 0: ignored, as ArduPlane does", item.seq)
         if item.seq == self.last_seq:
-            self.notes.px4.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
+            self.notes.px4.add("autocontinue is 0: no effect on the last item", item.seq)
         else:
-            self.add_open_item(
-                "autocontinue is 0: the flight continues, where PX4 would wait", item.seq, arduplane=False
-            )
+            self.add_open_item("autocontinue is 0: the flight continues, but PX4 would wait", item.seq, arduplane=False)
 
     def _fly_item(self, item: MissionItem) -> None:
         """Process a navigation item."""
@@ -687,7 +685,7 @@ class _ItineraryBuilder:
         if item.frame in OVER_TERRAIN:
             # `Plane::do_takeoff` subtracts home's altitude from the item's number, and `Plane::verify_takeoff` compares
             # the result with the height over home.
-            text = f"{name} above terrain: flown as written, where ArduPlane takes its height for an altitude AMSL"
+            text = f"{name} above terrain: flown as written, but ArduPlane reads its height as an altitude AMSL"
             self.add_open_item(text, item.seq, px4=False)
         if is_vertical:
             self.add_open_item(f"{name}: not flown straight up", item.seq)
@@ -709,7 +707,7 @@ class _ItineraryBuilder:
         is_later_loiter = stated_loiter(item) is not None and bool(self.stops)
         if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:
             # `Location::sanitize`, which ArduPlane's `do_loiter_*` call, takes such an altitude for the present one.
-            text = f"{name} at a height of 0 m: flown at the altitude of the item before, which ArduPlane keeps"
+            text = f"{name} at a height of 0 m: flown at the altitude of the previous item, as in ArduPlane"
             self.notes.arduplane.add(text, item.seq)
             self.add_open_item(text, item.seq, arduplane=False)
             item = replace(item, alt=math.nan)
@@ -722,23 +720,19 @@ class _ItineraryBuilder:
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.add_open_item(
-                f"{name} without a position, so that the autopilot takes the aircraft's: not flown by planfly", item.seq
+                f"{name} without a position: not flown by planfly; the autopilot uses the current position", item.seq
             )
             return
         if item.command == Command.NAV_WAYPOINT:
             if item.params[0] > 0.0:
                 # Fixed-wing aircraft do not hold: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) reads
                 # none.
-                self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
+                self.notes.add("NAV_WAYPOINT with a time to hold: flown through without a hold", item.seq)
             if pass_by := pass_by_distance(item):
-                self.notes.arduplane.add(
-                    f"{name} with {pass_by:.0f} m to fly on beyond it, as ArduPlane does", item.seq
-                )
+                self.notes.arduplane.add(f"{name}: flown on for {pass_by:.0f} m beyond it, as ArduPlane does", item.seq)
             elif item.params[2] <= -1.0:
                 # Converting a negative number to an unsigned one gives 0 on ARM and 255 on a PC; PX4 does not read it.
-                text = (
-                    f"{name} with {item.params[2]:g} m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m"
-                )
+                text = f"{name}: {item.params[2]:g} m to fly on beyond it: flown as 0 m, but ArduPlane may fly 255 m"
                 self.add_open_item(text, item.seq, px4=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.add_open_item(f"{name}: flown as a straight waypoint", item.seq)
@@ -753,7 +747,7 @@ class _ItineraryBuilder:
         elif stated_loiter(item) is None:
             self.add_open_item(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
-            self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)
+            self.notes.add(f"{name} without an altitude: flown at the altitude of the previous item", item.seq)
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
         self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
@@ -784,7 +778,7 @@ class _ItineraryBuilder:
             self.notes.add(f"{name}: {LANDING_NOTE}", item.seq)
             if self.stops[-1].frame in OVER_TERRAIN or item.frame in OVER_TERRAIN:
                 # `AP_Landing::type_slope_setup_landing_glide_slope` compares the altitudes of both items.
-                text = f"{name} with an approach above terrain: its glide is not flown as ArduPlane does"
+                text = f"{name} with an approach above terrain: flown on another glide path than ArduPlane's"
                 self.add_open_item(text, item.seq, px4=False)
             self.landing = self._make_stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
@@ -850,11 +844,11 @@ class _ItineraryBuilder:
             self.px4_airspeed = speed
             if speed_type != 0.0:
                 notes.add(
-                    f"DO_CHANGE_SPEED of type {speed_type:g}: flown as airspeed, as its type is not read", item.seq
+                    f"DO_CHANGE_SPEED of type {speed_type:g}: flown as airspeed, because PX4 ignores the type", item.seq
                 )
             return
         self.px4_airspeed = math.nan
-        notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: back to the autopilot's own airspeed", item.seq)
+        notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: returns to PX4's default airspeed", item.seq)
         if throttle > 0.0:
             notes.add("DO_CHANGE_SPEED's throttle: not flown", item.seq)
 

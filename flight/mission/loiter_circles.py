@@ -241,7 +241,7 @@ def _make_nodes(
             ):
                 unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=True))
             notes.add(
-                f"its circle has no tangent from the circle of item {previous.stop.item}: flown on that circle",
+                f"no tangent joins its circle to the circle of item {previous.stop.item}: flown on that circle",
                 stop.item,
             )
             node = replace(node, east=previous.east, north=previous.north, signed_radius=previous.signed_radius)
@@ -251,8 +251,8 @@ def _make_nodes(
 
 def _note_omitted_stop(stop: RoutePoint, circle: RoutePoint, notes: Notes) -> None:
     """Add a note on a stop that is omitted because it lies inside a loiter circle."""
-    text = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
-    notes.add(text if stop.item >= 0 else f"home {text}", stop.item if stop.item >= 0 else None)
+    text = f"not flown to, because it lies inside the circle of item {circle.item}, which is joined on a tangent"
+    notes.add(text if stop.item >= 0 else f"home: {text}", stop.item if stop.item >= 0 else None)
 
 
 def _signed_radius(
@@ -291,7 +291,7 @@ def _signed_radius(
     elif round(radius * radius_scale) != round(stated_radius):
         notes.add(
             f"loiter radius {stated_radius:g} m: flown with {radius * radius_scale:.0f} m,"
-            " because the radius grows with altitude",
+            " because the autopilot enlarges it with altitude",
             stop.item,
         )
     return math.copysign(radius * radius_scale, loiter.radius)

@@ -457,7 +457,8 @@ class _AltitudeConverter:
         if math.isnan(ground):
             position_text = f"latitude {stop.lat_deg:.5f}, longitude {stop.lon_deg:.5f}"
             request = f"{self.source}: {_stop_name(stop)}: height above terrain (frame {stop.frame}) at {position_text}"
-            reason = "no terrain is given for it" if terrain is None else f"{terrain.source} has no data there"
+            no_terrain_text = "requires terrain; name an elevation file (--terrain)"
+            reason = no_terrain_text if terrain is None else f"{terrain.source} has no data there"
             raise MissionError(f"{request}: {reason}", file=self.source, field="frame", value=stop.frame)
         return ground
 
@@ -506,7 +507,7 @@ class _AltitudeConverter:
             if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
                 hint = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
-                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {ground:.1f} m: "
+                    f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m: "
                     f"heights above home are measured from home's altitude{hint}"
                 )
             return home.alt
@@ -516,7 +517,7 @@ class _AltitudeConverter:
             )
             return 0.0
         self.notes.add(
-            f"home has no altitude: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {ground:.1f} m AMSL"
+            f"home has no altitude: the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f} is used, {ground:.1f} m AMSL"
         )
         return ground
 
@@ -560,7 +561,9 @@ def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Not
                 file=source,
                 field=_stop_name(stop),
             )
-        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the next leg", stop.item)
+        notes.add(
+            f"no aircraft climbs or sinks on the spot, so these {abs(climb):.0f} m are flown on the next leg", stop.item
+        )
     else:
         notes.add(f"same position as {_stop_name(previous)}, merged with it", stop.item)
     return previous if previous.item >= 0 else stop

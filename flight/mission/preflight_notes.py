@@ -84,7 +84,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     for name, course, altitude in ends:
         tail_wind = scenario.wind.components_on_course(course, altitude)[0]
         if tail_wind > MIN_NOTED_WIND_MPS:
-            yield f"{name}: {tail_wind:.1f} m/s of tailwind on {round(math.degrees(course)) % 360}°"
+            yield f"{name}: {tail_wind:.1f} m/s of tailwind on course {round(math.degrees(course)) % 360}°"
 
 
 def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
@@ -112,8 +112,9 @@ def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[st
         if readings:
             numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
             yield (
-                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as stated, as {stated_as}:"
-                f" {_heights_text([reading.height for reading in readings])}; check the frame: as {other}"
+                f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as {stated_as}:"
+                f" {_heights_text([reading.height for reading in readings])}; check the frame, because"
+                f" as {other} they are"
                 f" {_heights_text([reading.other_height for reading in readings])}"
             )
 
@@ -143,7 +144,7 @@ def _note_rally_points(
         if point.up <= ground - tolerance:
             yield (
                 f"{name} is {ground - point.up:.0f} m below the ground:"
-                f" {point.up:.0f} m AMSL, and the ground there {ground:.0f} m"
+                f" {point.up:.0f} m AMSL, but the ground there is at {ground:.0f} m"
             )
         distance = _distance_from_path(route.positions, (point.east, point.north))
         if 0.0 < rules.rally_limit < distance:
@@ -177,7 +178,7 @@ def _note_low_return(home_points: tuple[ReturnPoint, ...], scenario: Scenario, r
     ground_height = float(np.nanmax(ground, initial=-math.inf)) - home_points[0].up
     if ground_height >= rules.height:
         yield (
-            f"an RTL loiters {rules.height:.0f} m above home, and within {radius:.0f} m of home the ground rises to"
+            f"an RTL loiters {rules.height:.0f} m above home, but within {radius:.0f} m of home the ground rises to"
             f" {ground_height:.0f} m above home"
         )
 
@@ -249,6 +250,6 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
         if along == across == _LEVEL_TEXT:
             ground = f"over {length:.0f} m around the landing point the ground {_LEVEL_TEXT}"
         if max(abs(slope) for slope in slopes) > STEEPEST_STRIP_SLOPE:
-            ground += f" ({STEEPEST_STRIP_SLOPE:.0%} is the limit for a plan's landing)"
-    strip_text = "the scenario has no [landing], so touch-down and roll-out are not judged"
+            ground += f" (plans land on slopes of up to {STEEPEST_STRIP_SLOPE:.0%})"
+    strip_text = "touchdown and roll-out are not judged, because the scenario has no [landing]"
     yield f"item {last_item}: lands on course {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"

@@ -794,8 +794,8 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint
     """
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and not a "
-            f"command: started at {airspeed:g} m/s"
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is only an estimate of the ground station:"
+            f" the flight starts at {airspeed:g} m/s"
         )
         if abs(mission.cruise_speed - airspeed) > MAX_CRUISE_SPEED_DIFFERENCE * airspeed:
             text += f" (--aircraft selects your aircraft, --airspeed {mission.cruise_speed:g} flies at that airspeed)"

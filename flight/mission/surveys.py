@@ -247,7 +247,7 @@ def camera_notes(mission: Mission, route: Route) -> tuple[str, ...]:
         if plan.camera is not None and seconds < plan.camera.interval:
             notes.append(
                 f"the camera takes one photo per {plan.camera.interval:g} s; the trigger distance of"
-                f" {photo_spacing:.4g} m asks for one every {seconds:.2f} s at {float(speeds.max()):.1f} m/s"
+                f" {photo_spacing:.4g} m requires one every {seconds:.2f} s at {float(speeds.max()):.1f} m/s"
             )
     return tuple(notes)
 

@@ -33,6 +33,7 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 from world.scenario_file import first_fault
+from world.wording import count_text
 
 # ----------------------------------------------------------------------
 # QGroundControl's ComplexItems as the simple items that they stand for.
@@ -431,12 +432,14 @@ def parse_plan_file(text: str, source: str) -> Mission:
     ]
     if unplaced:
         number, name = unplaced[0][0], command_name(unplaced[0][1].command)
-        warnings.append(f"{source}: item {number}: {name} has no position ({len(unplaced)} such items in all)")
+        warnings.append(
+            f"{source}: item {number}: {name} has no position ({count_text(len(unplaced), 'such item')} in all)"
+        )
     home = _read_home(file.mission.plannedHomePosition, source)
     if home is None and file.mission.plannedHomePosition is not None:
-        warnings.append(f"{source}: plannedHomePosition is not a position: ignored; the mission has no home")
+        warnings.append(f"{source}: plannedHomePosition is not a position: the mission has no home")
     if [item.seq for item in items] != list(range(1, len(items) + 1)):
-        warnings.append(f"{source}: doJumpId is not 1 to {len(items)}: items are counted by their order")
+        warnings.append(f"{source}: the doJumpId are not 1 to {len(items)}: items are numbered by their order instead")
     mission = Mission(
         home=home,
         items=tuple(items),

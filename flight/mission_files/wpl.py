@@ -243,31 +243,33 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     if len(body) < len(rows):
         if home is None:
             warnings.append(
-                f"{rows[0].location}: home at 0, 0, which is not a position: ignored; the mission has no home"
+                f"{rows[0].location}: home is at 0, 0, which stands for no position: the mission has no home"
             )
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
                 f"{rows[0].location}: home in frame {first.frame}: its height is taken as above mean sea level;"
                 f" {HOME_LINE_MISSING_TEXT}, so ground stations take the first item for home and do not fly it"
             )
-    numbering_text = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
+    numbering_text = "items are numbered by line instead, as ground stations do, and jumps use these numbers"
     seq_steps = [(following, following.item.seq - previous.item.seq) for previous, following in pairwise(rows)]
     gaps, falling = [row for row, step in seq_steps if step > 1], [row for row, step in seq_steps if step < 1]
     if gaps:
         warnings.append(
-            f"{gaps[0].location}: a gap in the sequence numbers before {gaps[0].item.seq} ({len(gaps)} in all):"
+            f"{gaps[0].location}: the sequence numbers have a gap before {gaps[0].item.seq}"
+            f" ({count_text(len(gaps), 'gap')} in all):"
             f" {numbering_text}"
         )
     if falling:
         warnings.append(
             f"{falling[0].location}: sequence number {falling[0].item.seq} is not higher than the one before"
-            f" ({len(falling)} in all): {numbering_text}"
+            f" ({count_text(len(falling), 'such line')} in all): {numbering_text}"
         )
     unplaced = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if unplaced:
         name = command_name(unplaced[0].item.command)
         warnings.append(
-            f"{unplaced[0].location}: {name} at 0, 0, which is not a position ({len(unplaced)} such items in all)"
+            f"{unplaced[0].location}: {name} at 0, 0, which is not a position"
+            f" ({count_text(len(unplaced), 'such item')} in all)"
         )
     return warnings
 

@@ -51,12 +51,12 @@ class Airborne(ABC):
     memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the simulated aircraft.
     max_ticks: time limit, ticks.
-    engine: flight model in use, and the reason for it, as in "JSBSim, as chosen".
+    engine: flight model in use, and the reason for it, as in "JSBSim, as requested".
     _law: control law of a simulated autopilot; None for an external program that starts in the air.
     """
 
     _law: ControlLaw | None = None
-    engine: str = "JSBSim, for a flight by a program"
+    engine: str = "JSBSim, because the program of an autopilot flies"
 
     def __init__(
         self,

@@ -285,7 +285,7 @@ class FlightSetup:
         ground_rules = self.autopilot.ground
         if ground_rules.control_law is None:
             title = self.autopilot.title
-            return GroundPhases(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
+            return GroundPhases(notes=(f"{title} flies no take-off and no landing: both are judged only by geometry",))
         ground_phases = find_ground_phases(self.scenario, self.mission, self.route, self.default_launch_speed)
         if (
             ground_rules.needs_both_ends

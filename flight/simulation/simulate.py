@@ -377,22 +377,22 @@ class Flight(Airborne):
     def _choose_engine(self, setup: FlightSetup) -> tuple[CompiledModel | None, str]:
         """Choose the engine; return the compiled model (None for JSBSim), and a text with the engine and the reason."""
         if self._chosen_engine == "jsbsim":
-            return None, "JSBSim, as chosen"
+            return None, "JSBSim, as requested"
         if self._law.loop is None:
-            return None, f"JSBSim, since {setup.autopilot.title} has no compiled loop"
+            return None, f"JSBSim, because the control loop of {setup.autopilot.title} is not compiled"
         has_gusts, has_terrain = self._windy, bool(self._ground.known)
         try:
             model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
         except UnsupportedModel as unsupported:
-            return None, f"JSBSim, since the compiled model does not cover {unsupported}"
+            return None, f"JSBSim, because the compiled model does not cover {unsupported}"
         except (FlightError, ArithmeticError) as error:
-            return None, f"JSBSim, since the compiled model cannot start: {error}"
+            return None, f"JSBSim, because the compiled model cannot start: {error}"
         if differences := model.find_differences():
             # Start again, since the comparison has moved the aircraft.
             self.fdm = self._new_fdm()
             self._start_fdm()
-            return None, f"JSBSim, since the compiled model differs from it in {differences[0]}"
-        return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} in {PROOF_STEPS} steps"
+            return None, f"JSBSim, because the compiled model differs from it in {differences[0]}"
+        return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} over {PROOF_STEPS} test steps"
 
     def _make_loop(self) -> Callable[[int], int]:
         """Return a function that flies up to a number of ticks, fills the rows, and returns the end code or 0."""

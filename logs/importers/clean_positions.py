@@ -37,8 +37,9 @@ class SteadyClock:
 def remove_clock_jumps(time: Floats, usual_step: float = 0.1) -> SteadyClock:
     """Remove the backward jumps of a log's clock from the times of its rows.
 
-    A clock that goes back and stays back has been reset: the first row after the reset is moved to ``usual_step`` s
-    after the latest row before it, and all later rows are shifted with it.  A single row out of order keeps its time.
+    A clock that goes back and stays back has been reset.  The first row after the reset is then moved to ``usual_step``
+    s after the latest row before it, and all later rows are shifted by the same time.  A single row out of order keeps
+    its time.
 
     time: times of the rows in the order of the file, s, (n,).
     usual_step: time between the rows before and after a jump, s.
@@ -207,7 +208,7 @@ def _usable_rows(time: Floats, values: Floats) -> Flags:
 def _find_glitches(time: Floats, values: Floats) -> Flags:
     """Return a mask (n,): True for glitches.
 
-    A glitch is a row that no vehicle can have reached from the row before and left again.
+    A glitch is a row that no vehicle can reach from the row before, nor leave to the row after.
     """
     is_glitch = np.zeros(time.size, bool)
     if time.size < 5:

@@ -207,7 +207,7 @@ def index_dataflash(
     large log is small.
 
     data: bytes of the log, (n,).
-    release_memory: called regularly, to release the memory of the bytes that were read.
+    release_memory: function that releases the memory of the bytes read so far; called regularly.
     """
     is_format = np.zeros(256, np.bool_)
     is_format[FMT_TYPE] = True
@@ -261,7 +261,9 @@ def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory:
 
     is_requested: mask of the requested message types, (256,).
     """
-    state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
+    state = np.zeros(6, np.int64)
+    lengths = np.zeros(256, np.int64)
+    counts = np.zeros(256, np.int64)
     state[_IS_READING], lengths[FMT_TYPE] = 1, _FMT_BYTES
     starts, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
     for end in piece_ends(data.size, release_memory):
@@ -270,7 +272,9 @@ def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory:
         )
         starts.append(piece[0])
         kinds.append(piece[1])
-    damaged_places, lost_bytes, last_end = int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), int(state[_LAST_END])
+    damaged_places = int(state[_DAMAGED_PLACES])
+    lost_bytes = int(state[_LOST_BYTES])
+    last_end = int(state[_LAST_END])
     if not state[_IS_READING] and last_end and data.size - last_end < MAX_TRAILING_BYTES:
         # The walk counted the old bytes after the last message as a damaged place.
         damaged_places -= 1

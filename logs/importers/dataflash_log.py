@@ -183,7 +183,7 @@ class _Reader:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return the messages of a name; if several sensors or estimators send them, only those of the first."""
+        """Return the messages with a name; from several sensors or estimators, only the first one's."""
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
@@ -209,7 +209,8 @@ class _Reader:
         if not times:
             return np.zeros(0, np.int64), np.zeros(0), ()
         order = np.argsort(np.concatenate(starts), kind="stable")
-        sorted_starts, raw_times = np.concatenate(starts)[order], np.concatenate(times)[order]
+        sorted_starts = np.concatenate(starts)[order]
+        raw_times = np.concatenate(times)[order]
         is_finite = np.isfinite(raw_times)
         steady = remove_clock_jumps(raw_times[is_finite])
         return sorted_starts[is_finite], steady.time - raw_times[is_finite], steady.jumps
@@ -245,7 +246,7 @@ class _Reader:
         yield "throttle", self._throttle()
 
     def _first_table(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
-        """Return the first of several tables that has rows, times `scale`; None if none has.
+        """Return the first of several tables that has rows, times `scale`; None if all are empty.
 
         choices: name of a message and its fields, for each table.
         """
@@ -308,7 +309,7 @@ class _Reader:
     def _true_by_equivalent(self, time: Floats) -> Floats:
         """Return the ratio of true to equivalent airspeed at given times, (n,).
 
-        The ratio is the logged one, or else that of the standard atmosphere at the logged altitude.
+        The logged ratio is used, or else the ratio in the standard atmosphere at the logged altitude.
         """
         ratio = self._message_table("CTUN", ("E2T",))
         if ratio is not None and len(ratio.time) > 1:
@@ -343,7 +344,7 @@ class _Reader:
         return None
 
     def _heights(self) -> Iterable[HeightSource]:
-        """Yield the altitudes that the log has in addition to the altitude of the position."""
+        """Yield the altitudes in the log other than the altitude of the position."""
         position = self._position()
         gps = self._message_table("GPS", ("Alt",))
         if gps is not None and position is not None and position.source != "GPS":
@@ -357,7 +358,7 @@ class _Reader:
                 yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
 
     def _modes(self) -> Iterable[ModeChange]:
-        """Yield the mode changes; none for a log that states the modes by name instead of by number."""
+        """Yield the mode changes; nothing for a log that states modes by name instead of number."""
         messages = self._messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has(column) or messages.rows.dtype[column].kind == "S":

@@ -57,8 +57,8 @@ class FlightPart:
 def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
     """Return the start and end of each flight, s.
 
-    A flight is a period of at least `MIN_FLIGHT_TIME_S` with a median ground speed above `MIN_FLYING_SPEED_MPS`, except
-    in slower periods of up to `MAX_SLOW_TIME_S`.
+    A flight is a period of at least `MIN_FLIGHT_TIME_S` with a median ground speed above `MIN_FLYING_SPEED_MPS`.  It
+    may contain slower periods of up to `MAX_SLOW_TIME_S`.
 
     time, lat, lon: times (s) and positions (deg), (n,).
 
@@ -157,7 +157,7 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the part that followed its mission longest; of equal parts, the longest part."""
+    """Return the index of the part that followed its mission longest; in a tie, of the longest part."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
@@ -432,7 +432,7 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
     """Return the mean wind while the flight followed its mission, or None if the log contains no wind.
 
     It is the mean over the whole flight if the flight never followed a mission.  The first fifth of the rows is left
-    out, because the estimate starts from zero and converges in the first turns.
+    out, because the autopilot's estimate starts at zero and converges only in the first turns.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight

@@ -42,8 +42,8 @@ class LoggedItemGroup(NamedTuple):
 def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
     """Combine logged items, in the order of the log, into missions.
 
-    An item 0 begins a new mission, even if later items are lost.  A single item that equals an item of the mission is
-    logged because it is flown; a single item that differs is an edit, which begins a changed mission.  A mission that
+    An item 0 begins a new mission, even if later items are lost.  A single item that equals an item of the mission was
+    logged because it was flown.  A single item that differs is an edit, which begins a changed mission.  A mission that
     is logged twice, each time in part, is one mission.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
@@ -86,7 +86,8 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItemGroup]:
 def _starts_new_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
     """Return True if an item 0 starts a new mission, judged by the item that follows it.
 
-    It does if that item is item 1, is not in the mission so far, or differs from the mission's item.
+    The result is True if the following item is item 1, is not in the mission so far, or differs from the mission's
+    item.
 
     items: items of the mission so far, by number.
     """
@@ -98,8 +99,8 @@ def _starts_new_mission(following: MissionItem | None, items: Mapping[int, Missi
 def _is_same_mission(first: LoggedItemGroup, second: LoggedItemGroup) -> bool:
     """Return True if two groups of items are the same mission.
 
-    Either all items are equal, or the announced numbers of items and all common items are.  A common item 0, which is
-    home, is not evidence, because it is the same in all missions flown from a place.
+    This is the case if all items are equal, or if the announced numbers of items and all common items are equal.  Item
+    0, which is home, is ignored, because it is the same in all missions flown from a place.
     """
     first_items = {item.seq: item for item in first.items}
     common = [item for item in second.items if item.seq in first_items]

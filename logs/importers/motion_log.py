@@ -113,7 +113,7 @@ class _DataflashMotionReader:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return the messages of a name; if several sensors or estimators send them, only those of the first."""
+        """Return the messages with a name; from several sensors or estimators, only the first one's."""
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
@@ -124,7 +124,7 @@ class _DataflashMotionReader:
     def _first_samples(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
         """Return the fields of the first of several messages that the log has, times `scale`.
 
-        There are no rows if the log has none of the messages.  Servo outputs that RCOU lacks are 0.
+        The result has no rows if the log has none of the messages.  Servo outputs that RCOU lacks are 0.
 
         choices: name of a message and its fields.
         """

@@ -117,7 +117,7 @@ def open_log(path: Path) -> "RawLog":
 def detect_log_format(path: Path, head: bytes) -> LogFormat:
     """Return the format of a log, detected by the first bytes and the suffix of its file.
 
-    If both contradict each other, the first bytes decide.  Raises LogError if neither is known, and for a dataflash log
+    If they contradict each other, the first bytes decide.  Raises LogError if neither is known, and for a dataflash log
     that was converted to text.
 
     >>> detect_log_format(Path("flight.igc"), b"<gpx>").name, detect_log_format(Path("a.BIN"), bytes(9)).name

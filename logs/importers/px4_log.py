@@ -4,8 +4,6 @@ pyulog reads the container; damage is counted here, because pyulog only reports 
 and fields follow PX4's message documentation of the current release and of older releases.
 """
 
-import contextlib
-import io
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -33,6 +31,7 @@ from world.address_space import AddressSpaceError
 from world.arrays import Bytes, Ints
 from world.errors import LogError
 from world.kernels import compiled, read_only
+from world.silent_output import silence
 
 FORMAT = "PX4 log"
 # Bytes before the first record.
@@ -81,15 +80,16 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     """Read the named topics of a log.  Raises LogError for a file that pyulog cannot read."""
     try:
         # pyulog prints errors on the terminal.
-        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
+        with silence(), path.open("rb") as file:
             log = ULog(_FormatCheckingFile(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
         raise LogError(f"{path}: its stated size does not fit into memory", file=path) from None
     except Exception as error:  # of any kind: the library raises errors of struct, its own and plain ones
-        raise LogError(f"{path}: not a readable PX4 log: {_short_message(error)}", file=path) from error
-    return Topics(log, str(path), _damage_of(path))
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise LogError(f"{path}: not a readable PX4 log: {reason}", file=path) from error
+    return Topics(log, str(path), _file_damage(path))
 
 
 class _FormatCheckingFile:
@@ -117,22 +117,24 @@ class _FormatCheckingFile:
         return data
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Change the position; a relative seek is corrected by the bytes that the last read lacked."""
+        """Change the position; a relative seek is corrected by the bytes missing from the last read."""
         missing = self._missing if whence == 1 else 0
         self._missing = 0
         return self._file.seek(offset + missing, whence)
 
     def tell(self) -> int:
+        """Return the position in the file, bytes."""
         return self._file.tell()
 
     def close(self) -> None:
+        """Close the file."""
         self._file.close()
 
 
 def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) -> Damage:
     """Find the damage of a PX4 log.
 
-    Bytes at which no record with a known letter begins are damaged, and the last record may be cut.
+    Bytes that belong to no record with a known letter are damaged.  The last record may be cut.
 
     data: bytes of the log, (n,).
 
@@ -147,7 +149,7 @@ def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) 
     return Damage(int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), cut)
 
 
-def _damage_of(path: Path) -> Damage:
+def _file_damage(path: Path) -> Damage:
     """Return the damage of a log file."""
     file = MappedFile(path)
     return find_damage(file.data, file.release_memory)
@@ -207,11 +209,6 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
         reading,
         cut,
     )
-
-
-def _short_message(error: Exception) -> str:
-    """Return the first 120 characters of an error's message in one line, or the name of its type."""
-    return " ".join(str(error).split())[:120] or type(error).__name__
 
 
 def _instance_table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
@@ -335,8 +332,8 @@ class Topics:
         """Return the mean voltage (V) of all connected batteries and the sum of their currents (A), (n, 2).
 
         Return None for a log without batteries, or if the current of a connected battery was not measured.  Only
-        measurements of the same kind (`source`) as for the first battery are used, because another kind, such as by
-        motor controllers, repeats the same current.
+        batteries with the same kind of measurement (`source`) as the first battery are used, because another kind, such
+        as by motor controllers, measures the same current again.
         """
         connected_batteries = []
         for data in self._instances.get("battery_status", []):
@@ -364,7 +361,7 @@ class Topics:
         return None if battery is None else with_used_energy(battery)
 
     def _heights(self) -> Iterable[HeightSource]:
-        """Yield the altitudes that the log has in addition to the altitude of the position."""
+        """Yield the altitudes in the log other than the altitude of the position."""
         gps = self._gps()
         if gps is not None and "vehicle_global_position" in self._data:
             yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
@@ -397,9 +394,9 @@ class Topics:
         return "unknown"
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Yield the mission, made of the items that became current; its length is from mission_result.
+        """Yield the mission, made of the items that became current, with the length from mission_result.
 
-        None is yielded if the log has neither.
+        Nothing is yielded if the log has neither.
         """
         items = self._items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])

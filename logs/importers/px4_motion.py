@@ -134,7 +134,8 @@ def _inertial(topics: Topics) -> Samples:
 
     They come from the inertial sensors, or else from the two topics with filtered values.
     """
-    force, rates = tuple(f"accelerometer_m_s2[{k}]" for k in range(3)), tuple(f"gyro_rad[{k}]" for k in range(3))
+    force = tuple(f"accelerometer_m_s2[{k}]" for k in range(3))
+    rates = tuple(f"gyro_rad[{k}]" for k in range(3))
     samples = _samples(topics, "sensor_combined", force + rates)
     if len(samples.time):
         return samples
@@ -205,7 +206,8 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     its effect on each axis; the deflection of an axis is the mean of the surfaces, weighted by these scales.  Raises
     LogError for surfaces that cannot be modelled.
     """
-    servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
+    servos = _actuators(topics, "actuator_servos", _SERVOS)
+    motors = _actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
     is_known = np.isfinite(servos.values).any(axis=1) & _is_armed(topics, servos.time)
     servos = Samples(servos.time[is_known], servos.values[is_known])
@@ -293,7 +295,7 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
 
 
 def _is_armed(topics: Topics, time: Floats) -> Flags:
-    """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not say."""
+    """Return a mask (n,): True at times when the vehicle was armed; all True if the log does not state it."""
     states = _samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)

@@ -173,7 +173,8 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
     """
     time = np.arange(0.0, EXAMPLE_LEAD_S + 2.0 * EXAMPLE_LEG_M / EXAMPLE_SPEED_MPS + EXAMPLE_TAIL_S, EXAMPLE_STEP_S)
     distance_run = EXAMPLE_SPEED_MPS * (time - EXAMPLE_LEAD_S)
-    north, east = np.minimum(distance_run, EXAMPLE_LEG_M), np.maximum(distance_run - EXAMPLE_LEG_M, 0.0)
+    north = np.minimum(distance_run, EXAMPLE_LEG_M)
+    east = np.maximum(distance_run - EXAMPLE_LEG_M, 0.0)
     lats, lons = to_geo(GeoOrigin(lat, lon), east, north)
     course = np.where(distance_run < EXAMPLE_LEG_M, 0.0, 0.5 * math.pi)
     zeros, boot_time = np.zeros(time.size), time + 20.0
@@ -189,7 +190,8 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
         MissionItem(number, command, frame, (0.0,) * 4, round_to_grid(float(y)), round_to_grid(float(x)), up)
         for number, (y, x) in enumerate(geo_waypoints, 1)
     )
-    home, height = Home(items[0].lat_deg, items[0].lon_deg, up - 100.0), np.full(time.size, up)
+    home = Home(items[0].lat_deg, items[0].lon_deg, up - 100.0)
+    height = np.full(time.size, up)
     return RawLog(
         source="example.BIN",
         format="ArduPilot dataflash log",

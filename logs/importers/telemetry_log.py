@@ -367,7 +367,7 @@ class VehicleMessages:
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return columns of a message in the units as sent, on the vehicle's clock; None if never sent."""
+        """Return columns of a message in the units as sent, by the vehicle's clock; None if it was never sent."""
         rows = self._found.table(name)
         if not len(rows):
             return None
@@ -454,7 +454,7 @@ class VehicleMessages:
         return LogSeries(name, table.time[is_measured], table.values[is_measured]) if is_measured.any() else None
 
     def _heights(self) -> Iterable[HeightSource]:
-        """Yield the altitudes that the log has in addition to the altitude of the position."""
+        """Yield the altitudes in the log other than the altitude of the position."""
         gps = self._gps_position()
         if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
@@ -496,7 +496,7 @@ class VehicleMessages:
     def _with_home(self, mission: Mission) -> Mission:
         """Return a mission with the home that the vehicle reported last; unchanged if it reported none.
 
-        The home of an uploaded mission is only the station's assumption.
+        The home in an uploaded mission is only an assumption of the station.
         """
         reports = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
         if not reports:

@@ -25,7 +25,8 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
 
     digest: SHA-256 of the file's bytes.
 
-    Raises LogError for a log without a vehicle, and for PX4, whose telemetry does not state what its outputs move.
+    Raises LogError for a log without a vehicle, and for PX4, because its telemetry does not state which surface each
+    output moves.
     """
     messages, damage = vehicle_messages(path)
     if messages.is_px4:
@@ -75,7 +76,7 @@ def _message_times(time: Floats, microseconds: Floats) -> Floats:
     time: times of reception on the vehicle's clock, s, (n,).
     microseconds: times in the messages since the vehicle was switched on, us, (n,); the count may wrap after 32 bits.
 
-    The time of reception remains if both times differ too much.
+    If both times differ too much, the time of reception is kept.
 
     >>> _message_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
     [4300.067, 4300.167]

@@ -137,10 +137,8 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
     mesh_east, mesh_north = np.meshgrid(east, north)
     up = terrain.height(mesh_east, mesh_north)
     is_known = np.isfinite(up)
-    min_value, max_value = (
-        float(np.min(up, where=is_known, initial=np.inf)),
-        float(np.max(up, where=is_known, initial=-np.inf)),
-    )
+    min_value = float(np.min(up, where=is_known, initial=np.inf))
+    max_value = float(np.max(up, where=is_known, initial=-np.inf))
     fraction = np.where(is_known, (up - min_value) / max(max_value - min_value, 1.0), 0.0)
     points = np.stack([mesh_east, mesh_north, np.where(is_known, up, min_value)], axis=-1)
     return points, _LOWEST_COLOUR + fraction[..., None] * (_HIGHEST_COLOUR - _LOWEST_COLOUR), is_known
@@ -161,7 +159,10 @@ def _encode_mesh(terrain: Terrain, bounds: Floats) -> bytes:
         return b""
     up = corner_points[..., 2]
     vertex_numbers = np.arange(up.size).reshape(up.shape)
-    sw, se, nw, ne = vertex_numbers[:-1, :-1], vertex_numbers[:-1, 1:], vertex_numbers[1:, :-1], vertex_numbers[1:, 1:]
+    sw = vertex_numbers[:-1, :-1]
+    se = vertex_numbers[:-1, 1:]
+    nw = vertex_numbers[1:, :-1]
+    ne = vertex_numbers[1:, 1:]
     corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
     has_known_corners = is_known.ravel()[corners].all(axis=1)
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
@@ -242,7 +243,7 @@ def track_scene(time_ns: int, positions: Floats) -> bytes:
 
 
 def _encode_update(entity: SceneEntity) -> bytes:
-    """Encode a SceneUpdate with one entity."""
+    """Encode one entity as a SceneUpdate message."""
     return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 
@@ -285,7 +286,8 @@ def _points(points: Floats) -> Iterable[Point3]:
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
     """Encode the names and edges of zones, from ground or floor to the ceiling or to above the path."""
     entity = _entity(time_ns, "zones")
-    min_altitude, max_altitude = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
+    min_altitude = float(waypoints[:, 2].min())
+    max_altitude = float(waypoints[:, 2].max()) + 50.0
     for zone in scenario.zones:
         walls = zone_walls(zone, scenario.terrain, min_altitude, max_altitude)
         for wall in walls:

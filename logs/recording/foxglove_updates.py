@@ -60,7 +60,7 @@ class GrowingTrack:
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
-        """Add the position (3,) that follows the last by `TRACK_INTERVAL_S` s, and return the track so far.
+        """Add the next position (3,), `TRACK_INTERVAL_S` s after the last, and return the track so far.
 
         The track, (n, 3), is thinned to at most `MAX_POINTS` points, and valid until the next call.
 
@@ -159,7 +159,8 @@ class FlightEvents:
 
     def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
         """Make the record of the event that the aircraft enters or leaves the range of a threat."""
-        name, level = self._threats.names[threat], "warning" if kind == "missile range" else "info"
+        name = self._threats.names[threat]
+        level = "warning" if kind == "missile range" else "info"
         text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
         return self._event_record(time, text, level if has_entered else "info")
 
@@ -373,7 +374,7 @@ class Poses:
     def pose_records(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
         """Yield the messages of rows: a transform every 0.2 s, a fix each second, and the track.
 
-        The track follows every `TRACK_INTERVAL_S` s; as points it follows more and more rarely.
+        The track as a line is written every `TRACK_INTERVAL_S` s, and the track as points at growing intervals.
 
         log_times: log time of each row, ns, (n,).
         position, attitude: m and rad, (n, 3).
@@ -423,7 +424,7 @@ class Poses:
 
 
 def _change_indices(values: Ints, previous: int) -> Ints:
-    """Return the indices at which non-decreasing values exceed the value before.
+    """Return the indices at which non-decreasing values increase.
 
     previous: value before the first.
     """

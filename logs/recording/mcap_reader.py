@@ -58,7 +58,7 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
-    """Yield the records of each whole chunk, and those outside chunks, as bytes, and fill ``container``.
+    """Yield the records of each complete chunk, and records outside chunks, as bytes; fill ``container``.
 
     Damage raises no error; `Container.problem` describes it.
 

@@ -218,7 +218,7 @@ class Recorder:
         reference: ReferenceFlights | None = None,
         returns: DrawnReturns | None = None,
     ) -> None:
-        """Write how the flight ended, verdict, reference flights and returns, and close the file."""
+        """Write the end of the flight, verdict, reference flights and returns, and close the file."""
         if self._skipped_row is not None:
             self._append_rows(self._skipped_row)
             self._skipped_row = None
@@ -274,7 +274,7 @@ class Recorder:
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
-        """Write a scene that is known only at the end of the flight, but is shown from its start."""
+        """Write a scene that is known only at the end of the flight, but is shown from the start."""
         self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
@@ -325,9 +325,10 @@ class Recorder:
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
     """Yield the content of each chunk of a layout."""
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    # Convert to lists first: reading the fields chunk by chunk costs a microsecond each.
+    # Converting to lists first is faster than reading the fields chunk by chunk, which costs a microsecond each.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
-    offsets, messages = layout.channels["offset"].tolist(), layout.channels["messages"].tolist()
+    offsets = layout.channels["offset"].tolist()
+    messages = layout.channels["messages"].tolist()
     for k in range(len(layout.chunks)):
         yield ChunkContent(
             records=records[bounds["start"][k] : bounds["stop"][k]],

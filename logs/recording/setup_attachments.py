@@ -273,7 +273,7 @@ def pack_forecast(wind: Wind) -> dict[str, bytes]:
 
 
 def unpack_forecast(attachments: dict[str, bytes], source: str, wind: Wind, *, is_in_forecast: bool) -> Wind:
-    """Return a wind with the forecast of its attachments; the same wind without any.
+    """Add the forecast in the attachments to a wind; return the wind unchanged without a forecast.
 
     is_in_forecast: True if the scenario names a forecast.
     Raises LogError for an attachment that is missing or has the wrong content.
@@ -340,7 +340,7 @@ def _cached_versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages on whose arithmetic or formats a log depends.
+    """Return the versions of Python and of the packages that affect a log by arithmetic or format.
 
     Packages that are not installed are left out.
 

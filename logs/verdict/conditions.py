@@ -21,16 +21,16 @@ from world.wind import Turbulence
 from world.wording import count_text
 
 _NAVIGATION_TEXTS = {
-    "perfect": "exact",
-    "rtk": "with RTK's error (0.05 m on each axis)",
+    "perfect": "without position error",
+    "rtk": "with an RTK error of 0.05 m on each axis",
     "gnss": "with a GNSS error of 1.5 m on each axis",
 }
 AirspeedSource = Literal["scenario", "parameters", "aircraft", "flight"]
 _AIRSPEED_SOURCE_TEXTS: dict[AirspeedSource, str] = {
-    "scenario": "as stated",
-    "parameters": "by the autopilot's parameters",
+    "scenario": "from the scenario or an option",
+    "parameters": "from the autopilot's parameters",
     "aircraft": "its cruise speed",
-    "flight": "as it was flown",
+    "flight": "from the log",
 }
 
 
@@ -114,7 +114,7 @@ def _autopilot_source(flight_table: FlightTable) -> str:
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
-    """Return the source of the cruise airspeed: the scenario, else the autopilot's parameters, else the aircraft."""
+    """Name the source of the cruise airspeed: the scenario, else the parameter file, else the aircraft."""
     if scenario.flight.airspeed_mps is not None:
         return "scenario"
     stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
@@ -160,13 +160,13 @@ def flown_lines(conditions: Conditions) -> list[str]:
 
 
 def _aircraft_line(conditions: Conditions) -> str:
-    """Return the line on the aircraft and its airspeed, which says if no aircraft was named."""
+    """Return the line on the aircraft and its airspeed; it notes that the user named no aircraft."""
     speed = (
         f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
     )
     if not conditions.aircraft:
-        return f"Aircraft: not named (--aircraft names yours), so none of its limits are judged; {speed}"
+        return f"Aircraft: not named, so none of its limits are judged (--aircraft names yours); {speed}"
     mass = "" if conditions.mass_kg is None else f", {conditions.mass_kg:.3g} kg"
     line = f"Aircraft: {conditions.aircraft}{mass}, {speed}"
     if conditions.aircraft_named:
@@ -207,10 +207,11 @@ _SAME_LINE_DISTANCE_M = 1.0
 
 
 def corridor_line(setup: FlightSetup) -> str:
-    """Return a line on the width and origin of the corridor if the scenario does not state it, otherwise "".
+    """Return a line on a corridor whose width the scenario does not state; "" if the scenario states it.
 
-    The line warns if the corridor is wider than the distance between legs, because a flight within the corridor may
-    then never have been on the legs' lines.  Return "" also for a survey, whose photo lines are judged one by one.
+    The line states the width of the corridor and where it comes from.  It warns if the corridor is wider than the
+    distance between legs: a flight within such a corridor may never have followed the legs' lines.  Surveys also get
+    "", because their photo lines are judged one by one.
     """
     half_width, radius = setup.corridor, setup.autopilot.turns.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or judged_surveys(setup):
@@ -231,10 +232,10 @@ def corridor_line(setup: FlightSetup) -> str:
 
 
 def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the minimum distance (m) of a leg from the leg after the next, and the first leg's number.
+    """Return the smallest distance between parallel legs two legs apart, m, and the number of the first.
 
     Only legs that lie side by side are compared: their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`,
-    and at least half of the shorter leg lies next to the longer leg.  Return None if there are no such legs.
+    and at least half of the shorter leg lies next to the longer leg.  The result is None if there are no such legs.
 
     waypoints: east, north and up, m, (w, 3).
 
@@ -248,7 +249,8 @@ def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     for k in range(len(waypoints) - 3):
         (start, end), (other_start, other_end) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
         leg_vector, other_vector = end - start, other_end - other_start
-        leg_length, other_length = float(np.hypot(*leg_vector)), float(np.hypot(*other_vector))
+        leg_length = float(np.hypot(*leg_vector))
+        other_length = float(np.hypot(*other_vector))
         if leg_length <= 0.0 or other_length <= 0.0:
             continue
         direction = leg_vector / leg_length

@@ -122,13 +122,13 @@ class VerdictDocument(DocumentConfig):
 
 
 def finding_document(finding: Finding) -> FindingDocument:
-    """Return the document of a finding, with the texts of its place, its passing values and its suggestions."""
+    """Return a finding as a document, including the texts of its place, passing values and suggestions."""
     data = {field.name: getattr(finding, field.name) for field in fields(finding)}
     return FindingDocument(**data, where=finding.where, passes=finding.limit_text, suggestion=finding.suggestion)
 
 
 def level_document(level: LevelAnswer) -> LevelDocument:
-    """Return the document of a level's answer, with the texts of its disagreements."""
+    """Return a level's answer as a document, including the texts of its disagreements with the verdict."""
     return LevelDocument(
         name=level.name,
         flyable=level.flyable,
@@ -140,13 +140,13 @@ def level_document(level: LevelAnswer) -> LevelDocument:
 
 
 def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
-    """Return the document of the deciding parameter, with its text."""
+    """Return the deciding parameter as a document, including its text."""
     data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
     return DecidingDocument(**data, text=deciding_text(deciding))
 
 
 def parameters_document(parameters: Parameters) -> ParametersDocument:
-    """Return the document of the parameters: each value and its origin, and names in the file without an effect."""
+    """Return the parameters as a document: their values and origins, and file entries without an effect."""
     return ParametersDocument(
         file=parameters.source,
         values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),

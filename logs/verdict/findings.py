@@ -87,9 +87,9 @@ class Finding:
 
     @property
     def effective_limit(self) -> float | None:
-        """Limit including its tolerance; None without a limit.
+        """Limit extended by its tolerance; None without a limit.
 
-        If a finding fails by other evidence than its number, this is the limit without tolerance.
+        If the finding fails for a reason other than its number, the tolerance is left out.
 
         >>> make_finding("waypoint", Place("waypoint", 1), ok=True, reason="", limit=3.0, tolerance=5.3).effective_limit
         8.3
@@ -106,7 +106,7 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """Value that was compared with the limit: the flown or the planned value, whichever fits the margin."""
+        """Value that was compared with the limit: the flown or the planned one, whichever matches the margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
         errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
@@ -114,9 +114,9 @@ class Finding:
 
     @property
     def nearest(self) -> float | None:
-        """Distance outside the nearest missile's sphere or zone of a fence, m, negative inside; None if not known.
+        """Distance outside the nearest missile sphere or fence zone, m, negative inside; None if not known.
 
-        It is a fact of the rules threat and fence, whose margins are no distances, or those to the zone's edge.
+        Only findings of the rules threat and fence have it, as one of their facts.
         """
         return next((fact.value for fact in self.facts if fact.what == "nearest"), None)
 
@@ -130,7 +130,7 @@ class Finding:
         return self.compared_texts()[1]
 
     def compared_texts(self) -> tuple[str, str]:
-        """Return texts of the value and of the passing values, with enough digits to tell a failing value from them."""
+        """Return the value and the passing values as texts, with enough digits to show which side it is on."""
         value, limit = self.value, self.effective_limit
         if value is None or limit is None:
             texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
@@ -196,8 +196,8 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
     """Return the failed finding furthest beyond its limit, or else the finding closest to its limit.
 
-    A failed finding without a margin comes after failed findings with a margin.  Return None if no finding failed and
-    none that passed has a margin.
+    A failed finding without a margin ranks behind failed findings with one.  Return None if nothing failed and no
+    passed finding has a margin.
 
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
     >>> failed = make_finding("slope", Place("leg", 2), ok=False, reason="too slow", margin=5.0)
@@ -237,9 +237,9 @@ def make_finding(
 
     faults: faults with which the reason begins.
     facts: further measured numbers; non-finite numbers are omitted.
-    at_least: True if values of at least the limit pass.
-    A failed finding whose number is within the limit and the tolerance has no margin, because it fails for another
-    reason; nor has a passed finding whose number is beyond them, because it passes for another reason.
+    at_least: True if values of at least the limit pass.  The margin is dropped if it contradicts the result: a finding
+        that fails although its number is within the limit and tolerance fails for another reason.  A finding that
+        passes although its number is beyond them passes for another reason.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True
@@ -283,13 +283,12 @@ def worst_first_key(finding: Finding) -> tuple[int, float]:
     >>> worst_first_key(near) < worst_first_key(far)
     True
     """
-    return (
-        0 if finding.ok is False else 1 if finding.ok is None else 2
-    ), 0.0 if finding.margin is None else finding.margin
+    rank = {False: 0, None: 1, True: 2}[finding.ok]
+    return rank, 0.0 if finding.margin is None else finding.margin
 
 
 def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
-    """Return the reason of a finding: its faults, followed by its facts in brackets; or only its facts.
+    """Return a finding's reason: its faults with its facts in brackets, or only its facts without a fault.
 
     >>> finding_reason([message("overshoots its arc by 8 m")], ["turns 62.0°", "radius 76 m"])
     'overshoots its arc by 8 m (turns 62.0°; radius 76 m)'

@@ -1,19 +1,24 @@
 """Phrase a failed finding for a headline: the rule, the place, and the numbers or the reason in brief."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from logs.verdict.findings import Finding
-from logs.verdict.wording import compared_texts, place_text, shorten_statement
+from logs.verdict.wording import compared_texts, noun_with_place, place_text, shorten_statement, threat_text
 
 # Function that phrases a failed finding; its first argument is the rule's name for people.
 HeadlinePhrase = Callable[[str, Finding], str]
 
 
 def _with_place(noun: str, finding: Finding, text: str) -> str:
-    """Join a rule's noun, the finding's place (unless it is the whole flight), and a text in brackets."""
-    if finding.place.kind == "flight":
-        return f"{noun} ({text})"
-    return f"{noun} {'at' if finding.place.kind == 'waypoint' else 'on'} {place_text(finding.place)} ({text})"
+    """Join a rule's noun, the finding's place (unless it is the whole flight or mission), and a text in brackets."""
+    place = finding.place
+    if place.kind in ("flight", "plan", "mission"):
+        return f"{noun_with_place(noun, place)} ({text})"
+    # The item is outside brackets, so that the text follows in the only brackets.
+    item_text = "" if place.item is None else f", item {place.item}"
+    place_name = place_text(replace(place, item=None)) + item_text
+    return f"{noun} {'at' if place.kind == 'waypoint' else 'on'} {place_name} ({text})"
 
 
 def reason_phrase(noun: str, finding: Finding) -> str:
@@ -27,7 +32,7 @@ def event_phrase(noun: str, finding: Finding) -> str:
 
 
 def shortfall_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)", or with the reason if not below."""
+    """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)"; the reason if no value is too low."""
     value, limit = finding.value, finding.effective_limit
     if value is None or limit is None or value >= limit:
         return reason_phrase(noun, finding)
@@ -35,9 +40,10 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)", with the worse of both values.
+    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)".
 
-    If both values are within the limit, return a phrase with the reason.
+    The phrase states the larger of the planned and the flown value.  If both are within the limit, it states the reason
+    instead.
     """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
     worst_value = max(values, key=abs, default=None)
@@ -49,7 +55,7 @@ def excess_phrase(noun: str, finding: Finding) -> str:
 
 
 def slope_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase with the reason if the aircraft can fly no slope on the leg; else `excess_phrase`."""
+    """Return a phrase with the reason if no slope can be flown on the leg, else the `excess_phrase`."""
     return reason_phrase(noun, finding) if finding.limit == 0.0 else excess_phrase(noun, finding)
 
 
@@ -71,21 +77,23 @@ def zone_phrase(noun: str, finding: Finding) -> str:
 
 
 def missile_phrase(_noun: str, finding: Finding) -> str:
-    """Return a phrase such as "threat Alfa (missile) (13.3 s inside its range)"."""
-    place = place_text(finding.place)
-    name = f"threat {place}" if finding.place.name else place
-    return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside its range)"
+    """Return a phrase such as "missile Alfa (13.3 s inside its range)"."""
+    return (
+        f"missile {threat_text(finding.place)} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s"
+        " inside its range)"
+    )
 
 
 def photo_line_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase that compares a line's usable fraction, or the photos' overlap, with the minimum."""
+    """Return a phrase that compares a photo line's usable fraction, or the overlap, with its minimum."""
     return shortfall_phrase(finding.check or noun, finding)
 
 
 def missed_waypoint_phrase(_noun: str, finding: Finding) -> str:
-    """Return a phrase such as "waypoint 3 missed (120 m > 50 m)", without distances if never passed.
+    """Return a phrase such as "waypoint 3 missed (120 m > 50 m)".
 
-    If the finding has a brief reason of its own, the phrase is the place with this reason.
+    The distances are left out if the waypoint was never passed.  If the finding has its own brief reason, the phrase is
+    the place and this reason.
     """
     if finding.flown is not None and finding.brief != finding.reason:
         return f"{place_text(finding.place)} {finding.brief}"

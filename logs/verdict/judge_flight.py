@@ -27,7 +27,7 @@ from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
 from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
-from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
+from logs.verdict.summary import failed_at_take_off, headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
 
@@ -47,22 +47,22 @@ def judge_flight(
 ) -> Verdict:
     """Judge a flown track at the level "flown".
 
-    Any track is judged, however short or damaged; missing data makes the verdict incomplete.  A track without rows is a
-    flight that never began, so its route is judged at the level "geometric".  An imported flight is judged by
-    `logs.verdict.imported.judge_imported_flight.judge_imported_flight`.
+    Any track is judged, even a short or damaged one; missing data makes the verdict incomplete.  A track without rows
+    means that the flight never began: then the route is judged instead, at the level "geometric".  An imported flight
+    is judged by `logs.verdict.imported.judge_imported_flight.judge_imported_flight`.
 
     end_reason: "completed", or the reason why the flight ended early.
     log_complete: True if the log is not cut off.
-    envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for only the evidence.
+    envelope: True to judge by the aircraft's envelope and by the flight, False to judge by the flight alone.
     reference: results of reference flights.
     requirements: the setup's route requirements if already known.
-    findings_only: True for a verdict with only its findings and answer, as a campaign's table needs it: without
-        suggestions, lines and the answer of geometry.
+    findings_only: True to omit suggestions, summary lines and the geometric answer, which a campaign's table does not
+        need.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
     >>> judge_flight(log.setup, log.track, "completed").headline
-    'not flyable: threat Alfa (missile) (13.3 s inside its range)'
+    'not flyable: missile Alfa (13.3 s inside its range)'
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)
@@ -92,7 +92,7 @@ def judge_flight(
 
 
 def with_reference(verdict: Verdict, requirements: RouteRequirements, reference: ReferenceFlights) -> Verdict:
-    """Return a verdict with the results of reference flights: the airframe's answer and the suggestions that passed.
+    """Add the results of reference flights to a verdict: the airframe's answer and the suggestions that passed.
 
     A verdict on a flight that never began is returned unchanged.
     """
@@ -112,7 +112,7 @@ def with_reference(verdict: Verdict, requirements: RouteRequirements, reference:
 def _level_answers(
     requirements: RouteRequirements, flight_findings: tuple[Finding, ...], flyable: bool
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answer by geometry, with its disagreements with the flight, and the flight's own answer.
+    """Return the geometric answer, with its disagreements with the flight, and then the flight's answer.
 
     If the envelope is not applied, only the flight's own answer is returned.
     """
@@ -136,12 +136,15 @@ def _level_answers(
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
-    """Return the airframe's answer, by the reference flight, with its disagreements with the flight."""
+    """Return the airframe's answer, by the reference flight, with its disagreements with the flight.
+
+    A flight that failed at take-off is not compared, because the reference flight begins in the air.
+    """
     failed = {(rule, numbered_place(place)) for rule, place in airframe.failed}
     airframe_findings = [
         replace(finding, ok=(finding.rule, numbered_place(finding.place)) not in failed)
         for finding in flight_findings
-        if finding.rule not in GROUND_RULES
+        if finding.rule not in GROUND_RULES and not failed_at_take_off(flight_findings)
     ]
     disagreements = _disagreements("airframe", airframe_findings, flight_findings)
     # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
@@ -169,9 +172,10 @@ def _disagreements(
 
 
 def _worst_outcomes(findings: Sequence[Finding]) -> dict[tuple[object, ...], Finding]:
-    """Return each rule's worst judged finding at each place, and the worst on each kind of overlap, by a common key.
+    """Return the worst judged finding of each rule at each place, under a key that all levels share.
 
-    Levels may measure a different corner of a loiter, or another photo line, as the worst.
+    The corners of one loiter share a key, and so do all photo lines for one kind of overlap, because levels may find
+    different ones to be the worst.
     """
     outcomes: dict[tuple[object, ...], Finding] = {}
     for finding in findings:

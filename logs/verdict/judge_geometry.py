@@ -39,7 +39,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
 def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
     """Return the findings on mission items that fail or leave the verdict undecided.
 
-    The items of a plan were written by planfly, so they are judged only if PX4 is to fly them.
+    The items of a plan are judged only if PX4 is to fly them, because planfly wrote them.
     """
     items_are_judged = setup.plan is None or setup.autopilot.checks.dialect == "px4"
     findings = mission_findings(setup) if items_are_judged else []
@@ -51,8 +51,8 @@ def geometric_findings(
 ) -> tuple[Finding, ...]:
     """Return the findings on a route's geometry, compared with the aircraft's envelope.
 
-    flight_findings: findings on a flight of the route, from which the findings of rules with `Rule.is_same_for_plan`
-        are copied; None to run these rules.
+    flight_findings: findings on a flight of the route.  Findings of rules with `Rule.is_same_for_plan` are copied from
+        them; None to run these rules, too.
     """
     return _run_rules(requirements, None, (), geometric=True, flight_findings=flight_findings)
 
@@ -97,11 +97,11 @@ def _run_rules(
     includes_whole_flight: bool = True,
     flight_findings: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Run all rules, add `end_findings`, let the rules merge findings, and return the result.
+    """Run all rules, add `end_findings`, and let the rules merge the findings.
 
     end_findings: findings on how the flight ended.
-    includes_whole_flight: True to include rules that judge the flight as a whole, and to reduce the findings to the
-        worst of each stop.
+    includes_whole_flight: True to include rules that judge the whole flight, and to keep only the worst findings of
+        each stop.
     flight_findings: as in `geometric_findings`.
     """
 
@@ -131,10 +131,10 @@ _POSITION_RULES = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings at places that fail only if the aircraft turns to one side at a course reversal.
+    """Return undecided findings on places that fail only for one direction of a turn at a course reversal.
 
-    A flight shows only one side, which depends on its navigation error: of 12 ArduPlane flights through a turn of 180
-    degrees, 4 turned left.  Return [] for an imported flight, and for a route without a course reversal.
+    A flight shows only one direction, which depends on its navigation error: of 12 ArduPlane flights through a turn of
+    180 degrees, 4 turned left.  Return [] for an imported flight, and for a route without a course reversal.
     """
     setup = requirements.setup
     corners = reversals(setup.route)
@@ -164,7 +164,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
 
 
 def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return only each rule's worst finding on the corners of a stop, and its worst finding on the legs to the stop.
+    """Keep each rule's worst finding on the corners of each stop, and its worst on the legs to the stop.
 
     A stop is a waypoint or a loiter of the mission; a loiter is flown as several corners and legs.
 
@@ -192,7 +192,7 @@ MAX_SUGGESTED_FINDINGS = 200
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Return the findings, with ``suggestions`` added to failed or undecided findings that a change could fix.
+    """Add ``suggestions`` to the failed or undecided findings that a change could fix.
 
     Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
     If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
@@ -215,7 +215,7 @@ def with_suggestions(
 def with_passing_suggestions(
     findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Return the findings; failed findings keep only suggestions that passed a trial.
+    """Remove the suggestions that passed no trial from failed findings.
 
     trials: suggestions that passed their trials; None to keep all suggestions.
 
@@ -333,7 +333,7 @@ _EXCEEDED_TEXTS = {
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
-    """Return the verdict on a search that found no feasible plan, from the certificate of its best path alone.
+    """Judge a search that found no feasible plan by the certificate of its best path.
 
     The verdict's level is "plan", and the verdict is never complete, because nothing was flown.
 

@@ -79,8 +79,8 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
 
     verdicts: verdicts by name of the judged plan or flight.
 
-    A failed finding is a failure, and an unjudged finding is skipped.  The test case ``verdict`` fails if the answer is
-    not "flyable", also if nothing failed but a part was not judged.
+    A failed finding becomes a failure, and an unjudged finding a skipped test case.  The test case ``verdict`` fails
+    unless the answer is "flyable", even if no finding failed and a part was just not judged.
 
     `logs.verdict.verdict.Verdict.to_junit` writes one verdict.
     """
@@ -98,7 +98,7 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
 
 
 def junit_error_text(name: str, message: str) -> str:
-    """Return the text of a JUnit file for a plan or a flight that could not be judged: one test case, an error.
+    """Return the text of a JUnit file with one erroneous test case, for what could not be judged.
 
     name: name of the plan or flight.
     message: reason in one line.
@@ -107,12 +107,12 @@ def junit_error_text(name: str, message: str) -> str:
 
 
 def answer_case(reason: str) -> JunitCase:
-    """Return the test case of an answer.  reason: reason why it fails; "" if it passes."""
+    """Make the test case of an answer. reason: reason why it fails; "" if it passes."""
     return JunitCase("planfly", "verdict", "failure" if reason else "passed", reason)
 
 
 def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
-    """Make a test case with a unique name for each finding: failed, skipped if it was not judged, or passed."""
+    """Make one test case, with a unique name, for each finding; skip unjudged findings."""
     counts: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:
@@ -132,5 +132,5 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
 
 
 def _without_control_characters(text: str, keep: str = "") -> str:
-    """Replace each non-printable character that is not in `keep` with a space; XML 1.0 permits few of them."""
+    """Replace non-printable characters that are not in `keep` with spaces; XML 1.0 permits few of them."""
     return "".join(character if character.isprintable() or character in keep else " " for character in text)

@@ -32,6 +32,7 @@ ChangeKind = Literal[
     "radius",
     "home altitude",
     "altitude frame",
+    "terrain height",
     "end loiter",
     "launch course",
     "launch speed",
@@ -74,7 +75,7 @@ class Place(DocumentConfig):
 
 
 def numbered_place(place: Place) -> Place:
-    """Return a place with its number in the texts as its index: all corners of one loiter are then the same place.
+    """Return a place whose index is its number in texts, so that all corners of a loiter are one place.
 
     >>> numbered_place(Place("waypoint", 11, item=4, number=3)).index
     3
@@ -193,7 +194,7 @@ class AirframeAnswer(DocumentConfig):
 class DecidingParameter(DocumentConfig):
     """Autopilot parameter that decides the verdict: the flight passes if only this parameter is changed.
 
-    name: name of the parameter.
+    name: name of the parameter, or of two equal ones that are changed together, joined by "and".
     current: value as flown, in ``unit``.
     passing: nearest value with which a flight passed, in ``unit``.
     rule, place: rule and place of the finding that failed first with the current value.

@@ -29,7 +29,7 @@ class RuleFindings:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The failed findings, the worst first."""
+        """Failed findings, the worst first."""
         return tuple(
             sorted(
                 (finding for finding in self.findings if finding.ok is False), key=lambda finding: finding.margin or 0.0
@@ -48,7 +48,7 @@ class RuleFindings:
 
     @property
     def passed_otherwise(self) -> tuple[Finding, ...]:
-        """The findings that pass although their number is beyond the limit, for the reason that they state."""
+        """Findings that pass although their number is beyond the limit; each states why."""
         return tuple(
             finding
             for finding in self.findings
@@ -57,7 +57,7 @@ class RuleFindings:
 
     @property
     def count_text(self) -> str:
-        """Text such as "3 of 4 ok": the number of findings that pass, and the number that were judged."""
+        """Text such as "3 of 4 ok": the number of passed findings, and the number of judged findings."""
         return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
 
 

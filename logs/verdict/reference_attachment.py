@@ -33,7 +33,10 @@ class _ReferenceFile(DocumentConfig):
 
 @cache
 def _file_reader() -> TypeAdapter[_ReferenceFile]:
-    """Return the reader of the attachment; it is built at first use, since most flights have no attachment."""
+    """Return the reader of the attachment.
+
+    It is built at its first use, because most flights have no attachment.
+    """
     return TypeAdapter(_ReferenceFile)
 
 

@@ -69,12 +69,12 @@ class RuleWords:
 
     @property
     def word(self) -> str:
-        """The rule's name for people, within a sentence or in a table; `name` is its name in data."""
+        """Name of the rule in sentences and tables; `name` is its name in data."""
         return self.noun or self.name
 
     @property
     def scale(self) -> float | None:
-        """The margin's scale in the margin's unit, or None if the margin ranks no flights."""
+        """Scale of the margin, in its unit; None if flights are not ranked by this margin."""
         return None if self.margin is None else self.margin.scale
 
     @property
@@ -95,6 +95,9 @@ SIDE_OVERLAP = "side overlap"
 
 # Rules of take-off and landing, which the airframe's reference flight does not fly.
 GROUND_RULES = ("takeoff", "climbout", "launch", "landing", "approach", "touchdown")
+
+# Those of them that judge a flight before its first waypoint.
+TAKE_OFF_RULES = ("takeoff", "climbout", "launch")
 
 # The words of every rule by its name, in the order in which a verdict judges and lists the rules.
 RULE_WORDS: dict[str, RuleWords] = {
@@ -149,7 +152,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="fence",
             title="zones",
             question="Do the path and the flight stay outside exclusion zones and inside inclusion zones?",
-            margin=Margin("depth", "m", 10.0),
+            margin=Margin("depth of the violation", "m", 10.0),
             phrase=zone_phrase,
             unjudged="airspace",
             unjudged_unit="zone",
@@ -159,7 +162,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="threat",
             title="threats",
             question="Do the path and the flight stay outside each missile's sphere?",
-            margin=Margin("time inside", "s"),
+            margin=Margin("time in range", "s"),
             phrase=missile_phrase,
             explains_unjudged=True,
         ),
@@ -167,7 +170,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="bounds",
             title="bounds",
             question="Does the flight stay inside the area's box, above its floor and below its ceiling?",
-            margin=Margin("distance inside", "m", 10.0),
+            margin=Margin("distance inside the edge", "m", 10.0),
             phrase=shortfall_phrase,
             explains_unjudged=True,
         ),
@@ -190,7 +193,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="photo lines",
             noun=RULE_NOUNS["survey"],
             question="How much of each photo line of a survey is flown so that its photos can be used?",
-            margin=Margin("share of the photo line", "%", 5.0),
+            margin=Margin("usable share of the line", "%", 5.0),
             phrase=photo_line_phrase,
         ),
         RuleWords(
@@ -260,7 +263,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="touchdown",
             question="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles"
             " and zones?",
-            margin=Margin("strip", "m", 20.0),
+            margin=Margin("strip left", "m", 20.0),
             phrase=reason_phrase,
             unjudged="touchdown",
             explains_unjudged=True,
@@ -292,7 +295,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             name="energy",
             title="energy",
             question="Does the flight leave the required reserve in the battery or the tank?",
-            margin=Margin("energy", "Wh", 50.0),
+            margin=Margin("energy used", "Wh", 50.0),
             explains_unjudged=True,
         ),
         RuleWords(
@@ -317,7 +320,7 @@ RULE_WORDS: dict[str, RuleWords] = {
 
 
 def rule_word(name: str) -> str:
-    """Return the rule's name for people; a name that is not in `RULE_WORDS` is returned as it is.
+    """Return the name of a rule in texts; a name that is not in `RULE_WORDS` is returned unchanged.
 
     >>> rule_word("departure"), rule_word("slope")
     ('loss of control', 'slope')

@@ -12,7 +12,7 @@ import numpy as np
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from flight.mission.altitude_frames import misread_altitudes
-from flight.mission.items import OVER_HOME, Frame
+from flight.mission.items import LANDINGS, OVER_HOME, Frame
 from flight.mission.itinerary import stated_loiter
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
@@ -36,6 +36,7 @@ from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Suggestion
 from logs.verdict.tolerances import (
     CALM_WIND_MPS,
+    HEIGHT_ERROR_LIMIT_M,
     HOME_ERROR_M,
     LEVEL_SLOPE_RAD,
     MIN_EVIDENCE_FLIGHT_S,
@@ -78,8 +79,8 @@ def suggest_passing_zone(
 
     finding: the finding on the violated zone.
 
-    If the planned path violates the zone, its violating legs are shifted, by the additional depth of the flight, too.
-    If only the flight violates the zone, the violating legs of the flight are shifted.
+    If the planned path violates the zone, its violating legs are shifted, by enough for the greater depth of the
+    flight, too.  If only the flight violates the zone, the violating legs of the flight are shifted.
     """
     zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if zone_index is None or "entry leg" not in facts:
@@ -90,7 +91,8 @@ def suggest_passing_zone(
     if aligned is not None and planned_depth <= ROUNDING_M:
         moves, extra_depth = flown_moves(aligned, first_leg, last_leg), 0.0
     else:
-        moves, extra_depth = planned_moves(requirements, first_leg, last_leg), max(0.0, flown_depth - planned_depth)
+        moves = planned_moves(requirements, first_leg, last_leg)
+        extra_depth = max(0.0, flown_depth - planned_depth)
     leg_moves = moves[(moves["leg"] >= first_leg) & (moves["leg"] <= last_leg)]
     changes = []
     for shifts in (_HORIZONTAL_SHIFTS, _VERTICAL_SHIFTS):
@@ -120,8 +122,8 @@ def _smallest_shift(
 ) -> float | None:
     """Return the smallest shift (m) in one direction that ends a violation; None if it exceeds ``max_shift``.
 
-    A path at some depth beyond a limit needs a shift of at least that depth, so shifting by the depth at each step
-    misses no smaller shift.  Ground that rises faster than the step may be missed.
+    Each step shifts the path by its present depth beyond the limit.  No smaller shift is missed, because a path needs a
+    shift of at least its depth.  Ground that rises faster than the step may be missed.
     """
     shift, shifted_moves = 0.0, np.array(moves)
     for _ in range(ZONE_SUGGESTION_TRIAL_COUNT):
@@ -149,7 +151,7 @@ _MAX_RELATIVE_CHANGE = 9.0
 
 
 def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, ...]:
-    """Return alternatives sorted by the relative size of their changes, without changes that are too large."""
+    """Sort alternatives by the relative size of their changes, and drop those with too large a change."""
     helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
@@ -159,8 +161,8 @@ def suggest_gentler_slope(
 ) -> tuple[Suggestion, ...]:
     """Suggest a gentler slope, a longer leg or another airspeed for one leg; the smallest relative change first.
 
-    If the aircraft is not known well enough, suggest a flight that measures its ability; if its climb performance is
-    only guessed, first suggest that the user state it.
+    If the aircraft is not known well enough, suggest a flight that measures its climb or sink performance.  If its
+    climb performance is a guess, first suggest that the user state it.
     """
     leg = finding.place.index
     if leg is None:
@@ -187,7 +189,8 @@ def suggest_gentler_slope(
     if max_slope <= 0.0 or planned_slope <= max_slope:
         return _gentler_arc(requirements, leg)
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
-    gentler_height_change, longer_length = leg_length * math.tan(max_slope), height_change / math.tan(max_slope)
+    gentler_height_change = leg_length * math.tan(max_slope)
+    longer_length = height_change / math.tan(max_slope)
     alternatives: list[_SizedSuggestion] = []
     if gentler_height_change >= MIN_SUGGESTED_RISE_M:
         change = Change("rise", place, sign * height_change, sign * math.floor(gentler_height_change), "m")
@@ -209,7 +212,7 @@ def suggest_gentler_slope(
 def suggest_gentler_landing(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a lower waypoint before a landing that is too steep, or one further from it.
+    """Suggest a waypoint that is lower, or further away, before a landing that is too steep.
 
     If the aircraft is not known well enough, suggest a flight that measures its descent.
     """
@@ -227,17 +230,15 @@ def suggest_gentler_landing(
     height = altitude - ground
     step = float(math.ceil(height - length * math.tan(max_slope)))
     longer_length = float(math.ceil(height / math.tan(max_slope)))
-    lower, further = (
-        Change("descent", requirements.waypoint(leg), None, step, "m"),
-        Change("length", requirements.leg(leg), length, longer_length, "m"),
-    )
+    lower = Change("descent", requirements.waypoint(leg), None, step, "m")
+    further = Change("length", requirements.leg(leg), length, longer_length, "m")
     return _smallest_first(
         [(step / height, (lower,)), (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,))]
     )
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs before and after a fly-by arc at a leg's end; return () if the arc is not too steep."""
+    """Suggest gentler legs around a fly-by arc that is too steep at a leg's end; () for any other arc."""
     arc = steep_arc(requirements, leg)
     if arc is None:
         return ()
@@ -285,7 +286,7 @@ def suggest_gentler_turn(
 def suggest_stating_bank(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest that the user state the bank limit of an aircraft for which it is a guess; return () otherwise."""
+    """Suggest that the user state the aircraft's bank limit if it is a guess; return () otherwise."""
     if finding.check != UNKNOWN_AIRCRAFT:
         return ()
     current, wanted = (math.degrees(bank) for bank in (requirements.setup.max_bank, requirements.possible_bank))
@@ -295,7 +296,7 @@ def suggest_stating_bank(
 def suggest_larger_loiter(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest the radius that a loiter's item must state for the bank limit in this wind."""
+    """Suggest the radius at which a loiter keeps the bank limit in this wind."""
     if finding.check == UNKNOWN_AIRCRAFT:
         return suggest_stating_bank(requirements, aligned, finding)
     item = next((item for item in requirements.setup.mission.items if item.seq == finding.place.item), None)
@@ -316,7 +317,7 @@ def suggest_larger_loiter(
 
 
 def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
-    """Suggest longer legs at a corner, long enough for its turn and the neighbouring turns; return [] if all fit."""
+    """Suggest legs at a corner that are long enough for its turn and the neighbouring turns; [] if all fit."""
     needed_before = (
         requirements.length_before[corner]
         + requirements.length_after[corner - 1]
@@ -340,10 +341,10 @@ def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSug
 
 
 def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float) -> float:
-    """Return the largest turn up to ``max_turn`` (rad) that passes at a corner, deg, in steps of 0.1; 0 if none passes.
+    """Return the largest turn that passes at a corner, deg, in steps of 0.1; 0 if none passes.
 
-    The route after the waypoint is rotated with the turn.  In wind the next turns change with their courses, and so
-    does the length available to this turn.
+    The route after the corner is rotated with the turn.  In wind, the courses after the corner affect the next turns,
+    and thus the length available to this turn. max_turn: largest turn to try, rad.
     """
     first_point, end_point = max(0, corner - 2), min(len(requirements.points), corner + 3)
     route = requirements.route
@@ -381,10 +382,8 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
     """
     envelope = requirements.setup.envelope.with_margin()
     min_speed, max_speed = envelope.level_speeds(altitude)
-    min_speed, max_speed = (
-        max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
-        min(max_speed, float(envelope.airspeed[-1])),
-    )
+    min_speed = max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0]))
+    max_speed = min(max_speed, float(envelope.airspeed[-1]))
     min_speed, max_speed = min_speed / factor, max_speed / factor
     steps = (
         np.arange(
@@ -396,13 +395,15 @@ def _level_speeds(requirements: RouteRequirements, altitude: float, current_spee
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the nearest airspeed to command (m/s) at which the aircraft holds a leg's slope, or None.
+    """Return the nearest commanded airspeed at which the aircraft holds a leg's slope, m/s, or None.
 
     slope: absolute value of the slope, rad.
     """
-    course, direction = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
+    course = float(requirements.courses[leg])
+    direction = 0 if requirements.slopes[leg] >= 0.0 else 1
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
-    factor, certain_limits = _true_airspeed_ratio(requirements, leg), requirements.limits.with_margin()
+    factor = _true_airspeed_ratio(requirements, leg)
+    certain_limits = requirements.limits.with_margin()
 
     def can_hold_slope(speed: float) -> bool:
         """Return True if the aircraft certainly holds the slope at both ends of the leg at an airspeed, m/s."""
@@ -414,7 +415,7 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest lower airspeed to command (m/s) at which a turn fits its legs, or None."""
+    """Return the highest airspeed below the present command at which a turn fits its legs, m/s, or None."""
     current_speed = float(max(requirements.setup.demanded_route.leg_airspeeds[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(
@@ -479,8 +480,9 @@ def suggest_flying_higher(
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground.
 
-    If home's altitude is that far below the ground, or if items are below the ground that are above it as heights above
-    home, suggest another altitude of home, or heights above home, first.
+    Other suggestions come first where they apply: another altitude of home, if home is that far below the ground;
+    heights above home, if items are below the ground but would be above it with heights above home.  Over varied
+    ground, following the terrain is also suggested.
     """
     if finding.limit is None or finding.margin is None:
         return ()
@@ -500,7 +502,44 @@ def suggest_flying_higher(
         suggestions.append((Change("altitude frame", MISSION, *frames, ""),))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
         suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
+    following = _follow_ground(requirements, finding)
+    if following:
+        # Of several legs it raises all at once, and is tried before each of them is raised.
+        suggestions.insert(0 if len(following) > 1 else len(suggestions), following)
     return tuple(suggestions)
+
+
+# Smallest difference of the ground's altitude along a leg for which it is suggested to follow the ground, m.
+_MIN_FOLLOWED_RELIEF_M = 20.0
+
+
+def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggestion:
+    """Return the changes with which the legs that are too low over varied ground follow it.
+
+    A leg's end keeps its height above ground, but gets at least the required one and the height by which a leg may be
+    off.  A leg that already follows the ground is not changed, nor is one that ends with a landing.  Return () if the
+    failed finding is not on one of the legs.
+    """
+    setup, leg, limit = requirements.setup, finding.place.index, finding.limit
+    terrain = setup.scenario.terrain
+    if terrain is None or limit is None or finding.place.kind != "leg" or not setup.autopilot.checks.follows_terrain:
+        return ()
+    landing_items = {item.seq for item in setup.mission.items if item.command in LANDINGS}
+    changes = []
+    for other in range(requirements.legs):
+        start, end = requirements.points[other], requirements.points[other + 1]
+        count = 2 + int(float(requirements.runs[other]) / terrain.spacing)
+        places = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
+        ground = np.asarray(terrain.height(places[:, 0], places[:, 1]), dtype=np.float64)
+        follows = bool(np.isfinite(setup.route.points["above_ground"][other + 1]))
+        is_landing = int(setup.route.items[other + 1]) in landing_items
+        if follows or is_landing or not np.isfinite(ground).all() or np.ptp(ground) < _MIN_FOLLOWED_RELIEF_M:
+            continue
+        heights = places[:, 2] - ground
+        if other == leg or float(heights.min()) < limit:
+            height = _round_to_meter(max(float(heights[-1]), limit + HEIGHT_ERROR_LIMIT_M))
+            changes.append(Change("terrain height", requirements.leg(other), None, height, "m"))
+    return tuple(changes) if any(change.place.index == leg for change in changes) else ()
 
 
 def suggest_flying_lower(
@@ -517,9 +556,10 @@ def suggest_flying_lower(
 def suggest_better_launch(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a launch into the wind, or on the runway's other course, if there is a tailwind, and a faster throw.
+    """Suggest a launch into the wind, or a faster throw or catapult.
 
-    A faster throw or catapult reaches the lowest airspeed of level flight.
+    In a tailwind, suggest to launch against it, on a runway in the other direction.  A faster throw or catapult is one
+    that reaches the minimum airspeed of level flight.
     """
     ground = requirements.ground_phases
     take_off = None if ground is None else ground.procedures.take_off
@@ -554,7 +594,8 @@ def suggest_using_less_energy(
 ) -> tuple[Suggestion, ...]:
     """Suggest a shorter flight, or a battery or tank with more energy.
 
-    Neither moves a battery failsafe that leaves the mission, and the trial of a shorter flight has a larger battery.
+    Neither changes the charge at which a battery failsafe aborts the mission.  The trial of a shorter flight is flown
+    with a larger battery.
     """
     energy = finding.planned if finding.flown is None else finding.flown
     is_failsafe = finding.limit_source == "autopilot"

@@ -23,7 +23,7 @@ from logs.verdict.findings import (
 )
 from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import FLIGHT, DecidingParameter, LevelAnswer, Place
-from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, RuleWords
+from logs.verdict.rule_words import GROUND_RULES, RULE_WORDS, TAKE_OFF_RULES, RuleWords
 from logs.verdict.suggestions import home_height
 from logs.verdict.tolerances import HOME_ERROR_M, NOTABLE_HEIGHT_ERROR_M
 from logs.verdict.wording import deciding_text, disagreement_text, place_text
@@ -41,9 +41,9 @@ _LEVEL_TITLES = {
 
 
 def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, ...]:
-    """Return the notes for a headline on what all findings depend on: an uncertain aircraft, and home's altitude.
+    """Return headline notes on two facts that affect all findings: an uncertain aircraft, home's altitude.
 
-    An altitude of home that is a finding of its own is not noted.
+    There is no note on home's altitude if a finding already reports it.
     """
     source, height = setup.envelope.source, home_height(setup)
     notes = [f"an aircraft from {source}"] if source else []
@@ -56,7 +56,7 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
 
 
 def headline(findings: Sequence[Finding], flyable: bool, setup_notes: Sequence[str] = ()) -> str:
-    """Return the first line of a verdict: the answer, with the failed, unjudged or narrowly passed findings.
+    """Return the first line of a verdict: the answer, and the failed, unjudged or narrowly passed findings.
 
     flyable: True if the verdict is flyable.
     setup_notes: see `setup_notes`.
@@ -87,7 +87,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> from logs.verdict.places import Place
     >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
-    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge with what is known of ...'
+    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge, because the aircraft's ...'
     """
     open_findings = undecided_findings(findings)
     paths = [
@@ -130,7 +130,7 @@ _PLACED_SUBJECTS = {
 
 
 def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
-    """Describe the findings on an insufficiently known aircraft; return "" if there are none."""
+    """Describe the findings that are open because the aircraft is not known well enough; "" if none is."""
     slopes = [finding for finding in open_findings if finding.rule == "slope"]
     if len(slopes) < len(open_findings):
         counts = {rule: sum(finding.rule == rule for finding in open_findings) for rule in _PLACED_SUBJECTS}
@@ -145,17 +145,36 @@ def _unknown_aircraft_text(open_findings: Sequence[Finding]) -> str:
         is_singular = len(subjects) == 1 and not slopes and max(counts.values()) <= 1
         verb = "is" if is_singular else "are"
         subject_text = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
-        return f"{subject_text} {verb} too close to the limit to judge with what is known of the aircraft"
+        return f"{subject_text} {verb} too close to the limit to judge, because the aircraft's limits are uncertain"
     if not slopes:
         return ""
     if len(slopes) > _MAX_NAMED_FINDINGS:
-        return f"slopes on {len(slopes)} legs are too close to the limit to judge with what is known of the aircraft"
+        return (
+            f"slopes on {len(slopes)} legs are too close to the limit to judge, because the aircraft's"
+            " limits are uncertain"
+        )
     place_names = [place_text(finding.place) + ("," if finding.place.to_item is not None else "") for finding in slopes]
     noun, verb = ("slopes", "are") if len(slopes) > 1 else ("slope", "is")
     return (
-        f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge with what is known of"
-        " the aircraft"
+        f"{noun} on {' and '.join(place_names)} {verb} too close to the limit to judge,"
+        " because the aircraft's limits are uncertain"
     )
+
+
+def failed_at_take_off(findings: Sequence[Finding]) -> bool:
+    """Return True if a flight failed at take-off and flew no leg.
+
+    The airframe's reference flight, which begins in the air, then shows nothing about the flight as a whole.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import FLIGHT
+    >>> launch = make_finding("launch", Place("waypoint", 0), ok=False, reason="")
+    >>> ends = [make_finding("completion", FLIGHT, ok=False, reason="", flown=legs) for legs in (0, 1)]
+    >>> [failed_at_take_off((launch, end)) for end in ends], failed_at_take_off(ends)
+    ([True, False], False)
+    """
+    fails_take_off = any(finding.ok is False and finding.rule in TAKE_OFF_RULES for finding in findings)
+    return fails_take_off and any(finding.rule == "completion" and finding.flown == 0.0 for finding in findings)
 
 
 def most_urgent_failure(findings: Sequence[Finding]) -> Finding | None:
@@ -191,7 +210,7 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return a note for each missile whose range was missed by less than the navigation error."""
+    """Return a note for each missile range that the path missed by less than the navigation error."""
     notes = []
     for finding in findings:
         facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}
@@ -201,7 +220,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Return notes on notable altitude errors: of the worst waypoint, and of the worst leg that follows the ground."""
+    """Return notes on large altitude errors, at the worst waypoint and the worst leg that follows the ground."""
     waypoint_errors = _passing_errors(findings, "waypoint", "height error")
     leg_errors = _passing_errors(findings, "slope", GROUND_FOLLOWING_ERROR)
     return [
@@ -211,7 +230,7 @@ def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _passing_errors(findings: Sequence[Finding], rule: str, what: str) -> list[tuple[float, Place]]:
-    """Return the values of a fact of a rule's findings that did not fail, with their places."""
+    """Return the values of a fact, with their places, from those findings of a rule that did not fail."""
     return [
         (fact.value, finding.place)
         for finding in findings
@@ -235,8 +254,8 @@ def _worst_error_notes(errors: Sequence[tuple[float, Place]], verb: str, referen
 def _headline_findings(failed: list[Finding]) -> list[Finding]:
     """Select at most four failed findings: the worst of each rule before the second worst of any rule.
 
-    Of one rule, those within their limit come last: they may fail only because of the others, as the arc at a steep
-    leg's end does.
+    Findings of a rule whose number is within the limit come after its other findings: they may fail only because of
+    those, like the arc at the end of a steep leg.
     """
     margins = [0.0 if finding.margin is None else finding.margin for finding in failed]
     indices_by_margin = sorted(range(len(failed)), key=margins.__getitem__)
@@ -304,12 +323,14 @@ def summary_lines(
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for answer in other_answers:
         agreement = f"; {_agreement_text(answer)}" if level == "flown" else ""
+        if answer.name == "airframe" and failed_at_take_off(findings):
+            agreement = "; it begins in the air, after the take-off that failed"
         lines.append(f"{_LEVEL_TITLES[answer.name]}: {answer.headline}{agreement}")
     return tuple(lines)
 
 
 def unjudged_parts(findings: Sequence[Finding], setup: FlightSetup) -> list[tuple[str, str]]:
-    """Return each rule with unjudged findings that the summary explains, and a text: places and first reason."""
+    """Return the rules with unjudged findings to be explained, each with a text on places and first reason."""
     parts = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name and rule.explains_unjudged]
@@ -348,9 +369,10 @@ def _airframe_or_autopilot_lines(
 
 
 def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
-    """Return True if the airframe's flight shows something about every failure.
+    """Return True if the airframe's reference flight can explain every failure.
 
-    It flies no take-off and no landing, and it does not help where the aircraft itself cannot fly the slope.
+    It cannot explain failures in a take-off or landing, which it does not fly, or on a slope that the aircraft itself
+    cannot fly.
     """
     failed_findings = [finding for finding in findings if finding.ok is False]
     return not any(
@@ -360,7 +382,7 @@ def _is_covered_by_airframe(findings: Sequence[Finding]) -> bool:
 
 
 def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line on the failed leg on which the pitch was longest at the autopilot's limit, otherwise []."""
+    """Return a line on the failed leg with the longest time at the autopilot's pitch limit; [] without one."""
     failed_places = {finding.place for finding in findings if finding.ok is False}
     times = [
         (fact.value, finding.place)
@@ -376,15 +398,15 @@ def _pitch_limit_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[
 
 
 def _misspelling_lines(parameters: ParameterSet) -> list[str]:
-    """Return a line for each name of the parameter file that looks like a misspelled name of the autopilot's.
+    """Return a line for each name in the parameter file that looks like a misspelled parameter name.
 
-    Names that differ by a digit, as BATT2_CAPACITY from BATT_CAPACITY, are other parameters; so is every name of a file
-    that also has the similar name.
+    A name that differs by a digit, as BATT2_CAPACITY from BATT_CAPACITY, is another parameter.  So is a name in a file
+    that contains the similar name, too.
     """
     known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
 
     def is_meant(name: str, known: str) -> bool:
-        """Return True if a known name is meant; short parts such as P and D of gains are never misspelled."""
+        """Return True if a name is a misspelled known name; short parts such as P and D count as correct."""
         parts = set(name.split("_")) ^ set(known.split("_"))
         is_stated = known_names[known][0].name in stated_names
         return not is_stated and is_one_edit(name, known) and min(map(len, parts)) > _LONGEST_SHORT_PART
@@ -401,7 +423,7 @@ def _misspelling_lines(parameters: ParameterSet) -> list[str]:
 def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     """Return lines on the sources of the parameters, on names without an effect, and on contradictions.
 
-    Return [] without a parameter file.  Without a flight, the sources are only described if the file has a fault.
+    Return [] without a parameter file.  Without a flight, the sources are described only if the file has a fault.
     """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
@@ -451,7 +473,7 @@ def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
 
 
 def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """Return a line with the minimum clearance less the terrain's stated error; [] if no error is stated."""
+    """Return a line with the minimum clearance minus the terrain's stated error; [] if no error is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     clearances = [
         finding.planned if finding.flown is None else finding.flown
@@ -474,7 +496,7 @@ def _agreement_text(other_level: LevelAnswer) -> str:
     disagreements = other_level.disagreements
     if not disagreements:
         is_geometry = other_level.name == "geometry"
-        return "flight and geometry agree on every finding that both have" if is_geometry else "both flights agree"
+        return "flight and geometry agree on every finding that both judge" if is_geometry else "both flights agree"
     rest_text = (
         f", +{len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""
     )

@@ -19,42 +19,39 @@ ROUNDING_M = 0.02
 CLEARANCE_TOLERANCE_M = 0.1
 # m.  A waypoint further below home than this needs terrain: ground stations round home's altitude to whole metres.
 BELOW_HOME_M = 1.0
-# m.  The altitude of a mission's home may be this far above the terrain there: an ellipsoidal height instead of a
-# height above mean sea level, together with errors of elevation files, is less than this nearly everywhere people fly.
+# m.  A mission's home may be stated this far above the terrain there. The cause is an altitude above the ellipsoid
+# instead of mean sea level, or an error of the elevation file; nearly everywhere both together are less than this.
 HOME_ERROR_M = 50.0
 # m.  A leg may be this far above the maximum height above ground, or above the ceiling: the effect of `ROUNDING_M` on
 # steep ground.
 HEIGHT_TOLERANCE_M = 0.1
 # m.  A loiter's radius may be this much smaller than the radius at the bank limit: 1e-7 degrees at its center.
 LOITER_RADIUS_TOLERANCE_M = 0.02
-# Laps.  A loiter by an autopilot that steers to its center may be flown by this much less than drawn, because the
-# aircraft joins and leaves the circle on other courses; half a lap is the difference of joining on the other side.
+# Laps.  Laps that may be missing in a loiter by an autopilot that steers to its center. Such an aircraft joins and
+# leaves the circle on other courses than drawn; joining on the other side makes half a lap.
 LOITER_LAPS_TOLERANCE = 0.5
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
-# Radii of the arc at the bank limit.  Distance from the center of a loiter too tight for the bank limit that an
-# autopilot which steers to the center may reach: up to 2.09 on 20 flights of the simulated ArduPlane with
-# loiters of 10 to 100 m, in up to 12 m/s of wind.
-# Also the distance from a mission's last waypoint that PX4, which loiters there, may reach, in radii of this loiter or
-# of the arc at the bank limit, whichever is wider: up to 2.06 in 54 ends of missions by the simulated PX4, with
-# loiters of 80 and 200 m, in up to 12 m/s of wind.
+# Radii of the arc at the bank limit.  An aircraft stays within this distance of a loiter's center, even if the loiter
+# is too tight for its bank limit. In 20 flights of the simulated ArduPlane (loiters of 10 to 100 m, wind up to 12
+# m/s) it reached up to 2.09. It also stays within this distance of the last waypoint that the simulated PX4 circles:
+# up to 2.06 in 54 flights, in radii of that arc or of the loiter, whichever is larger.
 LOITER_SWING_RADII = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5
-# rad.  A bank limit that is only guessed may be up to this, the steepest that a data sheet or a scenario may state, or
-# up to the limit of autopilot or scenario if that is lower: what passes with it is undecided.
+# rad.  Largest bank that is possible if the bank limit is only guessed; a lower limit of autopilot or scenario
+# replaces it. What passes only with this bank is undecided. It is the steepest bank that a data sheet or a scenario
+# may state.
 POSSIBLE_BANK_RAD = math.radians(60.0)
-# rad.  A turn sharper than this has no useful tangent length; the tangent length of a U-turn is infinite.  Between legs
-# that are too short, guidance omits the arc of a turn beyond its own smaller limit, SHARPEST_FLY_BY in
-# flight/mission/route.py, which the turn rule imports from there.
+# rad.  A sharper turn has no useful tangent length, because the tangent length of a U-turn is infinite.
 U_TURN_RAD = math.pi - 1e-6
-# Turn radii.  Maximum fly-by offset of a turn; a larger offset, of a turn beyond about 176 degrees, is reduced to it.
+# Turn radii.  Maximum fly-by offset. Turns beyond about 176 degrees would need more, and are given this offset.
 MAX_FLY_BY_OFFSET_RADII = 30.0
 
 # The turn rule
 
-# rad.  Excess of the mean bank over a second beyond the limit that is tolerated: roll in gusts is not part of the turn.
+# rad.  The mean bank over a second may exceed the limit by this: roll in gusts is not part of the turn.
 BANK_TOLERANCE_RAD = math.radians(5.0)
 # m.  Tolerance for a turn flown outside its arc.
 OVERSHOOT_TOLERANCE_M = 5.0
@@ -62,9 +59,11 @@ OVERSHOOT_TOLERANCE_M = 5.0
 SETTLED_CROSS_TRACK_M = 1.0
 # m, by turbulence.  Increase of `SETTLED_CROSS_TRACK_M` by gusts.
 GUST_OFFSET_M = {"none": 0.0, "light": 0.5, "moderate": 1.0}
-# Fraction of the passing distance, and m by turbulence.  A turn may pass its waypoint closer than the arc at the bank
-# limit by the sum of both; the second is the cross-track error of an aircraft with good guidance.
+# Fraction of the passing distance.  A turn may pass its waypoint closer than the arc at the bank limit, by the sum of
+# this and `CORNER_CUT_TOLERANCE_M`.
 CORNER_CUT_FRACTION = 0.01
+# m, by turbulence.  Cross-track error of an aircraft with good guidance: added to `CORNER_CUT_FRACTION` of the
+# passing distance.
 CORNER_CUT_TOLERANCE_M = {"none": 0.6, "light": 0.8, "moderate": 1.0}
 # Standard deviations.  Largest navigation error that the rules take into account.
 NAVIGATION_SIGMAS = 3.0
@@ -73,19 +72,17 @@ SETTLING_WATCH_TIME_S = 10.0
 # Radii of the planned arc.  A larger flown radius is nearly straight flight, and says nothing about a turn.
 STRAIGHT_RADIUS_RATIO = 10.0
 
-# Fraction of the corridor's half width.  A corner is a negligible kink if the path without its waypoint passes the
-# waypoint within this: an aircraft on that path, or as far again on the waypoint's other side, is still well inside the
-# corridor.
+# Fraction of the corridor's half width.  A corner is negligible if the path without its waypoint passes the waypoint
+# within this. An aircraft on that path, or as far away on the waypoint's other side, is well inside the corridor.
 KINK_FRACTION = 0.25
 # Waypoints.  At most this many in a row are treated as one kink, or as one step; a survey's shortest lines are longer.
 KINK_WAYPOINT_COUNT = 8
 
 # The slope rule
 
-# m.  A leg beyond its slope limit is a negligible step if the leg, together with its too steep neighbours, rises or
-# descends by no more than this: an aircraft that begins the step early or late is within this height of the step.
-# ArduPlane itself flies altitude changes below ALT_SLOPE_MIN, 15 m by default, as a step (ArduPilot's parameter
-# reference).
+# m.  A leg beyond its slope limit is negligible if it rises or descends by no more than this, together with its too
+# steep neighbours. An aircraft that begins such a step early or late is within this height of it. ArduPlane itself
+# flies altitude changes below ALT_SLOPE_MIN, 15 m by default, as a step.
 NEGLIGIBLE_STEP_M = 10.0
 # rad.  A fitted slope may differ from the plan by this, in addition to the fit's own tolerance.
 SLOPE_TOLERANCE_RAD = math.radians(0.5)
@@ -179,22 +176,22 @@ ROUGH_SLOPE_ERROR_RAD = math.radians(0.5)
 # m.  If neither mission nor autopilot states an acceptance radius, a waypoint is reached within the fly-by path's
 # distance from it plus this.  A corridor is wider by this than its turns need.
 WAYPOINT_PASS_MARGIN_M = 10.0
-# m.  Height error at a waypoint that the first line of a verdict names.  At 106 waypoints of the simulated ArduPlane
-# and PX4, on slopes of up to 5 degrees in up to moderate turbulence, the height error was 11.4 m or less.  ArduPlane
-# passed waypoints of a safe plan with a launch up to 49 m low.
+# m.  A larger height error at a waypoint is named in the first line of a verdict. At 106 waypoints of the simulated
+# ArduPlane and PX4, on slopes of up to 5 degrees and in up to moderate turbulence, the error was 11.4 m or less.
+# ArduPlane passed waypoints of a safe plan with a launch up to 49 m low.
 NOTABLE_HEIGHT_ERROR_M = 25.0
-# Ratio.  An autopilot that turns by its own control law, at the waypoint or before it, swings beyond the next leg by up
-# to this many times R (1 - cos turn): up to 1.05 in 168 turns of 95 to 180 degrees by ArduPlane's simulated control
-# laws and up to 1.24 in 80 by PX4's, in wind of up to 12 m/s and light turbulence.
+# Ratio.  Largest distance beyond the next leg after a fly-over turn, divided by R (1 - cos turn), if the autopilot
+# turns by its own control law. It was up to 1.05 in 168 turns of the simulated ArduPlane and 1.24 in 80 turns of PX4
+# (95 to 180 degrees, wind up to 12 m/s, light turbulence).
 FLY_OVER_SWING_RATIO = 1.25
-# m.  Approaches to a waypoint within this of the closest are equally close, for example on a path that crosses itself
-# above or below: of them the one nearest in altitude applies.
+# m.  Approaches to a waypoint whose distances differ by less than this are equally close; of them the one nearest in
+# altitude counts. A path that crosses itself above or below has such approaches.
 EQUAL_DISTANCE_TOLERANCE_M = 0.5
 # m/s.  Error of a leg's mean airspeed.
 MEAN_SPEED_TOLERANCE_MPS = 1.0
-# Fraction of the commanded airspeed.  An airspeed that has settled further from its command than this, and by at least
-# `MEAN_SPEED_TOLERANCE_MPS`, is not held.  Five aircraft with three control laws flew legs within 10 % of it in still
-# air, including legs on which they took up 10 m/s more; 10 % less airspeed is a fifth less lift.
+# Fraction of the commanded airspeed.  An airspeed is not held if it has settled further from its command than this,
+# and by at least `MEAN_SPEED_TOLERANCE_MPS`. Five aircraft with three control laws stayed within 10 % in still air,
+# also after a command of 10 m/s more. With 10 % less airspeed, lift is a fifth less.
 HELD_SPEED_FRACTION = 0.1
 # m/s.  PX4 flies faster on purpose if the commanded airspeed leaves less ground speed than this (FW_GND_SPD_MIN).
 MIN_GROUND_SPEED_MPS = 5.0
@@ -264,8 +261,8 @@ TURN_AROUND_RADII = 3.25
 
 # Departures from the ground and approaches to it
 
-# m.  Ignore terrain within this distance of home under a climb-out: rail or runway are there, and the usual elevation
-# files do not resolve such a short distance, which is less than two of their pixels.
+# m.  Terrain within this distance of home is ignored under a climb-out. Rail or runway are there, and the distance is
+# less than two pixels of the usual elevation files.
 LAUNCH_RUN_M = 50.0
 # m.  Least height above the ground at home to which an aircraft climbs before it descends to its first waypoint: below
 # that ArduPlane flies no slope (`Plane::setup_glide_slope`).
@@ -286,11 +283,11 @@ FLARE_HEIGHT_MARGIN_M = 15.0
 LANDING_POINT_ERROR_M = 10.0
 # m.  Least height above ground on a go-around: it turns on that path, and turns are not laid out.
 GO_AROUND_CLEARANCE_M = 20.0
-# m.  Within this distance of a waypoint of the landing sequence that is below the required height, a go-around may be
-# as low as the waypoint: a slope down to a waypoint that is 10 m lower needs this length.
+# m.  A waypoint of the landing sequence may be below the required height. Within this distance of it a go-around may
+# be as low as the waypoint: a slope down to a waypoint that is 10 m lower needs this length.
 LINE_UP_DISTANCE_M = 500.0
-# m.  A go-around whose climb clears the ground beyond the landing point by less than this is undecided: the height of
-# the point mass was within this of the one recorded go-around of ArduPlane, which did not have to climb.
+# m.  A go-around is undecided if its climb clears the ground beyond the landing point by less than this. The
+# simulated height was within this of the one recorded go-around of ArduPlane, which did not have to climb.
 GO_AROUND_MODEL_ERROR_M = 6.0
 
 # Flown take-offs and landings
@@ -307,8 +304,8 @@ MAX_LAUNCH_HEIGHT_LOSS_M = 1.0
 # m.  Least runway length left where the aircraft leaves the ground: the simulated ArduPlane left it after 34 m, and the
 # real one after 37 m, in the one such flight that is known.
 RUNWAY_MARGIN_M = 10.0
-# m.  The legs after a take-off and the legs of a landing sequence are near the ground by nature: they need no more
-# height above ground than a go-around, `GO_AROUND_CLEARANCE_M`, even if the scenario requires more.
+# m.  Required height above ground of the legs after a take-off and of a landing sequence, even if the scenario
+# requires more: they are near the ground by nature. A go-around needs the same, `GO_AROUND_CLEARANCE_M`.
 GROUND_LEG_CLEARANCE_M = GO_AROUND_CLEARANCE_M
 # m.  Largest distance from home, or from the landing point, at which `GROUND_LEG_CLEARANCE_M` applies: the length of
 # the longest final that a plan has.  Beyond it, the scenario's requirement applies to these legs, too.
@@ -323,8 +320,8 @@ MAX_GEAR_HEIGHT_M = 1.0
 # m.  Error of a simulated touch-down along the strip: 5 touch-downs of ArduPlane in steady wind were within 15 m of the
 # simulated ones, and 38 of 42 in light turbulence within 30 m.  The strip must be this much longer at either end.
 TOUCHDOWN_ERROR_M = 30.0
-# m.  In turbulence a landing that leaves less of the strip than this is undecided: the 42 touch-downs of ArduPlane were
-# 27 m shorter to 46 m longer than the simulated ones, with an 11 kg Aerosonde as well as a 2 kg wing.
+# m.  In turbulence a landing is undecided if it leaves less of the strip than this. 42 touch-downs of ArduPlane were
+# 27 m shorter to 46 m longer than simulated, with an 11 kg Aerosonde as well as a 2 kg wing.
 GUST_TOUCHDOWN_ERROR_M = 50.0
 # m.  A final that is simulated lower above ground than this, before its flare may begin, is undecided: five ArduPlane
 # finals reached their flares within 2 m of the simulated height.
@@ -344,8 +341,8 @@ CHORD_TIME_S = 0.25
 FINAL_WAYPOINT_TOLERANCE_M = 10.0
 # s.  An imported flight that continues this long after its last waypoint has flown a part of the next leg.
 PARTIAL_LEG_MIN_S = 2.0
-# s.  In a longer pause of an imported log the aircraft's position is unknown: at a bank of 45 degrees it deviates by
-# g t^2 / 16 = 61 m and returns in that time, which is within the corridor of a usual WP_RADIUS.
+# s.  In a longer pause of an imported log the aircraft's position is unknown. At a bank of 45 degrees it deviates in
+# this time by g t^2 / 16 = 61 m and returns, which is within the corridor of a usual WP_RADIUS.
 MAX_UNSEEN_TIME_S = 10.0
 # m.  A flight that stays further than this from every waypoint of a plan was flown somewhere else.
 PLAN_MISMATCH_DISTANCE_M = 1000.0

@@ -73,9 +73,9 @@ class Verdict:
 
     @property
     def answer(self) -> str:
-        """The verdict in a few words: "flyable", "not flyable" or "not judged in full".
+        """Answer in a few words: "flyable", "not flyable" or "not judged in full".
 
-        For an imported flight they are "flown as planned", "not flown as planned" or "not judged in full".
+        For an imported flight, they are "flown as planned", "not flown as planned" or "not judged in full".
 
         >>> Verdict((), flyable=False, complete=True, lines=(), level="flown", imported=True).answer
         'not flown as planned'
@@ -87,7 +87,7 @@ class Verdict:
 
     @property
     def state(self) -> str:
-        """Answer by which a display chooses colors: "ok", "open" (nothing failed, a part was not judged) or "fail"."""
+        """Answer as a key for colors: "ok", "open" (nothing failed, but a part was not judged) or "fail"."""
         return "ok" if self.flyable else "open" if self.undecided else "fail"
 
     @property
@@ -97,7 +97,7 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """True if the verdict is flyable, or complete and undecided only on departure, approach or returns.
+        """True if the verdict is flyable, or is complete and leaves only departure, approach or returns open.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_PATH, make_finding
@@ -112,7 +112,7 @@ class Verdict:
 
     @property
     def headline(self) -> str:
-        """The answer in one line."""
+        """Answer in one line."""
         return self.lines[0] if self.lines else ""
 
     @property
@@ -122,7 +122,7 @@ class Verdict:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The findings that failed."""
+        """Failed findings."""
         return tuple(finding for finding in self.findings if finding.ok is False)
 
     @property
@@ -192,7 +192,7 @@ class Verdict:
         )
 
     def present(self) -> Presentation:
-        """Return the verdict in the order in which it is shown."""
+        """Return the verdict arranged for display: findings grouped by rule."""
         headline, *details = self.lines or ("",)
         return Presentation(
             headline=headline,

@@ -27,7 +27,7 @@ _MAX_STATEMENT_LENGTH = 80
 
 
 def place_text(place: Place) -> str:
-    """Return the name of a place for people.
+    """Return the name of a place in texts.
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
@@ -60,6 +60,22 @@ def place_text_within(place: Place) -> str:
     'leg 7, to item 9,'
     """
     return place_text(place) + ("," if place.to_item is not None else "")
+
+
+def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
+    """Name the rule of a finding and its place; a place that is the whole flight, plan or mission is left out.
+
+    within: True for use within a sentence, with the item of a leg between commas.
+
+    >>> noun_with_place("slope", Place("leg", 7, to_item=9)), noun_with_place("energy", Place("flight"))
+    ('slope at leg 7, to item 9', 'energy')
+    >>> noun_with_place("mission", Place("mission", item=3)), noun_with_place("mission", Place("mission"))
+    ('mission item 3', 'mission')
+    """
+    if place.kind in ("flight", "plan") or (place.kind == "mission" and place.item is None):
+        return noun
+    name = place_text_within(place) if within else place_text(place)
+    return f"{noun} {name}" if place.kind == "mission" else f"{noun} at {name}"
 
 
 def threat_text(place: Place) -> str:
@@ -95,6 +111,8 @@ def change_text(change: Change) -> str:
     match change.what:
         case "length":
             return f"make {_length_text(change)}"
+        case "terrain height":
+            return _terrain_height_text((change,))
         case "rise":
             return _rise_text(change)
         case "airspeed" if change.most is not None:
@@ -129,7 +147,7 @@ def change_text(change: Change) -> str:
 
 
 def _other_change_text(change: Change) -> str:
-    """Phrase a change of anything but the path as an instruction."""
+    """Phrase a change of anything other than the path as an instruction."""
     requested_value = change.wanted
     match change.what:
         case "home altitude":
@@ -187,6 +205,20 @@ def _length_text(change: Change) -> str:
     return f"{place_text_within(change.place)} {change.wanted:.0f} m long{comparison}"
 
 
+def _terrain_height_text(suggestion: Suggestion) -> str:
+    """Name the items at which legs that follow the ground end, with their heights above it.
+
+    >>> legs = [Change("terrain height", Place("leg", k, to_item=k + 1), None, 70.0 + k, "m") for k in (1, 2)]
+    >>> _terrain_height_text(tuple(legs))
+    'follow the ground to item 2 at 71 m and item 3 at 72 m above it (frame 10)'
+    """
+    texts = []
+    for change in suggestion:
+        end = place_text(change.place) if change.place.to_item is None else f"item {change.place.to_item}"
+        texts.append(f"{end} at {change.wanted:.0f} m")
+    return f"follow the ground to {_join_with_and(texts)} above it (frame 10)"
+
+
 def suggestion_text(suggestion: Suggestion) -> str:
     """Join the changes of one suggestion into one instruction.
 
@@ -194,7 +226,9 @@ def suggestion_text(suggestion: Suggestion) -> str:
     >>> suggestion_text(tuple(longer))
     'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
     """
-    if all(change.what == "length" for change in suggestion):
+    if all(change.what == "terrain height" for change in suggestion):
+        text = _terrain_height_text(suggestion)
+    elif all(change.what == "length" for change in suggestion):
         text = "make " + " and ".join(map(_length_text, suggestion))
     else:
         text = " and ".join(map(change_text, suggestion))
@@ -202,7 +236,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     remaining = [finding for change in suggestion for finding in change.remaining]
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
-        f"afterwards {state}: {', '.join(texts)}"
+        f"later in the flight {state}: {', '.join(texts)}"
         for state, fails in (("fails", True), ("undecided", False))
         if (texts := [_remaining_text(item) for item in remaining if item.fails is fails])
     ]
@@ -213,7 +247,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
 
 def _remaining_text(finding: RemainingFinding) -> str:
     """Name the rule and the place of a finding that remains open."""
-    return f"{RULE_NOUNS.get(finding.rule, finding.rule)} at {place_text(finding.place)}"
+    return noun_with_place(RULE_NOUNS.get(finding.rule, finding.rule), finding.place)
 
 
 def without_trial(suggestion: Suggestion) -> Suggestion:
@@ -241,7 +275,9 @@ def margin_text(margin: float, unit: str, *, passed: bool, tolerance: float | No
 
 
 def within_tolerance_text(tolerance: float | None, unit: str) -> str:
-    """Return the words for a value beyond its limit that passes.  tolerance: in `unit`; None if it is not known.
+    """Return the phrase for a value that is beyond its limit but passes.
+
+    tolerance: in `unit`; None if it is not known.
 
     >>> within_tolerance_text(0.5, "m/s"), within_tolerance_text(None, "")
     ('within the tolerance of 0.5 m/s', 'within the tolerance')
@@ -250,7 +286,7 @@ def within_tolerance_text(tolerance: float | None, unit: str) -> str:
 
 
 def moves_text(moves: Sequence[ItemMove]) -> str:
-    """List moves of items; items that move alike are named together.
+    """List moves of items; items with the same move are named together.
 
     >>> moves_text([ItemMove(8, -1.96, 48.9, 0.0), ItemMove(9, 0.0, 0.0, -6.5), ItemMove(10, 0.0, 0.0, -6.5)])
     'item 8 48.9 m north and 2 m west, items 9 and 10 6.5 m down'
@@ -308,14 +344,13 @@ def disagreement_text(disagreement: Disagreement) -> str:
     >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
     >>> disagreement_text(Disagreement("landing", Place("waypoint", 2), "geometry", there=False, here=True))
-    'landing at waypoint 2 fails by geometry, and touchdown, by which a flight judges it, passes in flight'
+    'landing at waypoint 2 fails by geometry, and touchdown, its counterpart, passes in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    rule_and_place = (
-        f"{RULE_NOUNS.get(disagreement.rule, disagreement.rule)} at {place_text_within(disagreement.place)}"
-    )
+    rule_noun = RULE_NOUNS.get(disagreement.rule, disagreement.rule)
+    rule_and_place = noun_with_place(rule_noun, disagreement.place, within=True)
     counterpart = FLOWN_COUNTERPARTS.get(disagreement.rule) if disagreement.level == "geometry" else None
-    conjunction = f", and {counterpart}, by which a flight judges it," if counterpart else " and"
+    conjunction = f", and {counterpart}, its counterpart," if counterpart else " and"
     return (
         f"{rule_and_place} {verbs[disagreement.there]} {_LEVEL_PHRASES[disagreement.level]}"
         f"{conjunction} {verbs[disagreement.here]} in flight"
@@ -354,7 +389,7 @@ def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
 
 
 def shorten_statement(statement: str) -> str:
-    """Cut a statement to the maximum length in a headline.
+    """Cut a statement to the maximum length for a headline.
 
     >>> shorten_statement("bank 80° at 3.0 s"), len(shorten_statement("m" * 200))
     ('bank 80° at 3.0 s', 80)
@@ -372,7 +407,7 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def _with_unit(digits: str, unit: str) -> str:
-    """Return the digits of a number with its unit, a counted unit in the singular after 1."""
+    """Join the digits of a number and its unit; a counted unit is in the singular after 1."""
     return digits + (" leg" if (digits, unit) == ("1", "legs") else _unit_suffix(unit))
 
 
@@ -386,7 +421,7 @@ _MAX_DIGITS = 9
 
 
 def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
-    """Return two values with their unit, with enough digits that different values look different.
+    """Format two values with their unit, with enough digits to show that different values differ.
 
     >>> compared_texts(-7.04, -7.02, "deg"), compared_texts(12.0, 15.0, "m")
     (('-7.04°', '-7.02°'), ('12 m', '15 m'))

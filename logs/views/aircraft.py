@@ -298,7 +298,7 @@ def _step_title(step: StepResponse) -> str:
 
 
 def _add_legend_above(axes: Any, title: str, columns: int) -> None:
-    """Draw the legend in the upper part of the panel, and raise the axis limit so that it hides no lines."""
+    """Draw the legend at the top of the panel, and raise the axis limit so that the legend hides no lines."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
     legend_fraction = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height

@@ -174,7 +174,7 @@ def series(name: str, role: str, along: Floats, values: ArrayLike, **options: An
 
 
 def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
-    """Return a layer as `series` does, filled from zero."""
+    """Return a layer like `series`, filled from zero."""
     column = np.asarray(values, dtype=np.float64)
     rows = outline_rows(column, BLOCKS)
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
@@ -239,7 +239,7 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
 
 
 def nice_step(span: float, max_count: int) -> float:
-    """Return a step for ticks: 1, 2 or 5 times a power of ten, for at most `max_count` steps in `span`."""
+    """Return the tick step for at most `max_count` steps in `span`: 1, 2 or 5 times a power of ten."""
     min_step = max(span, 1e-9) / max_count
     power = 10.0 ** np.floor(np.log10(min_step))
     for factor in (1.0, 2.0, 5.0, 10.0):
@@ -270,7 +270,7 @@ def numbers(values: Iterable[float], digits: int) -> list[float | None]:
 def screen_decimals(values: Floats) -> int:
     """Return the number of decimals that resolves a ten-thousandth of the range of values.
 
-    This is the resolution of a screen.
+    A screen resolves about as much.
 
     >>> screen_decimals(np.array([0.0, 90.0])), screen_decimals(np.array([0.001, 0.002]))
     (3, 7)

@@ -141,7 +141,8 @@ def refly_charts(reflight: Reflight) -> dict[str, Chart]:
     marks = leg_marks(reflight.setup.route.leg_numbers_of(legs), along)
     charts = {}
     for file, name, title, unit, factor, span in _REFLOWN:
-        flown_values, simulated_values = factor * getattr(reflight.flown, name), factor * getattr(reflight.model, name)
+        flown_values = factor * getattr(reflight.flown, name)
+        simulated_values = factor * getattr(reflight.model, name)
         if not np.isfinite(flown_values).any():
             continue
         lines = (series("flown", "flown", along, flown_values), series("simulated", "other", along, simulated_values))

@@ -167,7 +167,8 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
     dial.plot([0, 0], [0.82, 1.0], color=theme.colour("ink"), linewidth=1.2)
     winds_with_arrows = [named_wind for named_wind in winds if named_wind.wind.speed > 0.0]
     for k, named_wind in enumerate(winds_with_arrows):
-        east, north = np.sin(named_wind.wind.from_course), np.cos(named_wind.wind.from_course)
+        east = np.sin(named_wind.wind.from_course)
+        north = np.cos(named_wind.wind.from_course)
         # The second arrow is dashed and shorter, so that both show if they overlap.
         arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
         arrow |= {"color": theme.colour(named_wind.role), "linestyle": (0, (3, 1.5)) if k else "-"}

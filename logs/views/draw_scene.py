@@ -82,7 +82,7 @@ def draw_scene(view: SceneView) -> Figure:
     """Draw the 3-D scene of a flight, seen from the side of the line from start to destination.
 
     The title states the factor by which heights are exaggerated.  Lines are dashed and thin behind a ridge.  A long and
-    narrow scene is seen more from its end, with ground around it, so that it does not appear as a strip.
+    narrow scene is viewed from nearer to its end and with ground around it, so that it does not appear as a strip.
     """
     setup, track, failed = view.setup, view.track, view.failed
     scene_limits = scene_bounds(setup, track)
@@ -137,7 +137,7 @@ def _compass_name(azimuth: float) -> str:
 def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
-    """Make a figure and axes that hold route, threats and ground, with equal scales."""
+    """Make a figure and axes, with equal scales, into which route, threats and ground fit."""
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.positions[:, 2].min())
     corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
     threats = setup.scenario.threats
@@ -285,7 +285,7 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
 
 
 def _legend_handle(kind: LayerKind, role: str, text: str) -> Any:
-    """Return the handle of a legend entry with the look of a role."""
+    """Return the handle of a legend entry, drawn in the style of a role."""
     empty = np.zeros(0)
     return legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 

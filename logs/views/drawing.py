@@ -134,7 +134,7 @@ def new_figure(height: float) -> Figure:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """Render the figure as a PNG; the same figure gives the same bytes (no date, no version inside).
+    """Render the figure as a PNG without date or version, so that the same figure gives the same bytes.
 
     >>> figure = new_figure(2.0)
     >>> data = png_bytes(figure)
@@ -289,7 +289,7 @@ def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
 def can_share_legend(panels: Sequence[Panel]) -> bool:
     """Return True if all panels can share a legend.
 
-    They can if each look has one meaning and each meaning one look in all panels, and some repeat.
+    This is the case if, in all panels, each look has one meaning and each meaning one look, and some looks repeat.
 
     >>> none = np.zeros(2)
     >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
@@ -472,7 +472,9 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 def _area_look(look: theme.Look) -> dict[str, Any]:
     """Return matplotlib's style options of a filled area."""
-    edge = (theme.colour(look.edge) if look.edge else look.light) if look.width or look.hatch else "none"
+    edge = theme.colour(look.edge) if look.edge else look.light
+    if not look.width and not look.hatch:
+        edge = "none"
     return {
         "facecolor": (*theme.rgb(look.light), look.fill),
         "edgecolor": edge,
@@ -483,7 +485,7 @@ def _area_look(look: theme.Look) -> dict[str, Any]:
 
 
 def _draw_area(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
-    """Draw all rings as one path, so that holes stay open."""
+    """Draw the rings of an area as one path, so that the holes of the area stay open."""
     points = np.column_stack([layer.x, layer.y])
     gaps = np.flatnonzero(np.isnan(layer.x))
     rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]

@@ -85,12 +85,11 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
         moments = flown_moments(track)
         slopes.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.bank))
-    leg_slopes_deg, commanded_speeds = (
-        np.degrees(leg_slopes(setup.display_waypoints)),
-        np.asarray(setup.route.leg_airspeeds),
-    )
+    leg_slopes_deg = np.degrees(leg_slopes(setup.display_waypoints))
+    commanded_speeds = np.asarray(setup.route.leg_airspeeds)
     slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded_speeds, leg_slopes_deg))
-    min_speed, max_speed = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])
+    min_speed = float(setup.envelope.airspeed[0])
+    max_speed = float(setup.envelope.airspeed[-1])
     speed_range = (min_speed - 0.5, max_speed + 0.5)
     speed_ends = np.array(speed_range)
     planned_bank, aircraft_bank = (

@@ -51,7 +51,7 @@ class Failures:
     def threat_names(self) -> dict[int, str]:
         """Return the verdict's name of each failing threat, by its index.
 
-        A unit that fails as a missile and as a radar is named as a missile.
+        A threat that fails as a missile and as a radar is named as a missile.
         """
         radars_first = sorted(self.threats, key=lambda place: place.kind == "missile")
         return {place.index or 0: place_text(place) for place in radars_first}
@@ -135,8 +135,8 @@ def _max_distance(points: Floats, path: Floats) -> float:
 def track_distance(waypoints: Floats, track: Track) -> Floats:
     """Return the distance along the route of each row of a track, (t,) m, never decreasing.
 
-    A row is projected onto its active leg and held between that leg's ends; a row without a position keeps the
-    distance reached before it.
+    A row is projected onto its active leg, between the ends of the leg.  A row without a position gets the distance of
+    the row before it.
     """
     waypoint_distances = route_distance(waypoints)
     leg = np.clip(track.leg.astype(np.intp), 0, len(waypoints) - 2)

@@ -48,7 +48,7 @@ def ground_risk_map(setup: FlightSetup, volumes: Sequence[RiskVolume], populatio
             for band, area in population.bands
             if (parts := outline_parts(area))
         ]
-    layers += [area_layer(one.name, one.role, outline_parts(one.area)) for one in reversed(volumes)]
+    layers += [area_layer(volume.name, volume.role, outline_parts(volume.area)) for volume in reversed(volumes)]
     layers.append(Layer("line", "route of the mission", "planned", route[:, 0], route[:, 1], quiet=True))
     if population is not None:
         east, north = population.max_place

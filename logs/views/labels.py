@@ -69,7 +69,7 @@ class LabelPlacer:
         optional: bool = False,
         **style: Any,
     ) -> None:
-        """Write the text next to data position (x, y), at the place of lowest cost.
+        """Write the text next to data position (x, y), where the cost is lowest.
 
         size: font size, points.
         gap: pixels between text and position.
@@ -86,9 +86,9 @@ class LabelPlacer:
         width = 0.62 * size * len(text) * DPI / 72.0 + 2 * max(padding, _SIDE_PADDING_PX)
         height = 1.25 * size * DPI / 72.0 + 2 * padding
         best_box, best_cost, best_ring = self._make_box(point_x, point_y, width, height, gap, prefer), math.inf, 0
-        for ring, distance_in_heights in enumerate(
-            _FRAMED_DISTANCES if "bbox" in style else _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
-        ):
+        unframed_distances = _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
+        ring_distances = _FRAMED_DISTANCES if "bbox" in style else unframed_distances
+        for ring, distance_in_heights in enumerate(ring_distances):
             for direction_rank, direction in enumerate((prefer, *_DIRECTIONS)):
                 box = self._make_box(point_x, point_y, width, height, gap + distance_in_heights * height, direction)
                 order_cost = 0.0 if "bbox" in style else self._order_cost(box, point_x, point_y)
@@ -145,7 +145,7 @@ class LabelPlacer:
         )
 
     def _order_cost(self, box: Box, x: float, y: float) -> float:
-        """Return the cost of a label's box that stands on the wrong side of the labels of near points.
+        """Return the cost of a box on the wrong side of the labels of near points.
 
         A framed label has no such cost, because it has a line to its point.
 
@@ -156,10 +156,8 @@ class LabelPlacer:
             dx, dy = x - other_x, y - other_y
             if math.hypot(dx, dy) > box[2] - box[0] + other_box[2] - other_box[0]:
                 continue
-            x_offset, y_offset = (
-                box[0] + box[2] - other_box[0] - other_box[2],
-                box[1] + box[3] - other_box[1] - other_box[3],
-            )
+            x_offset = box[0] + box[2] - other_box[0] - other_box[2]
+            y_offset = box[1] + box[3] - other_box[1] - other_box[3]
             if dx * x_offset + dy * y_offset < 0.0:
                 cost += _ORDER_COST
         return cost

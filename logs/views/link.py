@@ -64,7 +64,7 @@ class DrawnLink:
 
 
 def draw_link(setup: FlightSetup, along: LinkAlongPath, antenna: Floats, *, is_flown: bool) -> DrawnLink | None:
-    """Compute the data of the pictures of a radio link; None without a link, a terrain, or a point of the path.
+    """Compute the data of a radio link's pictures; None if link, terrain or path is missing.
 
     along: the link along the path.
     antenna: position of the station's antenna, m, (3,).
@@ -158,7 +158,7 @@ def link_map(setup: FlightSetup, drawn: DrawnLink) -> MapChart:
 
 
 def _coverage_layers(coverage: LinkCoverage) -> list[Layer]:
-    """Return layers of the areas in which the link is weak or lost at the flight's height, or is in the ground."""
+    """Return layers of the areas in which the link is weak, lost or in the ground, at the flight's height."""
     is_weak = (coverage.margin >= 0.0) & (coverage.margin < WEAK_MARGIN_DB)
     height_text = coverage.height.text
     areas = (

@@ -192,7 +192,7 @@ def scenario_map(
 
 
 def map_json(chart: MapChart) -> Json:
-    """Return the map as JSON data, lengths in m; its ground is in the data of the 3-D view."""
+    """Return the map as JSON data, lengths in m; the ground is part of the data of the 3-D view."""
     return {
         "origin": chart.origin,
         "east": numbers(chart.east, 1),
@@ -204,7 +204,8 @@ def map_json(chart: MapChart) -> Json:
 def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
     """Return the east and north range that shows the scenario's area and all paths, with a margin, m.
 
-    Bounds made around an external mission limit nothing: the range covers its path, and the parts of zones within them.
+    Bounds that planfly made around an external mission are no limit: the range then covers the path, and the zones
+    within these bounds.
 
     paths: paths (t, 3), m; rows with NaN are ignored.
     """
@@ -228,14 +229,15 @@ def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]
 
 
 def _area_edge_layers(scenario: Scenario) -> list[Layer]:
-    """Return the layer of the edge of the scenario's area.
+    """Return the layer of the edge of the scenario's area; [] for an external mission.
 
-    There is none for an external mission, because the bounds made around it limit nothing.
+    The bounds that planfly makes around an external mission are no limit.
     """
     if scenario.external:
         return []
     (west, east), (south, north) = scenario.bounds.tolist()
-    x, y = np.array([west, east, east, west, west]), np.array([south, south, north, north, south])
+    x = np.array([west, east, east, west, west])
+    y = np.array([south, south, north, north, south])
     return [Layer("line", "edge of the area", "area", x, y, quiet=True)]
 
 
@@ -302,7 +304,8 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
 
     stops: number of each waypoint of the route.
     """
-    ends, numbers_of_ends = _named_ends(scenario, route), ("", "") if route is None else (stops[0], stops[-1])
+    ends = _named_ends(scenario, route)
+    numbers_of_ends = ("", "") if route is None else (stops[0], stops[-1])
     start, destination = (
         Label(f"{stop} {name}".strip(), float(point[0]), float(point[1]), "end")
         for (name, point), stop in zip(ends, numbers_of_ends, strict=True)
@@ -313,7 +316,7 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int]) -
 
 
 def _are_close(a: Floats, b: Floats) -> bool:
-    """Return True if two points lie within 50 m on the ground, so that one marker stands for both."""
+    """Return True if two points lie within 50 m horizontally, so that one marker is enough for both."""
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 

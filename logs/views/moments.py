@@ -86,7 +86,7 @@ def _item_or_none(item: int) -> int | None:
 
 
 def aircraft_model() -> dict[str, Any]:
-    """Return the triangles that depict the aircraft on the page, as their corners and colours.
+    """Return corners and colours of the triangles that depict the aircraft on the page.
 
     Corners are forward, left and up, in units of the span.
     """

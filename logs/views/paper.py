@@ -150,7 +150,7 @@ def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[A
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
-    """Draw the number of searches with a safe path, and the length ratio of safe paths, over generations.
+    """Draw the number of searches with a safe path, and the length ratios of safe paths, over generations.
 
     histories: by number of threats and algorithm, the history (g, 3) of each search: length ratio, kill exposure and
     violations of the best path yet.

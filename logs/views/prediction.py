@@ -46,7 +46,7 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
 def _with_gaps(along: Floats, *columns: Floats) -> tuple[Floats, ...]:
     """Insert NaN into an axis and its columns wherever the axis jumps.
 
-    It jumps between the segments of a log.
+    The axis jumps between the segments of a log.
     """
     steps = np.diff(along)
     jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1

@@ -51,7 +51,7 @@ def judged_path(
     time_of: Callable[[Element], float],
     key_of: Callable[[Element], Key],
 ) -> list[tuple[Key, list[PathPoint[Element]]]]:
-    """Return the path in segments with the same key of the element that is nearest in time.
+    """Split the path into segments; the element nearest in time has the same key throughout a segment.
 
     track: the flown track; None for the planned path.
     elements: judged elements, in order of time; each time has one element.
@@ -94,7 +94,7 @@ def path_layers(
 
 
 def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> MapChart:
-    """Return a map of the path, coloured by the outcome of a return from there, and of the worst returns.
+    """Return a map of the worst returns, and of the path, coloured by the outcome of returns from it.
 
     track: the flown track; None for returns from the planned path.
     """
@@ -155,7 +155,7 @@ def east_and_north(point: PathPoint[Any]) -> tuple[float, float]:
 def path_by_outcome(
     setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
 ) -> list[tuple[Kind, list[PathPoint[SimulatedReturn]]]]:
-    """Return the path in segments with the same outcome of the nearest return."""
+    """Split the path into segments by the outcome of the nearest return."""
     flown_track = track if drawn_returns.returns.flown else None
     return judged_path(setup, flown_track, drawn_returns.worst_by_start, lambda ret: ret.time, lambda ret: ret.kind)
 
@@ -163,7 +163,7 @@ def path_by_outcome(
 def path_by_reach(
     setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None
 ) -> list[tuple[Reach, list[PathPoint[Glide]]]]:
-    """Return the path in segments with the same best destination of the nearest glide."""
+    """Split the path into segments by the best destination of the nearest glide."""
     flown_track = track if drawn_returns.returns.flown else None
     glides = drawn_returns.glides.each
     return judged_path(setup, flown_track, glides, lambda glide: glide.time, lambda glide: glide.reach)
@@ -246,7 +246,8 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     scenario, limit = setup.scenario, drawn_returns.returns.limit
     segments = path_by_outcome(setup, drawn_returns, track)
     points = [point for _, segment in segments for point in segment]
-    time, positions = np.array([point.time for point in points]), np.array([point.position for point in points])
+    time = np.array([point.time for point in points])
+    positions = np.array([point.position for point in points])
     ground, safe_altitudes = terrain_altitudes(scenario, positions), drawn_returns.min_safe_altitudes
     altitudes = np.concatenate([positions[:, 2], safe_altitudes.altitude, np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
@@ -294,7 +295,7 @@ def _path_positions(setup: FlightSetup, track: Track | None, first: float, last:
 
 
 def _glide_margin_panel(glides: Glides) -> Panel:
-    """Return the panel of the altitude to spare of glides without the engine, over time, by destination."""
+    """Return a panel with the spare altitude of engine-out glides over time, by destination."""
     time = np.array([glide.time for glide in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:

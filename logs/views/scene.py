@@ -72,10 +72,8 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
     altitudes = setup.route.positions[:, 2]
     min_altitude, max_altitude = float(altitudes.min()), float(altitudes.max())
     if grid is not None:
-        min_altitude, max_altitude = (
-            min(min_altitude, float(np.nanmin(grid.heights))),
-            max(max_altitude, float(np.nanmax(grid.heights))),
-        )
+        min_altitude = min(min_altitude, float(np.nanmin(grid.heights)))
+        max_altitude = max(max_altitude, float(np.nanmax(grid.heights)))
     requested_factor = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(max_altitude - min_altitude, 50.0)
     return max(factor for factor in (1.0, 1.5, 2.0, 3.0) if factor <= max(requested_factor, 1.0))
 

@@ -18,7 +18,7 @@ _POINTS = 8000
 
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Chart each survey of a flight from above, rotated so that its lines are horizontal, a panel each.
+    """Chart each survey of a flight in a panel, from above, rotated so that its lines are horizontal.
 
     Return None without a flown survey.
     """
@@ -61,14 +61,18 @@ def _survey_panel(
         """Convert positions to distances along and across the survey's lines, m."""
         return (positions[:, :2] - origin) @ axes
 
-    usable_parts, lost_parts, unknown_parts = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros((0, 2))]
+    usable_parts = [np.zeros((0, 2))]
+    lost_parts = [np.zeros((0, 2))]
+    unknown_parts = [np.zeros((0, 2))]
     labels = []
     step = -(-len(survey.lines) // _MAX_NUMBERED_LINES)
     for number, (line, measure) in enumerate(zip(survey.lines, line_measures, strict=True), 1):
         corners = to_panel(requirements.points[line.first : line.last + 1])
         unknown_spans = () if measure is None else measure.unknown_spans
+        # A line that was not flown is lost as a whole.
+        lost_spans = ((0.0, np.inf),) if measure is None else measure.lost_spans
         for parts, spans in (
-            (lost_parts, _lost_spans(measure)),
+            (lost_parts, lost_spans),
             (unknown_parts, unknown_spans),
             (usable_parts, _usable_spans(measure)),
         ):
@@ -88,21 +92,14 @@ def _survey_panel(
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
 
 
-def _lost_spans(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
-    """Return the start and end of each lost part of a photo line, m.
-
-    A line that was not flown is lost as a whole.
-    """
-    return ((0.0, np.inf),) if measure is None else measure.lost_spans
-
-
 def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
     """Return the start and end of each usable part of a photo line, m."""
     if measure is None:
         return []
     gaps = sorted((*measure.lost_spans, *measure.unknown_spans))
-    edges = [0.0, *(metres for span in gaps for metres in span), measure.length]
-    return [(start, end) for start, end in zip(edges[::2], edges[1::2], strict=True) if end > start]
+    starts = [0.0, *(gap_end for _, gap_end in gaps)]
+    ends = [*(gap_start for gap_start, _ in gaps), measure.length]
+    return [(start, end) for start, end in zip(starts, ends, strict=True) if end > start]
 
 
 def _line_part(corners: Floats, start: float, end: float) -> Floats:

@@ -41,7 +41,8 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
         radius_at_path[missile_indices] = kill_radius_at_path(threats, missile_indices, route)
     section_name = "missile: its reach at path height" if route is not None else "missile: circle of its sphere"
     for k, name in enumerate(threats.names):
-        kill_radius, detection_radius = float(threats.kill_radius[k]), float(threats.detection_radius[k])
+        kill_radius = float(threats.kill_radius[k])
+        detection_radius = float(threats.detection_radius[k])
         center = threats.position[k, :2]
         texts = (_threat_text(name, kill_radius, detection_radius),)
         if detection_radius > 0.0:
@@ -140,7 +141,8 @@ def outline_label_position(
     max_altitude: upper edge of the picture, m AMSL.
     """
     samples_inside = np.flatnonzero(np.isfinite(upper))
-    top, bottom = samples_inside[np.argmax(upper[samples_inside])], samples_inside[np.argmin(lower[samples_inside])]
+    top = samples_inside[np.argmax(upper[samples_inside])]
+    bottom = samples_inside[np.argmin(lower[samples_inside])]
     if min_altitudes[top] < upper[top] < max_altitude:
         return float(kilometres[top]), float(upper[top]), (0, 1)
     if min_altitudes[bottom] < lower[bottom] < max_altitude:
@@ -191,7 +193,8 @@ def threat_cuts(
     """
     layers: list[Layer] = []
     labels: dict[int, Label] = {}
-    min_corner, max_corner = plane.points[:, :2].min(axis=0), plane.points[:, :2].max(axis=0)
+    min_corner = plane.points[:, :2].min(axis=0)
+    max_corner = plane.points[:, :2].max(axis=0)
     distances = np.hypot(
         *np.maximum(np.maximum(min_corner - threats.position[:, :2], threats.position[:, :2] - max_corner), 0.0).T
     )
@@ -256,7 +259,7 @@ def zone_text(zone: Zone) -> str:
 
 
 def _level_text(level: ZoneLevel) -> str:
-    """Return an altitude limit of a zone as text, with what it is measured from."""
+    """Return an altitude limit of a zone as text, with its datum."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
 
@@ -305,7 +308,7 @@ class ZoneCut:
 
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
-    """Return the parts of the plane that zones forbid, without zones away from the path.
+    """Return the parts of the plane that zones forbid; zones away from the path are left out.
 
     An inclusion zone forbids the altitudes below its floor and above its ceiling, and everything outside it.
     """

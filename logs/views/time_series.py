@@ -102,8 +102,8 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
 def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     """Chart battery energy used, power, current, and the aircraft's specific energy over time.
 
-    The specific energy is shown as a height.  For an aircraft that burns fuel, the heat of the fuel is shown, and no
-    current.
+    The specific energy is shown as a height.  For an aircraft that burns fuel, the heat of the fuel replaces the
+    battery energy, and there is no current.
     """
     burns_fuel = setup.envelope.power_level.size > 0 and not setup.envelope.volts
     store_name, unit, power_unit, scale = (

@@ -37,7 +37,7 @@ class PlaceValue:
 
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
-    """List the findings of a rule by number of their waypoint or leg; findings elsewhere are left out."""
+    """Sort the findings of a rule by the number of their waypoint or leg; other findings are left out."""
     place_rows = []
     for finding in findings:
         place = finding.place
@@ -52,7 +52,7 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
-    """Chart turns, slopes, clearances, waypoints and corridor, a panel each if the verdict has findings.
+    """Chart turns, slopes, clearances, waypoints and corridor; each has a panel if the verdict judged it.
 
     Bars stand for the plan, dots for the flight, dashes for limits; rings mark failures.
 
@@ -89,7 +89,8 @@ def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[Place
     known_values = known_values[np.isfinite(known_values)]
     limits = limit_values[np.isfinite(limit_values)]
     shown_limits = limits[_visible_limits(limits, rule, float(np.abs(known_values).max()))]
-    min_value, max_value = float(min([*known_values, *shown_limits])), float(max([*known_values, *shown_limits]))
+    min_value = float(min([*known_values, *shown_limits]))
+    max_value = float(max([*known_values, *shown_limits]))
     margin = _MARGIN * ((max_value - min_value) or 1.0)
     note = ""
     if len(shown_limits) < len(limits):

@@ -140,7 +140,9 @@ def new_aircraft(
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
         raise PlanflyError.of_argument(
-            "source", source, f"cannot be combined with {next(iter(sheet_values))}: a copy has that aircraft's numbers"
+            "source",
+            source,
+            f"cannot be combined with `{next(iter(sheet_values))}`, because a copy keeps the numbers of its aircraft",
         )
     from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 
@@ -162,7 +164,7 @@ def describe_aircraft(
     """Compute trims, modes, envelope and step responses of an aircraft, and draw them.
 
     name: name of a built-in aircraft, or a folder.
-    motor_braking: True lets the motor brake in descents.
+    motor_braking: True to let the motor brake in descents.
     out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``, in whose name {name} stands for the aircraft's
     name; None writes no pictures.
     overwrite: True replaces existing pictures.

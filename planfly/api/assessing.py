@@ -84,7 +84,7 @@ def ground_risk(
 
 
 def _goal_options(goal: GroundRiskGoal) -> dict[str, object]:
-    """Return the options of the command line that state a question, by name."""
+    """Return the command-line options that state the goal, by name."""
     return {
         "population": goal.population,
         "population_unit": None if goal.population is None else goal.unit,

@@ -84,7 +84,7 @@ def _open_base(
 ) -> CampaignBase:
     """Open the mission of a campaign, and prepare the campaign's folder.
 
-    For a scenario a path is planned, unless the folder of a resumed campaign contains the plan.  Raises PlanflyError
+    A path is planned for a scenario, unless the folder of a resumed campaign contains the plan.  Raises PlanflyError
     for bad input; then the folder is not changed.
     """
     campaign_target, flight_options = (
@@ -94,6 +94,7 @@ def _open_base(
     is_planned = isinstance(campaign_target, Plan) or is_mission_file(campaign_target)
 
     def open_with_plan(plan_file: Path | None) -> CampaignBase:
+        """Open the campaign base; if the plan file does not exist, plan a path with a progress report."""
         make_base = partial(open_campaign, campaign_target, dispersions, flight_options, plan_file=plan_file)
         if is_planned or (plan_file is not None and plan_file.is_file()):
             return make_base()
@@ -107,7 +108,7 @@ def _open_base(
 
 
 def _command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> str:
-    """Return the target as it stands in the command line that repeats a campaign.
+    """Return the target as written in the command line that repeats a campaign.
 
     A `Plan` is named by its file in `folder`, and a `Scenario` by a file that is written there.
     """
@@ -119,7 +120,7 @@ def _command_line_target(target: Plan | Scenario | str | Path, folder: Path) -> 
 def _scenario_file(scenario: Scenario, folder: Path) -> str:
     """Write a scenario into the folder of a campaign, for the command line that repeats it; return the file's path.
 
-    A scenario made around a mission is no file; its name is returned.
+    For a scenario made around a mission, nothing is written, and its name is returned.
     """
     if scenario.external:
         return scenario.name
@@ -151,7 +152,7 @@ def answer_command_line(
 ) -> str:
     """Return the command line that repeats a window, a battery or a ground risk.
 
-    Returns "" for a target or a scenario that is an object in Python, which the command line cannot name.
+    Returns "" if target or scenario is a Python object, because a command line cannot name it.
 
     question: options of the command itself, by name.
     """
@@ -194,16 +195,21 @@ def continued_goal(
 ) -> Goal:
     """Return the goal of a resumed campaign.
 
-    It is the requested goal, or the earlier goal if none is requested.  Without a requested number of flights, the
-    earlier number is kept.  Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
+    None keeps the earlier target, number of flights, or confidence level.
+    Raises PlanflyError for numbers outside their ranges, and for a folder without a campaign.
     """
     requested_goal = make_goal(flights, prove, at_least, confidence)
-    is_requested = (flights, prove, at_least) != (None, None, None)
-    return resumed_goal(requested_goal if is_requested else None, folder, confidence, keeps_flights=flights is None)
+    return resumed_goal(
+        requested_goal,
+        folder,
+        confidence,
+        keeps_target=prove is None and at_least is None,
+        keeps_flights=flights is None,
+    )
 
 
 def _report_flight_count(goal: Goal, folder: Path) -> None:
-    """Report the number of flights of a campaign that is resumed without a number, and where it comes from."""
+    """Report the number of flights of a campaign that is resumed without one, and the number's source."""
     stored_count = read_stored_settings(folder / CAMPAIGN_DATABASE).get("flights")
     origin = "the number of the resumed campaign" if goal.flights == stored_count else "the default"
     report_line(f"flies {'at most ' if goal.stops else ''}{count_text(goal.flights, 'flight')}, {origin}")
@@ -239,7 +245,7 @@ def campaign(
     .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights; None takes 300, or, with ``prove``, at most 5,000; for a resumed campaign its earlier
-    number.  Without flights, ``prove`` and ``at_least``, a resumed campaign keeps its earlier goal.
+    number.  Without ``prove`` and ``at_least``, a resumed campaign keeps its earlier target.
     prove: a probability; flights are flown until they show whether the mission reaches it.
     at_least: a probability to judge after all flights.  Only one of the two may be given.
     confidence: confidence level of each bound; None takes 0.95, or the earlier value of a resumed campaign.
@@ -409,7 +415,10 @@ def winds(
         goal = WindsGoal(prove, confidence, directions, most, flight_limit(flights, folder, resume=resume))
         base = _open_base(target, options, _read_spread(spread).without(SEARCHED_QUANTITIES), directory)
         if base.scenario.wind.forecast is not None:
-            allowed = "not in this search, which replaces the wind: planfly window finds departures in a forecast"
+            allowed = (
+                "not allowed, because this search sets the wind itself; planfly window finds take-off"
+                " times in a forecast"
+            )
             raise ArgumentError.of_argument("forecast", options["forecast"], allowed, shown="")
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             winds_found = find_winds(base, goal, workers_used, store, advance)
@@ -426,7 +435,7 @@ def winds(
 
 
 def open_sample(target: Plan | Scenario | str | Path, options: SampleOptions) -> CampaignBase:
-    """Open the mission of varied flights that are not stored; for a scenario a path is planned.
+    """Open the mission of dispersed flights that are not stored; plan a path for a scenario.
 
     Raises PlanflyError for bad input.
     """

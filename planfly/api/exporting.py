@@ -174,10 +174,10 @@ def export(
 
 
 def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
-    """Return the name of the autopilot that the user names, or that a parameter file is for.
+    """Return the name of the autopilot that the user names, or for which a parameter file was written.
 
-    Return "" for neither.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that is clearly
-    of no autopilot.
+    Return "" without either.  Raises ArgumentError for an unknown autopilot, and ParameterError for a file that belongs
+    to no autopilot.
     """
     check_arguments(autopilot=autopilot)
     if autopilot is not None:
@@ -193,7 +193,7 @@ def _chosen_autopilot(autopilot: str | None, params: str | Path | None) -> str:
 
 
 def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
-    """Return a source with the autopilot that a .plan is for, and with notes on what the .plan lacks.
+    """Return a source with the autopilot of a .plan, and with notes on what the .plan cannot store.
 
     autopilot: name of the autopilot; "" if the user named none.
     fence: files of fences that the user named.
@@ -247,20 +247,21 @@ def _check_suffix(target: Path) -> None:
 
 
 def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _SourceContent:
-    """Read a log, a plan or a mission, as far as the target files need it.
+    """Read those parts of a log, a plan or a mission that the target files need.
 
     Raises MissionError for options that do not apply to a log, and for targets that need a log.
     """
     if path.is_file() and is_log(path):
         if (at := options["at"]) is not None:
-            allowed = "a log is exported with the zones of its own time"
+            allowed = "not allowed: a log is exported with the zones at the time of its flight"
             raise MissionError.of_argument("at", at, allowed, file=path)
         if options["fence"]:
-            allowed = "a log is exported with the fence that it was flown with"
+            allowed = "not allowed: a log is exported with the fence of its flight"
             raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
         for name in ("scenario", "autopilot", "params", "aircraft"):
             if (value := options.get(name)) is not None:
-                allowed = f"a log is exported with the {name} that it was flown with"
+                word = "parameters" if name == "params" else name
+                allowed = f"not allowed: a log is exported with the {word} of its flight"
                 raise MissionError.of_argument(name, value, allowed, file=path)
         return _read_log(path, needs_returns=_needs_kml(targets))
     has_aircraft = options.get("aircraft") is not None
@@ -270,7 +271,7 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOG_SUFFIXES:
-            message = f"{target}: {suffix} is written only from a flight log (.mcap), which {path} is not"
+            message = f"{target}: only a flight log (.mcap) can be exported as {suffix}, and {path} is not a flight log"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     needs_world = has_aircraft or any(
         target.suffix.lower() in (*MAP_WRITERS, *PARAMETER_SUFFIXES) for target in targets
@@ -377,7 +378,9 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
     if kind in _CONTENT_NAMES:
         count = len(mission.fences if kind == "fence" else mission.rally)
         if not count:
-            raise MissionError(f"{mission.source}: no {_CONTENT_NAMES[kind]} to write to {target}", file=mission.source)
+            raise MissionError(
+                f"{mission.source}: contains no {_CONTENT_NAMES[kind]} to write to {target}", file=mission.source
+            )
         return mission_text(mission, kind), f"{count} {_CONTENT_NAMES[kind]}"
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):

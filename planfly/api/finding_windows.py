@@ -81,7 +81,7 @@ def window(
     workers = make_workers(options["workers"], options["scheduler"], options["seed"])
     first = first or asked
     if first is None:
-        allowed = "missing: the first time of take-off is needed, or the time that is asked about"
+        allowed = "missing; state the first time of take-off, or `at` TIME"
         raise ArgumentError.of_argument("earliest", None, allowed, shown="")
     if last is not None and last < first:
         raise ArgumentError.of_argument("latest", latest, f"expected a time after {first.isoformat()}")
@@ -114,7 +114,7 @@ def _open_base(target: Plan | str | Path, options: WindowOptions, departures: Se
                 continue
             break
         if base.scenario.wind.forecast is None:
-            allowed = "missing: a window needs a forecast, by this option or in [wind]"
+            allowed = "missing; a window needs a forecast: name its file here, or in [wind] of the scenario"
             raise ArgumentError.of_argument("forecast", None, allowed, shown="")
         return base
     raise errors[0]

@@ -235,7 +235,7 @@ def fly(
 
 
 def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
-    """Convert a judged flight to its result; a flight that did not start has no log and no flight model."""
+    """Convert a judged flight to a `FlownMission`, without log and flight model if it did not start."""
     log = log if len(flight.track) else None
     program_log = None if log is None or program is None else autopilot_log_path(log, program)
     return FlownMission(
@@ -334,10 +334,14 @@ def judge(
         imported = read_imported(what, **options)
         return Judged(imported.setup, imported.verdict, lossy=imported.lossy, track=imported.track, is_log=True)
     source = _source_name(what)
-    check_keywords_not_given(source, select_log_options(options), "only with an imported log, not with this file")
+    check_keywords_not_given(
+        source, select_log_options(options), "allowed only with the log of another program, such as .BIN"
+    )
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         check_judging_options(source, options)
-        check_keywords_not_given(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
+        check_keywords_not_given(
+            source, {"geometry": geometry or None}, "allowed only with a mission; a log is judged by its flight"
+        )
         what = read_log(Path(what)) if isinstance(what, str | Path) else what
         return _judge_flight(what, options["terrain"], read_named_fences(options["fence"]))
     flight_options = select_mission_options(options)
@@ -389,9 +393,13 @@ def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: s
 
 
 # Reason why a log cannot be judged in another world, in messages.
-_FIXED_OPTIONS_TEXT = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+_FIXED_OPTIONS_TEXT = (
+    "not allowed with a log, which is judged with the aircraft, speeds, wind and autopilot of its flight"
+)
 # Reason why a log cannot be judged in another scenario, in messages.
-_FIXED_SCENARIO_TEXT = "a log is judged in the scenario stored in it; only `terrain` can replace its ground"
+_FIXED_SCENARIO_TEXT = (
+    "not allowed with a log, which is judged in its own scenario; only `terrain` can replace its ground"
+)
 
 
 def check_judging_options(source: str, options: MissionOptions) -> None:
@@ -404,7 +412,7 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
-    """Judge a flight that was flown before.
+    """Judge a recorded flight again.
 
     terrain: elevation file that replaces the terrain of the flight; None keeps the terrain.
     fences: additional fences.

@@ -195,7 +195,7 @@ def _load_base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
     aircraft = find_aircraft(absolute_path(Path(text)) if names_folder(text) else text)
     if (aircraft.folder / "posterior.toml").is_file():
-        allowed = "this aircraft was itself identified from flight logs: name its base instead, see its posterior.toml"
+        allowed = "this aircraft was itself identified from flight logs; name the `base` that its posterior.toml states"
         raise FlightError.of_argument("base", str(base), allowed)
     if aircraft.battery_voltage == 0.0:
         allowed = "expected an electric aircraft; engines that burn fuel cannot be identified"
@@ -204,7 +204,7 @@ def _load_base(base: str | Path) -> Aircraft:
 
 
 def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> None:
-    """Raise FlightError for stated numbers that are not those of a small aircraft similar to the base.
+    """Raise FlightError for stated numbers that do not fit a small aircraft similar to the base.
 
     Each must be in `_RANGES`, and mass and span within a factor of `_MAX_SIZE_RATIO` of the base.
     """
@@ -220,9 +220,10 @@ def _check_stated_numbers(stated_numbers: dict[str, float], prior: Aircraft) -> 
     ):
         if not 1.0 / _MAX_SIZE_RATIO <= value / base_value <= _MAX_SIZE_RATIO:
             min_value, max_value = base_value / _MAX_SIZE_RATIO, base_value * _MAX_SIZE_RATIO
-            allowed = f"expected {min_value:.3g}..{max_value:.3g} for the base {prior.name}"
-            advice = "or make another `base` from a data sheet: planfly aircraft --new FOLDER"
-            raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
+            unit = _RANGES[name][2]
+            allowed = f"allowed {min_value:.3g}..{max_value:.3g} {unit} with the base {prior.name}"
+            advice = "for another size make a `base` from a data sheet (planfly aircraft --new FOLDER)"
+            raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g} {unit}")
 
 
 def _check_distinct(logs: Sequence[MotionLog]) -> None:
@@ -242,8 +243,8 @@ def records_and_outputs(
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
     """Return the flight records of a log, and the servo outputs with which they were read.
 
-    The servo outputs are those of the base if all of them match the log, otherwise those of the log.  With PX4, and
-    with elevons, whose mixer is part of the model, they are always those of the base.
+    The servo outputs of the base are used if all of them match the log; otherwise those of the log are used.  PX4 and
+    aircraft with elevons, whose mixer is part of the model, always use those of the base.
 
     min_seconds: shortest usable flight, s.
     until: end of the part that is used, s of the log; None for the whole log.
@@ -323,6 +324,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
     best, samples = identified.performance()
 
     def interval(value: Floats, sample_values: Floats, factor: float = 1.0) -> Interval:
+        """Return the 2.5 % quantile of the samples, the estimate and the 97.5 % quantile, times a factor."""
         lower, upper = np.percentile(sample_values, [2.5, 97.5])
         return factor * float(lower), factor * float(value[0]), factor * float(upper)
 
@@ -340,7 +342,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
 def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
     """Return the names of the logs without battery current, if other logs have it.
 
-    They are empty if no log has battery current.
+    The result is empty if no log has battery current.
     """
     lacking = {record.source: None for record in records if not record.has_current}
     return tuple(lacking) if any(record.has_current for record in records) else ()

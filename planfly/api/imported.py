@@ -57,7 +57,7 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
     """
     for name in ("params", "guidance", "autopilot", "airspeed", "nav", "seed"):
         if (value := dict(options)[name]) is not None:
-            allowed = "an imported flight is judged with the autopilot and the speeds of its log"
+            allowed = "not allowed for an imported flight, which is judged with the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)
     check_arguments(flight=options["flight"], datum=options["datum"])
     return import_flight(Path(log), options)

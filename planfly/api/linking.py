@@ -160,7 +160,9 @@ def link(
     if judged.setup.scenario.link is None:
         missing = next((name for name in _NEEDED if given[name] is None), None)
         if missing is not None:
-            raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
+            raise ArgumentError.of_argument(
+                missing, None, "missing; state it, or name a scenario with [link]", shown=""
+            )
     entries = {_ENTRIES[name]: value for name, value in given.items()}
     scenario = with_link(judged.setup.scenario, **entries, lat_deg=lat, lon_deg=lon)
     setup = judged.setup.in_scenario(with_ground_at_station(scenario, judged.setup.mission))
@@ -191,8 +193,8 @@ def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Link
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
     """Judge the radio link of a scenario along a track, as the verdict does.
 
-    Without a track, a terrain or a position of the station the finding is undecided, and the result has no link along
-    the path.
+    If the track, the terrain or the position of the station is missing, the finding is undecided, and the result has no
+    link along the path.
     """
     link_of_scenario = setup.scenario.link
     if link_of_scenario is None:

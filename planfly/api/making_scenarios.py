@@ -73,7 +73,7 @@ def make_scenario(
 
 
 def _plain_values(values: Any) -> Any:
-    """Return the values of tables with lists and numbers of Python in place of numpy's."""
+    """Convert numpy arrays and numbers in tables to lists and numbers of Python."""
     if isinstance(values, Mapping):
         return {key: _plain_values(value) for key, value in values.items()}
     if isinstance(values, list | tuple):

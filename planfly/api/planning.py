@@ -219,18 +219,20 @@ def _write_plan(plan: Plan, target: Path | None) -> Plan:
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Make the function that tells a search when to stop.
+    """Make a function that tells a search when to stop.
 
     The function returns "interrupted" as soon as `stop` returns True, "budget" after a number of seconds, and otherwise
     "".  The time in which kernels are compiled does not count.
     """
 
     def working_time() -> float:
+        """Return the time of the process without the compilation of kernels, s."""
         return time.monotonic() - COMPILE_TIMER.seconds
 
     start = working_time()
 
     def should_stop() -> str:
+        """Return the reason to stop the search now; "" to continue."""
         if stop is not None and stop():
             return "interrupted"
         return "budget" if seconds is not None and working_time() - start >= seconds else ""
@@ -246,9 +248,9 @@ def conditions_of_plan(plan: Plan) -> Conditions:
 
 
 def failures_to_expect(plan: Plan) -> tuple[str, ...]:
-    """Return the known causes for which more than one of twenty dispersed flights of a safe plan is expected to fail.
+    """Return the known causes that are expected to make more than 5 % of dispersed flights fail.
 
-    Each is one line with what would help; the result is empty for a plan that is not safe.
+    Each cause is one line with a remedy.  The result is empty for a plan that is not safe.
     """
     return expected_failures(plan, load_airframe(plan.scenario)) if plan.safe else ()
 

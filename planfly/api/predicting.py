@@ -230,9 +230,9 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
 
 
 def _used_until(aircraft: Aircraft, sha256: str, start: float) -> float | None:
-    """Return up to which time of a log an aircraft was identified from it, s; infinity for the whole log.
+    """Return the time up to which a log was used to identify an aircraft, s; infinity for the whole log.
 
-    Returns None for a log of which no part was used.  Logs are recognised by the hash of their data.
+    Returns None if no part of the log was used.  Logs are recognised by the hash of their data.
 
     sha256: hash of the log's data.
     start: first time that is read, s of the log; parts that end earlier are ignored.
@@ -250,7 +250,7 @@ def drawn_flights(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
 
     The quantities are drawn as in a campaign with planfly's own dispersions, with two differences: the wind varies by
     the error of a logged wind instead of a forecast, and all levels of turbulence are equally likely.  The position
-    offset stands for the error of the logged positions.
+    offset represents the error of the logged positions.
     """
     dispersions = with_aircraft_draws(default_dispersions(), aircraft)
     generator = np.random.default_rng(_SEED)

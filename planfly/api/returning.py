@@ -121,14 +121,14 @@ class ReturnsResult:
 
     @property
     def program_lines(self) -> tuple[str, ...]:
-        """Comparison of the worst returns as flown by the ArduPlane program and by the simulated ArduPlane."""
+        """Lines that compare the worst returns flown by the ArduPlane program and by the simulated ArduPlane."""
         if self.by_program is None:
             return ()
         return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
 
     @property
     def no_return_line(self) -> str:
-        """Description of the point after which the battery is too low for the return."""
+        """Text on the point after which the battery is too low for a return."""
         return point_of_no_return_text(self.returns)
 
     @property
@@ -149,12 +149,16 @@ class ReturnsResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        notes = [f"returns are simulated with {self.returns.autopilot}'s control of a point mass, in the mean wind"]
+        notes = [
+            f"returns are simulated in the mean wind, by {self.returns.autopilot}'s control laws flying a point mass"
+        ]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             reflown_text = count_text(len(self.returns.jsbsim_differences), "return")
+            verb = "was" if len(self.returns.jsbsim_differences) == 1 else "were"
             notes.append(
-                f"{reflown_text} close to a limit also flown in JSBSim; the heights of the two simulations differ by"
+                f"{reflown_text} close to a limit {verb} also flown in JSBSim; the heights of the two"
+                " simulations differ by"
                 f" up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
@@ -179,7 +183,9 @@ class ReturnsResult:
         if self.setup.scenario.external:
             notes.append("the mission was given without a scenario: threats are unknown")
         if not self.returns.flown:
-            notes.append("returns start on the planned path: nothing was flown; the energy used before is predicted")
+            notes.append(
+                "nothing was flown: returns start on the planned path, and the energy used before them is predicted"
+            )
         return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:
@@ -187,7 +193,9 @@ class ReturnsResult:
 
 
 # Reason why the returns of a flight cannot be judged in another world, in messages.
-_RETURNS_AS_FLOWN_TEXT = "returns of a flight are flown in its own conditions; only `terrain` can replace its ground"
+_RETURNS_AS_FLOWN_TEXT = (
+    "not allowed with a log, whose returns start in the conditions of its flight; only `terrain` can replace its ground"
+)
 
 
 @with_warm_up(*FLYING, *GLIDING)
@@ -228,7 +236,11 @@ def returns(
     if path is not None and is_imported_log(path):
         check_keywords_not_given(str(path), {"seed": options["seed"], "nav": options["nav"]}, _RETURNS_AS_FLOWN_TEXT)
         return _judge_imported_flight(_read_imported_flight(path, options), request)
-    check_keywords_not_given(str(path or "mission"), select_log_options(options), "only with an imported log")
+    check_keywords_not_given(
+        str(path or "mission"),
+        select_log_options(options),
+        "allowed only with the log of another program, such as .BIN",
+    )
     what = read_log(path) if path is not None and is_log(path) else what
     flight_options = select_mission_options(options)
     if isinstance(what, FlightLog | FlownMission):

@@ -164,7 +164,7 @@ class SurveyResult:
 
 
 # Reason why a flown survey cannot be judged in another world, in messages.
-_LINES_AS_FLOWN_TEXT = "a flight's photo lines are those that were flown"
+_LINES_AS_FLOWN_TEXT = "not allowed with a log, whose photo lines are judged as they were flown"
 
 
 @with_warm_up(*FLYING)
@@ -317,7 +317,7 @@ def _remedy_parameter_file(setup: FlightSetup, remedy: SurveyRemedy) -> str:
 
 
 def _with_parallel_lines_as_survey(scenario: Scenario) -> Scenario:
-    """Return a scenario in which all parallel lines are judged as survey lines."""
+    """Return a scenario that makes the verdict judge all parallel lines as survey lines."""
     limits = scenario.limits.model_copy(update={"surveys": "lines"})
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 
@@ -335,7 +335,7 @@ def _check_has_survey(setup: FlightSetup) -> None:
 
 
 def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> SurveyResult:
-    """Judge a survey that was flown before, and measure its photo lines."""
+    """Judge a recorded survey flight, and measure its photo lines."""
     _check_has_survey(setup)
     requirements = route_requirements(setup)
     return _measure_survey(requirements, track, judge_flight(setup, track, end_reason, requirements=requirements))

@@ -15,7 +15,7 @@ from world.wording import count_text
 
 
 def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPage:
-    """Return the page of a window: the chart, and a table of all departures.
+    """Return the page of a take-off window: the chart, and a table of all departures.
 
     figure: chart of the departures.
     command: command line that repeats the search; "" if there is none.
@@ -26,10 +26,10 @@ def window_page(result: WindowResult, figure: Figure, command: str) -> AnswerPag
     styles: tuple[ColumnStyle, ...] = ("n", "n", "u", "n", "")
     rows = [
         (
-            *(f"{one.time.astimezone(zone):{window_text.TIME_FORMAT}}" for zone in zones),
-            *window_text.departure_cells(one),
+            *(f"{departure.time.astimezone(zone):{window_text.TIME_FORMAT}}" for zone in zones),
+            *window_text.departure_cells(departure),
         )
-        for one in result.departures
+        for departure in result.departures
     ]
     goal = result.goal
     return AnswerPage(

@@ -16,9 +16,10 @@ _MAX_OWN_RATIO = 2.5
 
 
 def draw_battery(result: BatteryResult) -> Figure:
-    """Draw the share of the flights that keep the reserve, by capacity, with the found and the aircraft's capacity.
+    """Draw the share of the flights that keep the reserve over the battery capacity.
 
-    A flight that does not complete the mission, and a flight with a return that does not arrive, keeps no reserve.
+    The found capacity and the aircraft's own capacity are marked.  A flight keeps no reserve if it does not complete
+    the mission, or if one of its returns does not arrive.
     """
     goal = result.goal
     needed = np.sort([row.required_capacity(goal.reserve) for row in result.known])

@@ -18,7 +18,7 @@ def answer_line(result: BatteryResult) -> str:
     goal = result.goal
     where_text = "in the mission and in every return" if result.has_returns else "in the mission (without returns)"
     where_text += " that arrives" if any(row.blocked_returns for row in result.rows) else ""
-    keeps_text = f"{goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
+    keeps_text = f"a reserve of {goal.reserve:.0%} {where_text} with probability {goal.probability:g}"
     lost = sum(math.isinf(row.return_energy) for row in result.rows)
     if math.isinf(result.capacity) and lost:
         return f"no battery keeps {keeps_text}: in {lost} of {len(result.rows)} flights a return does not arrive"
@@ -35,11 +35,11 @@ def answer_line(result: BatteryResult) -> str:
     if not math.isfinite(high):
         interval_text = f"at least {low:.0f} Wh {confidence_text}, no upper bound with {len(result.rows)} flights"
     volts_text = f", {1000.0 * result.capacity / result.volts:.0f} mAh at {result.volts:.1f} V" if result.volts else ""
-    return f"{result.capacity:.0f} Wh ({interval_text}{volts_text}) keep {keeps_text}"
+    return f"a battery of {result.capacity:.0f} Wh ({interval_text}{volts_text}) keeps {keeps_text}"
 
 
 def _unknown_reason(result: BatteryResult) -> str:
-    """Return why the battery is unknown."""
+    """Return the reason why the smallest battery is unknown."""
     count, completed = len(result.rows), len(result.completed)
     endings = [row.ended for row in result.rows if row.ended != "completed"]
     if unknown := len(result.completed) - len(result.known):
@@ -71,8 +71,8 @@ def battery_lines(result: BatteryResult) -> list[str]:
         lines.append("the mission has no home, so no returns were simulated")
     elif blocked:
         lines.append(
-            f"in {blocked} of {total} flights some returns hit something before they arrive, whatever the battery, and"
-            " are left out: see planfly returns"
+            f"in {blocked} of {total} flights some returns hit an obstacle before they arrive; these returns are left"
+            " out (planfly returns shows them)"
         )
     lines.append(
         f"{total} of {len(result.rows)} flights complete the mission; a return starts every {result.goal.interval:g} s"
@@ -82,7 +82,7 @@ def battery_lines(result: BatteryResult) -> list[str]:
 
 
 def leg_names(result: BatteryResult) -> list[str]:
-    """Return the name of the legs with each number, as in messages."""
+    """Return the name of each leg as in messages; the legs of one loiter share a name."""
     requirements = route_requirements(result.base.nominal_setup())
     numbers = requirements.setup.route.leg_numbers
     first_legs = np.searchsorted(numbers, np.arange(int(numbers[-1]) + 1)).tolist()
@@ -90,22 +90,25 @@ def leg_names(result: BatteryResult) -> list[str]:
 
 
 def decision_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return the parts that decide the battery, each with its flights and their share, the most frequent first."""
+    """Return a row for each part of a flight that decides the battery: its flights and their share.
+
+    The most frequent part comes first.
+    """
     names, total = leg_names(result), len(result.completed)
     return [
         (
             "the end of the mission"
-            if one.leg < 0
-            else f"the return that starts at {one.time:.0f} s ({names[one.leg]})",
-            str(one.flights),
-            f"{one.flights / total:.0%}",
+            if decision.leg < 0
+            else f"the return that starts at {decision.time:.0f} s ({names[decision.leg]})",
+            str(decision.flights),
+            f"{decision.flights / total:.0%}",
         )
-        for one in result.decisions
+        for decision in result.decisions
     ]
 
 
 def leg_rows(result: BatteryResult) -> list[tuple[str, str, str]]:
-    """Return each leg with its median energy and its share of the mission's."""
+    """Return a row for each leg: its median energy, and its share of the mission's energy."""
     energies, total = result.leg_energies.tolist(), float(result.leg_energies.sum())
     return [
         (name, f"{energy:.1f} Wh", f"{energy / total:.0%}" if total > 0.0 else "")
@@ -129,12 +132,14 @@ def _own_battery_line(result: BatteryResult) -> str:
 
 
 def _mass_lines(result: BatteryResult) -> list[str]:
-    """Return the mass of the aircraft with the found battery."""
+    """Return a line on the mass of the aircraft with the found battery."""
     if result.goal.specific_energy is None:
         return ["the same mass is assumed for every capacity (--specific-energy states the battery's energy per mass)"]
     if not math.isfinite(result.capacity):
         return []
-    limit_text = f"; not less than {MIN_MASS_FACTOR:g} of it" if result.mass_factor == MIN_MASS_FACTOR else ""
+    limit_text = (
+        f"; at least {MIN_MASS_FACTOR:g} times this mass is assumed" if result.mass_factor == MIN_MASS_FACTOR else ""
+    )
     return [
         f"with {result.goal.specific_energy:g} Wh/kg the aircraft then weighs {result.mass * result.mass_factor:.2f} kg"
         f" (now {result.mass:.2f} kg{limit_text})"

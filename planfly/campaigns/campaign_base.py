@@ -87,7 +87,7 @@ class CampaignBase:
         return judging_conditions(self.nominal_setup())
 
     def inputs(self) -> dict[str, Any]:
-        """Return all inputs of the flights except the code, by name; long inputs as their hashes.
+        """Return all inputs of the flights except the code, by name; long inputs are replaced by hashes.
 
         The inputs are seed, scenario, terrain, mission, aircraft model, autopilot parameters and dispersions.
         """
@@ -132,13 +132,12 @@ def open_campaign(
     plan_file: Path | None = None,
     advance: Advance | None = None,
 ) -> CampaignBase:
-    """Open the base of a campaign for a plan, a mission file, or a scenario, for which a path is planned.
+    """Open the base of a campaign for a plan, a mission file or a scenario; plan a path for a scenario.
 
     target: a built-in scenario's name, a scenario's TOML file, a scenario, a plan, or a plan.json, .waypoints or .plan.
-    options: options of the flights; the plan avoids their zones, and their seed is used for the plan and the draws.
-    plan_file: file of a scenario's plan, which is read if it exists, and written otherwise.
-    Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions with medians at which the
-    aircraft cannot fly.
+    options: options of the flights.  The plan avoids their zones; their seed is used for the plan and for the draws.
+    plan_file: file of a scenario's plan, which is read if it exists, and written otherwise.  Raises a PlanflyError for
+    bad input, for a plan that is not feasible, and if the aircraft cannot fly at the medians of the dispersions.
     """
     if isinstance(target, Plan) or is_mission_file(target):
         return campaign_of_setup(open_flight(target, options), dispersions)
@@ -147,32 +146,36 @@ def open_campaign(
     has_plan_file = plan_file is not None and plan_file.is_file()
     plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
     if has_plan_file and plan.scenario.to_json() != scenario.to_json():
-        differences = describe_differences(*(flatten_inputs(one.to_json()) for one in (plan.scenario, scenario)))
+        differences = describe_differences(*(flatten_inputs(opened.to_json()) for opened in (plan.scenario, scenario)))
         name = target if isinstance(target, str) else scenario.name
         message = f"{plan_file}: this plan was made for another scenario, not {name}: {differences}"
         raise MissionError(message, file=str(plan_file))
     if plan_file is not None and not has_plan_file:
         write_atomically(plan_file, plan_json(plan))
-    return _checked(_make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed)))
+    return _check_base(_make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed)))
 
 
 def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignBase:
     """Return the base of a campaign that flies the mission of a setup, with the draws of its aircraft.
 
-    Raises SpreadError for dispersions with medians at which the aircraft cannot fly.
+    Raises SpreadError if the aircraft cannot fly at the medians of the dispersions.
     """
     # Use the name without the folder, because the folder does not affect the flight.
     mission = replace(setup.mission, source=Path(setup.mission.source).name)
     scenario, airframe = setup.scenario, airframe_for_setup(setup)
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
     dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
-    return _checked(
+    return _check_base(
         CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
     )
 
 
-def _checked(base: CampaignBase) -> CampaignBase:
-    """Return the base.  Raises PlanflyError if its aircraft cannot fly at the medians, or if it has no valid route."""
+def _check_base(base: CampaignBase) -> CampaignBase:
+    """Check and return a base.
+
+    Raises PlanflyError if the aircraft cannot fly at the medians of the dispersions, or if the mission has no valid
+    route.
+    """
     check_level_flight_at_medians(base)
     # Refuse a mission without a valid route now, not in a worker.
     base.nominal_setup()
@@ -232,7 +235,7 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
         raise SpreadError(
-            f"{base.dispersions.name}: with the median factors {factors}, {aircraft.name} cannot fly level at"
+            f"{base.dispersions.name}: with the medians of its factors ({factors}) {aircraft.name} cannot fly level at"
             f" {base.airframe.airspeed:g} m/s",
             file=base.dispersions.name,
             value=factors,
@@ -256,10 +259,9 @@ def _check_draws(base: CampaignBase) -> None:
 
 
 def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
-    """Return the dispersions with the draws stored next to the aircraft's model, if there are any.
+    """Add the draws of aircraft properties that are stored next to the aircraft's model, if there are any.
 
-    The draws are of aircraft properties.  A dispersions file that names other draws, or has its own dispersions of drag
-    or control power, is used unchanged.
+    A dispersions file is used unchanged if it names other draws, or disperses drag or control power itself.
     """
     file = aircraft.folder / DRAWS_FILE
     has_own_dispersions = dispersions.name != DEFAULT_DISPERSIONS_NAME and any(
@@ -306,7 +308,7 @@ class VariedFlight:
 
 
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """Vary a flight by a draw: its setup, its airframe, and differences that the autopilot does not know.
+    """Apply a draw to a flight: vary its setup, its airframe, and what differs unknown to the autopilot.
 
     Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`.  The autopilot does not know
     the varied mass, drag, control power, aircraft properties and start position.
@@ -336,7 +338,7 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
 
 
 def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: GivenWind | None) -> Scenario:
-    """Return the scenario with the wind of a draw; gusts use the flight's seed, not the scenario's seed."""
+    """Return the scenario with the wind of a draw; the flight's seed replaces the scenario's for gusts."""
     old_wind = scenario.wind
     nominal = mean_wind or GivenWind(old_wind.speed, math.degrees(old_wind.from_course))
     speed = min(MAX_WIND_MPS, max(0.0, nominal.speed + values["wind_speed"]))
@@ -352,7 +354,7 @@ def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: Gi
 
 
 def _draw_strip_error(strip: LandingStrip | None, seed: int) -> float | None:
-    """Draw the error of the surveyed height of a landing strip, m; None if the height was not surveyed.
+    """Draw a random error of a landing strip's surveyed height, m; None if the height was not surveyed.
 
     seed: seed of the flight.
     """
@@ -399,11 +401,11 @@ def _terrain_error_at_home(base: CampaignBase, varied_terrain: Terrain) -> float
 
 
 def _with_moved_home(base: CampaignBase, home_error: float) -> tuple[Mission, PlacedMission]:
-    """Return a campaign's mission, and the same mission placed, with the altitude of home corrected by an error.
+    """Return a campaign's mission, and the same mission placed, with home's altitude shifted by an error.
 
-    An autopilot measures the altitude of home where it is armed.  Heights above home keep their distance from this
-    altitude.  ArduPlane also corrects its terrain data by their error at home (`AP_Terrain::update_reference_offset`),
-    so that heights above terrain move as far.  Altitudes AMSL stay.
+    An autopilot measures the altitude of home where it is armed, so heights above home shift with it.  ArduPlane also
+    corrects its terrain data by their error at home (`AP_Terrain::update_reference_offset`), so heights above terrain
+    shift by the same amount.  Altitudes AMSL do not change.
     home_error: m.
     """
     mission, terrain = base.mission, base.scenario.terrain

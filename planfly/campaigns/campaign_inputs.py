@@ -13,13 +13,13 @@ _MAX_DESCRIBED = 6
 
 
 def hash_input(content: str | bytes) -> str:
-    """Return the value that stands for a long input."""
+    """Return the hash that represents a long input."""
     data = content.encode() if isinstance(content, str) else content
     return _HASH_PREFIX + hashlib.sha256(data).hexdigest()[:16]
 
 
 def flatten_inputs(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the inputs of a document by name, with ``table.key`` for those of a table, and a hash for each list.
+    """Flatten a document into inputs by name: ``table.key`` for an entry of a table, a hash for a list.
 
     >>> flatten_inputs({"seed": 1, "wind": {"speed_mps": 5.0}})
     {'seed': 1, 'wind.speed_mps': 5.0}
@@ -34,7 +34,7 @@ def flatten_inputs(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def describe_differences(stored: Mapping[str, Any], current: Mapping[str, Any]) -> str:
-    """Describe the inputs that differ, each with both values if they are short; "" if none differs.
+    """Describe the inputs that differ, with both values if they are short; return "" if none differs.
 
     >>> describe_differences({"seed": 1, "wind.speed_mps": 5.0}, {"seed": 1, "wind.speed_mps": 8.0, "landing": "a"})
     'wind.speed_mps 8.0 instead of 5.0, landing a (not stated before)'
@@ -58,7 +58,7 @@ def _differs_by_rounding(stored: Any, current: Any) -> bool:
 
 
 def _difference_text(name: str, stored: Any, current: Any) -> str:
-    """Describe one input that differs; None stands for an input that is not stated."""
+    """Describe one input that differs; a value is None if the input is not stated."""
     if str(stored if current is None else current).startswith(_HASH_PREFIX):
         return name
     if current is None:

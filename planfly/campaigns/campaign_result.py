@@ -131,7 +131,7 @@ class CampaignResult:
         return pd.DataFrame(dict(self.columns))
 
     def path_arrays(self) -> dict[str, NDArray[np.float32]]:
-        """Read clearance along the route and offset at each stop, of each flight, from the campaign's folder.
+        """Read each flight's clearance along the route and offset at each stop from the campaign's folder.
 
         "clearance": minimum height above ground on each of 150 equal pieces of the route, (n, 150), m.
         "crossings": distance right of and above each stop of the route at closest approach, (n, s, 2), m.

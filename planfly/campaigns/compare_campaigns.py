@@ -14,7 +14,7 @@ from planfly.campaigns.dispersions import NAMES
 from planfly.campaigns.flight_row import OUTCOMES, parse_failed_findings
 from planfly.campaigns.statistics.decision import DEFAULT_CONFIDENCE, Estimator, Goal, Interval, Tally
 from planfly.campaigns.statistics.proportions import ProportionDifference, independent_difference, paired_difference
-from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, read_stored_settings, read_table
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, StoreError, check_rows, read_stored_settings, read_table
 from world.html_table import html_table
 from world.wording import count_text
 
@@ -25,7 +25,7 @@ class ComparedCampaign:
 
     name: its folder.
     interval: two-sided interval of the probability of a flyable flight, at 95 % confidence.
-    failed_by_rule: number of flights that failed each rule.
+    failed_by_rule: number of compared flights that failed each rule: flights of pairs if there are any.
     """
 
     name: str
@@ -57,7 +57,7 @@ class CampaignComparison:
 
     @property
     def answer(self) -> Literal["more likely", "less likely", "no difference shown"]:
-        """Answer by the interval: flights of the second campaign are more or less likely to be flyable, or neither."""
+        """Answer by the interval: second campaign more likely flyable, less likely flyable, or neither."""
         if self.difference.interval.low > 0.0:
             return "more likely"
         return "less likely" if self.difference.interval.high < 0.0 else "no difference shown"
@@ -68,7 +68,13 @@ class CampaignComparison:
         first, second = self.first, self.second
         names = [name for name in RULE_WORDS if name in first.failed_by_rule or name in second.failed_by_rule]
         counts = [(name, first.failed_by_rule.get(name, 0), second.failed_by_rule.get(name, 0)) for name in names]
-        return sorted(counts, key=lambda entry: -abs(entry[2] / second.tally.flown - entry[1] / first.tally.flown))
+        first_count, second_count = self.compared_counts
+        return sorted(counts, key=lambda entry: -abs(entry[2] / second_count - entry[1] / first_count))
+
+    @property
+    def compared_counts(self) -> tuple[int, int]:
+        """Number of compared flights of each campaign: the pairs, or all flights if there are no pairs."""
+        return (self.pairs or self.first.tally.flown, self.pairs or self.second.tally.flown)
 
     def __repr__(self) -> str:
         value, (low, high), _ = self.difference
@@ -80,7 +86,7 @@ class CampaignComparison:
 
 
 def campaign_table(path: Path) -> Path | None:
-    """Return the file of a campaign's table for the campaign's folder or for the file itself; None for another path."""
+    """Return the table file of a campaign, given its folder or the file itself; None for any other path."""
     if path.is_dir():
         path /= CAMPAIGN_DATABASE
     return path if path.name == CAMPAIGN_DATABASE and path.is_file() else None
@@ -89,16 +95,21 @@ def campaign_table(path: Path) -> Path | None:
 def compare_tables(first: Path, second: Path) -> CampaignComparison:
     """Compare the campaigns in two tables.
 
-    Raises StoreError for a file that is no table of a campaign, for an empty table, and for a table that another
-    process has locked.
+    Raises StoreError for a file that is no table of a campaign, for an empty or damaged table, and for a table that
+    another process has locked.
     """
+    for path in (first, second):
+        check_rows(path)
     tables = [read_table(path) for path in (first, second)]
     settings = [read_stored_settings(path) for path in (first, second)]
     for path, table in zip((first, second), tables, strict=True):
         if not len(table["flight"]):
             raise StoreError(f"{path}: no flight of this campaign was flown", file=path)
-    campaigns = [_compared(*values) for values in zip((first, second), tables, settings, strict=True)]
-    flyable = _paired_outcomes(*tables)
+    pairs = _paired_rows(*tables)
+    flyable = np.column_stack([table["outcome"][rows] == "flyable" for table, rows in zip(tables, pairs, strict=True)])
+    compared_rows = pairs if len(flyable) else [np.arange(len(table["flight"])) for table in tables]
+    sources = zip((first, second), tables, compared_rows, settings, strict=True)
+    campaigns = [_count_outcomes(*source) for source in sources]
     only_first = int(np.count_nonzero(flyable[:, 0] & ~flyable[:, 1]))
     only_second = int(np.count_nonzero(flyable[:, 1] & ~flyable[:, 0]))
     counts = [(campaign.tally.flyable, campaign.tally.flown) for campaign in campaigns]
@@ -120,8 +131,13 @@ def compare_tables(first: Path, second: Path) -> CampaignComparison:
     )
 
 
-def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[str, Any]) -> ComparedCampaign:
-    """Return the counts of a campaign."""
+def _count_outcomes(
+    path: Path, table: Mapping[str, NDArray[Any]], compared_rows: NDArray[np.intp], settings: Mapping[str, Any]
+) -> ComparedCampaign:
+    """Count the outcomes of a campaign.
+
+    compared_rows: rows of the table, (n,), whose failures are counted by rule.
+    """
     outcomes = table["outcome"].tolist()
     tally = Tally(*map(outcomes.count, OUTCOMES))
     goal = Goal(
@@ -130,31 +146,33 @@ def _compared(path: Path, table: Mapping[str, NDArray[Any]], settings: Mapping[s
     )
     failed_rules = [
         {rule for rule, _ in parse_failed_findings(text)}
-        for text, outcome in zip(table["failed"].tolist(), outcomes, strict=True)
+        for text, outcome in zip(table["failed"][compared_rows], table["outcome"][compared_rows], strict=True)
         if outcome != "undecided"
     ]
     failed_by_rule = {name: count for name in RULE_WORDS if (count := sum(name in rules for rules in failed_rules))}
     return ComparedCampaign(str(path.parent), tally, Estimator(goal).estimate(tally).interval, failed_by_rule)
 
 
-def _paired_outcomes(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Return True for each flyable flight of the flights that both campaigns have, (n, 2).
+def _paired_rows(first: Mapping[str, NDArray[Any]], second: Mapping[str, NDArray[Any]]) -> list[NDArray[np.intp]]:
+    """Return the rows of the flights that both campaigns have, (n,) for each campaign.
 
-    n is 0 if the draws of any of these flights differ, because then the flights are no pairs.
+    n is 0 if the draws of any of these flights differ, because the flights are then not paired.
     """
     _, first_rows, second_rows = np.intersect1d(first["flight"], second["flight"], return_indices=True)
     for name in ("seed", *NAMES):
         if not np.array_equal(first[name][first_rows], second[name][second_rows]):
-            return np.empty((0, 2), dtype=bool)
-    return np.column_stack([first["outcome"][first_rows] == "flyable", second["outcome"][second_rows] == "flyable"])
+            return [np.empty(0, dtype=np.intp)] * 2
+    return [first_rows, second_rows]
 
 
 def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]], pairs: int) -> list[str]:
-    """Return remarks on the flights that are compared, and on assumptions of the interval that do not hold."""
+    """Return remarks on the compared flights, and on assumptions of the interval that do not hold."""
     notes = []
     counts = [len(table["flight"]) for table in tables]
     if pairs and pairs < max(counts):
-        notes.append(f"the difference is that of the {count_text(pairs, 'flight')} that both campaigns have")
+        notes.append(
+            f"only {count_text(pairs, 'flight')} that both campaigns have are compared, in the difference and by rule"
+        )
     if undecided_count := sum(table["outcome"].tolist().count("undecided") for table in tables):
         notes.append(
             f"{count_text(undecided_count, 'flight')} not judged in full: the difference counts them as not flyable"
@@ -165,7 +183,7 @@ def _notes(tables: list[dict[str, NDArray[Any]]], settings: list[dict[str, Any]]
 
 
 def _disagreement_notes(difference: ProportionDifference, *, is_paired: bool) -> list[str]:
-    """Return a remark if the test and the interval, which decides the answer, disagree on a difference; otherwise [].
+    """Return a remark if the test contradicts the interval, which decides the answer; otherwise [].
 
     >>> _disagreement_notes(ProportionDifference(0.1, Interval(0.02, 0.3), 0.04), is_paired=True)
     []
@@ -215,6 +233,7 @@ def comparison_lines(comparison: CampaignComparison) -> list[str]:
 
 def _change_text(first: int, second: int, comparison: CampaignComparison) -> str:
     """Return the number of flights that failed a rule in each campaign, and the change of their share."""
-    change = 100.0 * (second / comparison.second.tally.flown - first / comparison.first.tally.flown)
+    first_count, second_count = comparison.compared_counts
+    change = 100.0 * (second / second_count - first / first_count)
     word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"
     return f"{word}, in {first} and {count_text(second, 'flight')} ({change:+.1f} %)"

@@ -85,7 +85,7 @@ class DaskPool:
         client.register_plugin(CampaignPlugin(self._name, copy))
 
     def close(self) -> None:
-        """Remove the campaign from the workers, ignoring the errors of workers that die in the meantime."""
+        """Remove the campaign from the workers; ignore errors of workers that die meanwhile."""
         with contextlib.suppress(OSError):
             self._client.unregister_worker_plugin(self._name)
 
@@ -105,12 +105,14 @@ class DaskPool:
         finished: Any = cast("Any", distributed.as_completed)(loop=self._client.loop)
 
         def send(request: FlightRequest) -> None:
+            """Submit a request to the cluster under a free task name."""
             # Dask takes the first word of a tuple as the kind of task, and keeps a permanent record of each kind.
             key = next(key for number in self._numbers if (key := (self._name, number)) not in flying)
             flying[key] = request
             finished.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
 
         def send_requests() -> None:
+            """Submit requests until all workers are busy or there is no further request."""
             while (
                 len(flying) < min(_TASK_NAME_COUNT, self._max_parallel_flights())
                 and (request := next_request()) is not None

@@ -273,7 +273,8 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
         allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
     parameters = dict(quantity_table)
-    distribution, source = parameters.pop("distribution", None), parameters.pop("source", None)
+    distribution = parameters.pop("distribution", None)
+    source = parameters.pop("source", None)
     _check_distribution(quantity, distribution, name)
     if not isinstance(source, str) or not source.strip():
         allowed = "missing; state the source of the numbers"
@@ -377,8 +378,8 @@ class Draw:
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     r"""Draw the values of all quantities for one flight.
 
-    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``. No draw depends on another draw, so any
-    order, any number of workers and any part of a campaign give the same flights.
+    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``.  Each draw is independent of the others.
+    The flights are therefore the same in any order, with any number of workers, and in any part of a campaign.
 
     seed: seed of the campaign.
 

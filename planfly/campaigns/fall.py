@@ -24,16 +24,16 @@ _MAX_FALL_S = 600.0
 
 
 def plate_drag(aircraft: Aircraft) -> float:
-    """Return the drag deceleration of a fall with the wing broadside to the air, per airspeed squared, 1/m."""
+    """Return the drag per mass and airspeed squared of a fall with the wing broadside to the air, 1/m."""
     return 0.5 * _AIR_DENSITY * _PLATE_DRAG_COEFFICIENT * aircraft.wing_area / aircraft.mass
 
 
 def impact_points(
     position: Floats, velocity: Floats, drag: float, wind_at: Callable[[Floats], Floats], terrain: Terrain
 ) -> Floats:
-    """Return where falls meet the ground, east and north, m, (n, 2).
+    """Return the positions (east, north) at which falls hit the ground, m, (n, 2).
 
-    Where the terrain is unknown, its lowest known height below the falls applies.
+    Where the terrain is unknown, the lowest known terrain below the falls is used.
 
     position, velocity: at the start of the falls, over the ground, m and m/s, (n, 3).
     drag: drag per mass and square of the airspeed, 1/m.

@@ -143,10 +143,10 @@ def fly_for_energy(
 
 
 def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: float) -> EnergyRow:
-    """Return the row with the return that needs the most energy; without a home, return the row unchanged.
+    """Add the return that needs the most energy to a row; without a home, return the row unchanged.
 
-    The energy of a return is that of the point mass, times the ratio of flown to predicted energy of this flight's
-    mission: the point mass does not know the drawn mass and drag, gusts and turns.
+    The point mass does not know the drawn mass and drag, gusts and turns.  Its energy of a return is therefore
+    multiplied by the ratio of flown to predicted energy in the mission of this flight.
     """
     if varied.setup.mission.home is None:
         return row
@@ -155,9 +155,9 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     returns: Returns = judge_returns(
         make_return_world(varied.setup), flown_starts(varied.setup, track, interval), interval
     )
-    kinds = Counter(one.kind for one in returns.each if math.isnan(one.time_to_loiter))
-    lost = [one for one in returns.each if one.kind == "lost"]
-    arriving = [one for one in returns.each if math.isfinite(one.time_to_loiter)]
+    kinds = Counter(ret.kind for ret in returns.each if math.isnan(ret.time_to_loiter))
+    lost = [ret for ret in returns.each if ret.kind == "lost"]
+    arriving = [ret for ret in returns.each if math.isfinite(ret.time_to_loiter)]
     row = replace(
         row,
         unknown_returns=kinds["unknown"] + kinds["low"],
@@ -165,7 +165,7 @@ def _with_returns(row: EnergyRow, varied: VariedFlight, track: Track, interval: 
     )
     if not lost and not arriving:
         return row
-    worst = lost[0] if lost else max(arriving, key=lambda one: one.energy_used + ratio * one.energy)
+    worst = lost[0] if lost else max(arriving, key=lambda ret: ret.energy_used + ratio * ret.energy)
     worst_row = min(len(track) - 1, int(np.searchsorted(track.time, worst.time)))
     leg = int(varied.setup.route.leg_numbers_of(track.leg[worst_row : worst_row + 1])[0])
     needed = math.inf if lost else worst.energy_used + ratio * worst.energy
@@ -229,12 +229,12 @@ class BatteryResult:
 
     @property
     def completed(self) -> tuple[EnergyRow, ...]:
-        """Flights that completed the mission with a known energy."""
+        """Rows of the flights that completed the mission with a known energy."""
         return tuple(row for row in self.rows if row.mission_energy > 0.0)
 
     @property
     def own_probability(self) -> Interval:
-        """Bounds of the probability that the aircraft's own battery keeps the reserve, each with the confidence."""
+        """Bounds of the probability that the aircraft's battery keeps the reserve, at the goal's confidence."""
         from scipy import stats
 
         two_sided = 1.0 - 2.0 * (1.0 - self.goal.confidence)
@@ -243,7 +243,7 @@ class BatteryResult:
 
     @property
     def is_enough(self) -> bool | None:
-        """True if the aircraft's own battery keeps the reserve with the probability; None if it is not known."""
+        """True if the aircraft's battery keeps the reserve with the required probability; None if not known."""
         if self.is_guessed or math.isnan(self.capacity) or not self.has_returns:
             return None
         if self.own_probability.low >= self.goal.probability:
@@ -257,24 +257,30 @@ class BatteryResult:
 
     @property
     def decisions(self) -> tuple[BatteryDecision, ...]:
-        """Parts that decide the battery, the most frequent first."""
-        legs = Counter(row.return_leg if row.is_decided_by_return else -1 for row in self.completed)
-        times = {
-            leg: [row.return_time for row in self.completed if row.is_decided_by_return and row.return_leg == leg]
-            for leg in legs
-        }
-        return tuple(
-            BatteryDecision(count, leg, float(np.median(times[leg])) if leg >= 0 else math.nan)
-            for leg, count in legs.most_common()
-        )
+        """Parts of a flight that decide the battery, the most frequent first."""
+        # The mission, not a return, decides the flights under -1.
+        times_by_leg: dict[int, list[float]] = {}
+        for row in self.completed:
+            leg = row.return_leg if row.is_decided_by_return else -1
+            times_by_leg.setdefault(leg, []).append(row.return_time)
+        decisions = []
+        for leg, times in sorted(times_by_leg.items(), key=lambda entry: -len(entry[1])):
+            median_time = float(np.median(times)) if leg >= 0 else math.nan
+            decisions.append(BatteryDecision(len(times), leg, median_time))
+        return tuple(decisions)
 
     @property
     def leg_energies(self) -> Floats:
         """Median energy of each leg over the flights, Wh, (legs,)."""
         rows = [row.leg_energies for row in self.completed]
-        legs = max(map(len, rows), default=0)
-        padded = np.array([(*row, *[0.0] * (legs - len(row))) for row in rows]).reshape(len(rows), legs)
-        return np.median(padded, axis=0) if len(rows) else np.zeros(0)
+        if not rows:
+            return np.zeros(0)
+        leg_count = max(map(len, rows))
+        # A leg that a flight did not record took no energy.
+        energies = np.zeros((len(rows), leg_count))
+        for k, row in enumerate(rows):
+            energies[k, : len(row)] = row
+        return np.median(energies, axis=0)
 
 
 def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advance: Advance) -> BatteryResult:
@@ -282,8 +288,8 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
 
     Raises PlanflyError for an aircraft that burns fuel.
 
-    If the mass changes with the battery, campaigns of the same draws are flown with the mass of the battery that the
-    campaign before has found, until the battery no longer changes.
+    If the mass changes with the battery, the campaign is repeated with the same draws and the mass of the battery found
+    last, until the battery no longer changes.
     """
     aircraft = base.airframe.aircraft
     if not aircraft.battery_voltage > 0.0:
@@ -337,6 +343,7 @@ def fly_energy_campaign(
     indices: Iterator[int] = iter(range(goal.flights))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 
@@ -351,10 +358,11 @@ def fly_energy_campaign(
 
 
 def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tuple[float, CapacityRange]:
-    """Return the quantile of the capacities that the flights need, Wh, and its interval from the order statistics.
+    """Return the quantile of the capacities that the flights need, Wh, and its interval.
 
-    Both are NaN if a larger part of the flights than the goal leaves open did not complete the mission or has returns
-    of unknown energy, or if the aircraft's power is unknown.  A bound is inf if no battery covers so many flights.
+    The interval follows from order statistics.  A bound is inf if no battery is enough for that many flights.  Quantile
+    and interval are NaN if the aircraft's power is unknown.  They are also NaN if too many flights did not complete the
+    mission, or have returns of unknown energy, to reach the goal.
     """
     from scipy import stats
 
@@ -366,6 +374,6 @@ def quantile_of_capacities(rows: tuple[EnergyRow, ...], goal: BatteryGoal) -> tu
     low, high = stats.quantile_test(needed, p=goal.probability).confidence_interval(goal.confidence)
     largest = float(needed[needed < _ENDLESS_BATTERY_WH].max(initial=0.0))
     bounds = [float(low) if math.isfinite(low) else 0.0, float(high) if math.isfinite(high) else math.inf]
-    # A quantile between the largest capacity and none is that of a flight that no battery covers.
+    # A quantile interpolated between the largest capacity and infinity is infinite: no battery is enough.
     capacity, *bounds = (math.inf if value > largest else value for value in (capacity, *bounds))
     return capacity, CapacityRange(*bounds)

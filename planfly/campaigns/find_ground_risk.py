@@ -111,10 +111,9 @@ class ExcursionRow(FlightRow):
 def fly_for_excursions(
     base: CampaignBase, index: int, wind: GivenWind | None = None, *, path: BaseGeometry, interval: float, glide: bool
 ) -> ExcursionRow:
-    """Fly one flight of a campaign, and find the areas below it and its returns, and of the falls from there.
+    """Fly one flight of a campaign; find the areas below the flight and its returns, and of falls from them.
 
-    index: number of the flight, from 0.
-    wind: mean wind that replaces the scenario's wind, or None.
+    index: number of the flight, from 0. wind: mean wind that replaces the scenario's wind, or None.
     path: planned path, and that of the flight without variations, m.
     interval: time between two returns, s.
     glide: True to include the glide after an engine failure.
@@ -145,10 +144,11 @@ def fly_for_excursions(
     middle = 0.5 * float(flown.track.time[-1])
 
     def wind_at(places: Floats) -> Floats:
+        """Return the wind at places (n, 3) at the middle of the flight, m/s, (n, 2)."""
         return setup.scenario.wind_velocities(places, np.full(len(places), middle))
 
     falls = _fall_areas(sampled, airframe, wind_at, terrain)
-    glides = shapely.buffer([shapely.LineString(one[:, :2]) for one in paths.glides], 1.0)
+    glides = shapely.buffer([shapely.LineString(glide_path[:, :2]) for glide_path in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
     deviation = float(shapely.distance(shapely.points(positions[:, :2]), path).max())
@@ -237,10 +237,10 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
 
 
 def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
-    """Return the beginning of a return, m, (n, 3), up to where it heads for its target.
+    """Return the first part of a return, m, (n, 3), up to where the aircraft heads for its target.
 
     path: positions, m, (n, 3).
-    radius: radius of the loiter about the target, m: a course that meets it heads for the target, too.
+    radius: radius of the loiter around the target, m; a course that meets the loiter heads for the target, too.
     """
     steps, ways = np.diff(path[:, :2], axis=0), np.array(target[:2]) - path[:-1, :2]
     along = np.sum(steps * ways, axis=1)
@@ -253,14 +253,14 @@ def turn_of_return(path: Floats, target: Position, radius: float) -> Floats:
 def turn_areas(
     times: Floats, positions: Floats, start_times: Floats, turns: list[Floats], interval: float
 ) -> list[BaseGeometry]:
-    """Return the areas of turns that begin at any time from each start of a return to the next.
+    """Return the areas of the turns of returns that begin between two successive starts.
 
-    Each is the flight between both starts, widened on both sides by the larger of their two turns.
+    Each area is the flight between two starts, widened on both sides by the larger of their turns.
 
-    times, positions: of the flight, s, (n,), and m, (n, 3).
+    times, positions: times, s, (n,), and positions, m, (n, 3), of the flight.
     start_times: times of the returns' starts, s, (m,).
     turns: turn of each return, m, (n, 3) each.
-    interval: time after the last start, s.
+    interval: time after the last start that is covered, s.
     """
     areas = []
     for k, (start, end) in enumerate(itertools.pairwise([*start_times, *(start_times[-1:] + interval)])):
@@ -273,7 +273,7 @@ def turn_areas(
 
 
 def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
-    """Return the areas between neighbouring returns: a return may begin at any time between theirs."""
+    """Return the areas between successive returns; a return may begin at any time between their starts."""
     lines = [shapely.get_coordinates(shapely.LineString(path[:, :2]).simplify(_OUTLINE_TOLERANCE_M)) for path in paths]
     rings = [np.concatenate([one, other[::-1]]) for one, other in itertools.pairwise(lines)]
     return [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
@@ -282,8 +282,9 @@ def areas_between(paths: list[Floats]) -> list[BaseGeometry]:
 def _fall_areas(
     sampled: list[tuple[Floats, Floats]], aircraft: Aircraft, wind_at: Callable[[Floats], Floats], terrain: Terrain
 ) -> list[BaseGeometry]:
-    """Return the areas on which an aircraft can fall from paths: the hull of each piece of a path and its impacts.
+    """Return the areas in which an aircraft can fall from paths.
 
+    Each area is the hull of a piece of a path and of the impact points of falls from it.
     sampled: positions and velocities of each path, m and m/s, (n, 3) each.
     wind_at: see `impact_points`.
     """
@@ -300,7 +301,7 @@ def _fall_areas(
 
 
 def _largest_height(positions: Floats, terrain: Terrain) -> float:
-    """Return the largest height above ground of positions, m; -inf if no ground is known."""
+    """Return the largest height of positions above ground, m; -inf if no ground is known."""
     heights = positions[:, 2] - terrain.height(positions[:, 0], positions[:, 1])
     return float(np.max(heights, where=np.isfinite(heights), initial=-math.inf))
 
@@ -358,7 +359,7 @@ class GroundRiskResult:
 
     @property
     def aircraft(self) -> Aircraft:
-        """The aircraft."""
+        """Aircraft of the mission."""
         return self.base.airframe.aircraft
 
     @property
@@ -373,12 +374,12 @@ class GroundRiskResult:
 
     @property
     def volume_height(self) -> float:
-        """Height of the operational volume above ground, m: the larger of the flown one and the formula's."""
+        """Height of the operational volume above ground, m: the larger of the flown and the calculated height."""
         return max(self.flown.contingency_height, self.formula.height)
 
     @property
     def contingency_width(self) -> float:
-        """Width of the contingency volume, m: the larger of the flown one and the formula's."""
+        """Width of the contingency volume, m: the larger of the flown and the calculated width."""
         return max(self.flown.contingency_width, self.formula.width)
 
     @property
@@ -393,29 +394,29 @@ class GroundRiskResult:
 
     @property
     def glide_buffer(self) -> float | None:
-        """Width of the ground risk buffer by a glide, m; None if glides are not asked for."""
+        """Width of the ground risk buffer by a glide, m; None if glides are not requested."""
         return None if self.glide_ratio is None else glide_buffer(self.volume_height, self.glide_ratio)
 
     @property
     def buffer_width(self) -> float:
-        """Width of the ground risk buffer, m: the larger of the flown one and the formulas'."""
+        """Width of the ground risk buffer, m: the largest of the flown and the calculated widths."""
         return max(self.flown.buffer_width, self.one_to_one_buffer, self.glide_buffer or 0.0)
 
     @property
     def is_judged(self) -> bool:
-        """True if the class is known, or known to be outside SORA; False without a home, to which returns fly."""
+        """True if the class is known, or known to be outside SORA; False without a home for returns."""
         is_populated = self.goal.controlled or (self.population is not None and self.population.is_complete)
         return is_populated and self.base.mission.home is not None
 
     @property
     def entered_zones(self) -> tuple[str, ...]:
-        """Names of the scenario's zones whose area the operational volume meets, whatever their heights."""
-        zones = (*self.base.scenario.zones,)
-        areas = (
-            shapely.union_all([shapely.Polygon(outline, holes) for outline, *holes in zone_parts(zone)])
-            for zone in zones
-        )
-        return tuple(zone.name for zone, area in zip(zones, areas, strict=True) if area.intersects(self.volume))
+        """Names of the scenario's zones whose area the operational volume meets, at any altitude."""
+        names = []
+        for zone in self.base.scenario.zones:
+            parts = [shapely.Polygon(outline, holes) for outline, *holes in zone_parts(zone)]
+            if shapely.union_all(parts).intersects(self.volume):
+                names.append(zone.name)
+        return tuple(names)
 
 
 def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers, advance: Advance) -> GroundRiskResult:
@@ -474,10 +475,11 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
 def _fly_excursions(
     base: CampaignBase, goal: GroundRiskGoal, path: BaseGeometry, workers: Workers, advance: Advance
 ) -> tuple[ExcursionRow, ...]:
-    """Fly the flights of a campaign for their areas; return the rows with areas in the order of the draws."""
+    """Fly the flights of a campaign, and return their rows with areas, in the order of the draws."""
     indices: Iterator[int] = iter(range(goal.flights))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 
@@ -494,7 +496,7 @@ def _fly_excursions(
 
 
 def _best_glide_ratio(base: CampaignBase) -> float:
-    """Return the largest distance per height lost of a glide in calm air.
+    """Return the best glide ratio in calm air: distance per height lost.
 
     Raises FlightError for a model without trims with the throttle closed.
     """
@@ -507,7 +509,10 @@ def _best_glide_ratio(base: CampaignBase) -> float:
         raise FlightError(message, file=aircraft.name)
     altitude = float(setup.route.positions[0, 2])
     airspeeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 20)
-    return max(1.0 / float(glide_slopes(model, float(one), altitude, altitude + 1.0).table.min()) for one in airspeeds)
+    return max(
+        1.0 / float(glide_slopes(model, float(airspeed), altitude, altitude + 1.0).table.min())
+        for airspeed in airspeeds
+    )
 
 
 def make_volumes(
@@ -520,7 +525,7 @@ def make_volumes(
     """Make the volumes from the rows of the flights.
 
     path: planned path, and that of the flight without variations, m.
-    glide_ratio: best glide ratio; None if glides are not asked for.
+    glide_ratio: best glide ratio; None if glides are not requested.
     """
     aircraft = base.airframe.aircraft
     if not all(math.isfinite(row.height) for row in rows):
@@ -564,5 +569,5 @@ def _without_filled_holes(area: BaseGeometry, footprint: BaseGeometry) -> BaseGe
 
 
 def _reach(outer: BaseGeometry, inner: BaseGeometry) -> float:
-    """Return the largest distance of an area's outline beyond another area, m; 0 for an empty area."""
+    """Return how far an area extends beyond another area at most, m; 0 for an empty area."""
     return float(shapely.distance(shapely.points(shapely.get_coordinates(outer)), inner).max(initial=0.0))

@@ -73,7 +73,7 @@ class Departure:
 
     @cached_property
     def interval(self) -> Interval:
-        """Interval of the probability of a flyable flight, of Clopper and Pearson with 95 % confidence."""
+        """Clopper-Pearson interval of the probability of a flyable flight, with 95 % confidence."""
         return clopper_pearson(self.flyable, len(self.rows))
 
     @cached_property
@@ -83,7 +83,7 @@ class Departure:
 
     @property
     def rules(self) -> tuple[str, ...]:
-        """Rules that fail most flights, each the same number; () without failures."""
+        """Rules that fail the most flights (ties included); () without failures."""
         return deciding_rules(self.failures)
 
     @property
@@ -92,7 +92,7 @@ class Departure:
         return sum(row.undecided for row in self.rows)
 
     def is_judged_in_full(self, probability: float) -> bool:
-        """Return True if the flights that are not judged in full do not decide whether the departure is open.
+        """Return True if flights that are not judged in full cannot change whether the departure is open.
 
         probability: probability of a flyable flight at which a departure is open.
         """
@@ -110,9 +110,9 @@ class Departure:
 
     @property
     def wind(self) -> tuple[float, float]:
-        """Mean wind at the start: m/s, and the direction it blows from, deg; NaN if the departure was not flown.
+        """Mean wind at the start: speed, m/s, and direction it blows from, deg; NaN if not flown.
 
-        With several members, their mean.
+        With several members of the forecast, it is their mean.
         """
         if not self.scenarios:
             return math.nan, math.nan
@@ -138,7 +138,7 @@ class WindowResult:
         return f"<WindowResult {self.base.name}: {sum(map(bool, map(self.is_open, self.departures)))} departures open>"
 
     def is_open(self, departure: Departure) -> bool | None:
-        """Return True if a departure's fraction of flyable flights reaches the probability; None if not flown."""
+        """Return True if a departure's fraction of flyable flights is large enough; None if not flown."""
         return None if not departure.rows else departure.share >= self.goal.probability
 
     @property
@@ -157,23 +157,27 @@ class WindowResult:
 
     @property
     def asked(self) -> Departure | None:
-        """Departure about which the user asks; None for any."""
+        """Departure that the user asks about; None if the user asks about any departure."""
         return next((departure for departure in self.departures if departure.time == self.goal.asked), None)
 
     @property
     def is_go(self) -> bool | None:
-        """True if the asked departure is open, or any departure if none is asked; None if that is not known.
+        """True if the requested departure is open, or any departure if none was requested; None if unknown.
 
-        It is not known if the flights that are not judged in full decide it.
+        It is unknown if the result depends on the flights that are not judged in full.
         """
         departures = self.departures if self.asked is None else (self.asked,)
         probability = self.goal.probability
-        opens = [self.is_open(one) if one.is_judged_in_full(probability) else None for one in departures]
-        return True if any(opens) else None if None in opens else False
+        results = [
+            self.is_open(departure) if departure.is_judged_in_full(probability) else None for departure in departures
+        ]
+        if any(results):
+            return True
+        return None if None in results else False
 
     @property
     def best(self) -> Departure | None:
-        """Departure with the largest fraction of flyable flights, the earliest of several; None if none was flown."""
+        """Departure with the most flyable flights, the earliest in a tie; None if no departure was flown."""
         flown = [departure for departure in self.departures if departure.rows]
         return max(flown, key=lambda departure: departure.share, default=None)
 
@@ -181,7 +185,7 @@ class WindowResult:
 def departure_times(
     first: datetime, last: datetime, step: timedelta, asked: datetime | None = None
 ) -> tuple[datetime, ...]:
-    """Return the departures from the first to the last, with the asked departure among them.
+    """Return the departure times from the first to the last, including the requested departure.
 
     >>> day = datetime(2026, 5, 1, tzinfo=UTC)
     >>> [time.hour for time in departure_times(day, day + timedelta(hours=5), timedelta(hours=2))]
@@ -195,7 +199,7 @@ def departure_times(
 def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance: Advance) -> WindowResult:
     """Fly a campaign for each departure; the draws of flight k are the same at every departure.
 
-    With the members of an ensemble, flight k flies in member k modulo their number.
+    If the forecast is an ensemble, flight k flies in member k modulo the number of members.
     """
     departures = [_open_departure(base, time) for time in goal.departures]
     scenarios = [departure.scenarios for departure in departures if departure.scenarios]
@@ -203,6 +207,7 @@ def find_window(base: CampaignBase, goal: WindowGoal, workers: Workers, advance:
     indices: Iterator[int] = iter(range(total))
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight; None if all flights are requested."""
         index = next(indices, None)
         return None if index is None else FlightRequest(index)
 
@@ -234,8 +239,8 @@ def fly_departure(
 ) -> FlightRow:
     """Fly one flight of one departure.
 
-    index: number of the departure times `flights`, plus number of the flight.
-    wind: None.
+    index: number of the departure times `flights`, plus the number of the flight.
+    wind: always None, because the forecast states the wind of a departure.
     scenarios: for each departure, its scenario in each member of the forecast.
     flights: number of flights of each departure.
     """
@@ -245,7 +250,7 @@ def fly_departure(
 
 
 def _open_departure(base: CampaignBase, time: datetime) -> Departure:
-    """Return a departure without flights, with its scenarios if the forecast covers the flight."""
+    """Return a departure without flights yet; it has scenarios only if the forecast covers the flight."""
     try:
         scenarios = _member_scenarios(with_flight_time(base.scenario, time.isoformat()))
         replace(base, scenario=scenarios[0]).nominal_setup()
@@ -265,7 +270,7 @@ def _member_scenarios(scenario: Scenario) -> tuple[Scenario, ...]:
 def last_departure(base: CampaignBase, first: datetime) -> datetime:
     """Return the default end of a search: `DEFAULT_SPAN` after the first departure.
 
-    It is earlier, but not before the first departure, if the forecast covers no flight that begins later.
+    If the forecast ends before, it is the last departure whose flight the forecast covers, but never before the first.
     """
     forecast_end = first + DEFAULT_SPAN
     if base.scenario.wind.forecast is not None:

@@ -161,7 +161,7 @@ class WindsResult:
 
     @property
     def fails_in_calm_air(self) -> bool:
-        """True if the flights in calm air show that the mission misses the target probability there."""
+        """True if the flights in calm air show that the mission misses the target probability in calm air."""
         calm = self.calm
         if calm is None:
             return False
@@ -173,7 +173,7 @@ class WindsResult:
     def reasons(self) -> tuple[str, ...]:
         """Reason why the boundary of each direction is not judged; "" if it is judged.
 
-        A direction whose boundary is calm air is judged if the flights there show it.
+        A direction whose boundary is calm air is judged if its flights prove this.
         """
         fails_in_calm_air, max_width = self.fails_in_calm_air, 2.0 * BOUNDARY_ACCURACY_MPS
         counts = zip(self.flight_counts(), self.undecided_counts(), strict=True)
@@ -199,8 +199,8 @@ class WindsResult:
     def estimated(self) -> tuple[bool, ...]:
         """True for each direction whose boundary is stated: it is judged, or only its interval is too wide.
 
-        With fewer flights the boundary and its interval depend mostly on assumptions, and flights that are not judged
-        in full may be on either side of it.
+        Otherwise there are too few flights, so that boundary and interval depend mostly on assumptions, or some flights
+        are not judged in full and may lie on either side of the boundary.
         """
         counts = zip(self.flight_counts(), self.undecided_counts(), strict=True)
         return tuple(
@@ -210,11 +210,11 @@ class WindsResult:
 
     @property
     def answer(self) -> WindsAnswer:
-        """The answer: "judged", "not flyable", "not judged in full" or "not judged".
+        """Answer: "judged", "not flyable", "not judged in full" or "not judged".
 
-        It is "not flyable" if the mission does not reach the target probability even in calm air, because the flights
-        there show it or all boundaries are judged; "not judged" if no direction has a judged boundary; "not judged in
-        full" if only some directions have one; and otherwise "judged".
+        It is "not flyable" if the mission does not reach the target probability even in calm air.  It is "not judged"
+        if no direction has a judged boundary, "not judged in full" if only some directions have one, and otherwise
+        "judged".
         """
         judged = self.judged
         if self.fails_in_calm_air or (self.calm is not None and all(judged)):
@@ -239,10 +239,10 @@ class WindsResult:
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
     """Create the table of a search in a folder, or open it to resume the search.
 
-    The number of flights may be changed; if it is smaller, the other flights stay in the table.
+    The number of flights may change when a search is resumed.  If it is smaller, the surplus flights stay in the table.
 
-    base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
-    Raises StoreError, also for the table of a search with another goal.
+    base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.  Raises StoreError for a table that
+    cannot be used, such as that of a search with another goal.
     """
     settings = {
         "name": base.name,
@@ -262,13 +262,12 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsResult:
-    """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
+    """Fly rounds of flights until each boundary is accurate enough, or all flights are used.
 
-    A search starts with a few flights in calm air. If none of them is flyable, no wind is searched, and the table
-    stays empty.
-    Flights in the table are not flown again. The winds of a round depend only on the earlier rounds, so the result is
-    the same for any number of workers and interruptions. Flights completed before an error or Ctrl-C stay in the
-    table.
+    A search starts with a few flights in calm air.  If none of them is flyable, no wind is searched, and the table
+    stays empty.  Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so
+    the result is the same for any number of workers and interruptions.  Flights completed before an error or Ctrl-C
+    stay in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
@@ -316,7 +315,7 @@ class _Search:
         self._failed: list[tuple[tuple[str, Place], ...]] = []
 
     def next_round(self) -> list[RequestedFlight]:
-        """Return the requests of the next round; empty if all boundaries are known or all flights are used."""
+        """Return the requests of the next round; empty if the search is complete or all flights are used."""
         self.open = [number for number in self.open if self._is_open(number)]
         flights_each = max(_MIN_FLIGHTS_EACH, min(_MAX_FLIGHTS_EACH, _FLIGHTS_PER_ROUND // max(1, len(self.open))))
         requests: list[RequestedFlight] = []
@@ -369,7 +368,8 @@ class _Search:
         """Return the result of the search."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
-        calm_failures, failures = self._calm_failures(boundaries), self._failures_by_direction(boundaries)
+        calm_failures = self._calm_failures(boundaries)
+        failures = self._failures_by_direction(boundaries)
         return WindsResult(
             self.goal,
             boundaries,
@@ -408,9 +408,9 @@ class _Search:
         return tuple(failures)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
-        """Return the failures in the weakest wind flown, over the directions whose boundary is calm air.
+        """Return the failures in the weakest flown wind, over the directions whose boundary is calm air.
 
-        Returns None if there is no such direction, or if the weakest wind of these directions is not nearly calm.
+        Return None if there is no such direction, or if this wind is not nearly calm.
         """
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [
@@ -432,7 +432,7 @@ class _Search:
 def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
     """Fly the first draws in calm air; return the flights if none of them is flyable, otherwise [].
 
-    The number of flights is chosen so that, if the mission had the target probability, all of them would fail with a
+    There are enough flights to disprove the target: a mission that has the target probability fails all of them with a
     probability of at most 1 minus the confidence.
     """
     count = max(_MIN_CALM_FLIGHTS, math.ceil(math.log(1.0 - goal.confidence) / math.log(1.0 - goal.target)))
@@ -441,6 +441,7 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
     draws, rows = iter(range(count)), dict[int, FlightRow]()
 
     def next_request() -> FlightRequest | None:
+        """Return the request of the next flight in calm air; None once a flight was flyable."""
         has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
         draw = next(draws, None) if has_none_flyable else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
@@ -453,7 +454,7 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:
-    """Return a hashable key for a failed rule and place; item numbers and names are not part of it."""
+    """Return a hashable key for a failed rule and place, without item numbers and names."""
     return rule, place.kind, place.index
 
 
@@ -467,7 +468,7 @@ class _StoredFlights:
         self.flown = {number: flight for number, (_, flight) in requests_and_outcomes.items()}
 
     def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
-        """Return the requests whose flights are not in the table, and which must be flown.
+        """Return the requests that must be flown, because their flights are not in the table.
 
         Raises StoreError if the table has another request with the same number.
         """
@@ -499,6 +500,7 @@ def _fly_round(
     requested_by_request: dict[FlightRequest, RequestedFlight] = {}
 
     def next_flight_request() -> FlightRequest | None:
+        """Return the request of the next missing flight of the round; None if all are requested."""
         requested_flight = next(remaining_requests, None)
         if requested_flight is None:
             return None
@@ -528,7 +530,7 @@ class _ProgressReport:
             self._advance(float(flight_count), float(total), remark)
 
     def report_calm(self, flight_count: int) -> None:
-        """Report the flights in calm air with which a search ends."""
+        """Report the flights in calm air after which a search ends."""
         if self._advance is not None:
             text = f"{count_text(flight_count, 'flight')} in calm air, none of them flyable"
             self._advance(float(flight_count), float(flight_count), text)
@@ -537,8 +539,7 @@ class _ProgressReport:
         """Report the settled directions, the flights, the flights per minute, and the least remaining time.
 
         No remaining time is given beyond `MIN_FLIGHTS_PER_DIRECTION`, because the number of flights is then unknown.
-
-        is_last: True reports even if no report is due.
+        is_last: True to report even if no report is due.
         """
         if self._advance is None or not (self._rate.is_due() or is_last):
             return

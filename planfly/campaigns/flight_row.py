@@ -45,8 +45,8 @@ MarginalPass = tuple[str, Place, float]
 def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
     """Return the marginal passes of a flight: findings that passed by less than their rule's scale.
 
-    Each is given by rule, place and margin.  The margin is a fraction of the scale, 0 to 1.
-    Passes close to a missile's sphere follow at the end.
+    A marginal pass consists of rule, place and margin.  The margin is a fraction of the scale, 0 to 1.  Passes close to
+    a missile's sphere follow at the end.
     """
     fractions: dict[tuple[str, Place], float] = {}
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
@@ -105,10 +105,10 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
-    """Return the distance right of and above each of s stops at closest approach, m, (s, 2).
+    """Return the offsets to the right of and above each of s stops at the closest approach, m, (s, 2).
 
-    NaN for a stop that was not reached.  A stop is a waypoint, or the corner at which a loiter or a return starts;
-    later corners are omitted, because their number differs between flights.  Right is relative to the mean of the
+    Offsets are NaN for a stop that was not reached.  A stop is a waypoint, or the first corner of a loiter or return;
+    the later corners are omitted, because their number differs between flights.  Right is relative to the mean of the
     incoming and outgoing courses.
     """
     points = route.positions
@@ -171,7 +171,7 @@ class Column:
 
 
 def _failed_findings_text(failed_findings: Iterable[tuple[str, Place]]) -> str:
-    """Return failed rules and places as JSON text for a column of the table."""
+    """Return failed rules and places as the JSON text of a table's column."""
     return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed_findings])
 
 
@@ -244,7 +244,7 @@ class FlightRow:
 
     @property
     def closeness(self) -> float:
-        """Minimum of all scaled margins, by which flights are sorted; inf if no margin is known."""
+        """Minimum of all scaled margins; inf if no margin is known. Flights are sorted by it."""
         fractions = (fraction for rule, margin in self.margins if (fraction := scale_margin(rule, margin)) is not None)
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 
@@ -316,7 +316,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str, str], ...]:
-    """Return the rules that a verdict without failures does not judge, with places and reason; () with failures."""
+    """Return the unjudged rules of a verdict without failures, with places and reason; () if any rule failed."""
     if not (verdict.flyable or verdict.undecided):
         return ()
     texts = dict(unjudged_parts(verdict.findings, setup))
@@ -328,8 +328,8 @@ def find_unjudged_rules(verdict: Verdict, setup: FlightSetup) -> tuple[tuple[str
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
     """Return the rule and the place of each failed finding.
 
-    If a flight that does not count as flyable has no failed finding, these are the undecided findings for which it does
-    not count, or else the rule `completion`.
+    If a flight without failed findings is not flyable, the undecided findings that prevent it are returned, or else the
+    rule `completion`.
     """
     failed_findings = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     if failed_findings or verdict.flies:

@@ -62,11 +62,17 @@ def _add_outcome(tally: Tally, outcome: str) -> Tally:
 
 
 def resumed_goal(
-    requested: Goal | None, folder: Path, confidence: float | None = None, *, keeps_flights: bool = False
+    requested: Goal,
+    folder: Path,
+    confidence: float | None = None,
+    *,
+    keeps_target: bool = False,
+    keeps_flights: bool = False,
 ) -> Goal:
-    """Return the goal of a resumed campaign: the requested goal, or the stored goal if none is requested.
+    """Return the goal of a resumed campaign: the requested goal, with the parts of the stored goal that are kept.
 
     confidence: confidence of the goal; None keeps the stored confidence.
+    keeps_target: True keeps the stored target, and whether the flights stop when it is decided.
     keeps_flights: True keeps the stored number of flights, if both goals have a fixed number or both stop by
         themselves.
     Raises StoreError for a folder without a campaign.
@@ -76,7 +82,7 @@ def resumed_goal(
     if not settings:
         raise StoreError(f"{path}: there is no campaign to continue", file=path)
     old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
-    goal = old_goal if requested is None else requested
+    goal = replace(requested, target=old_goal.target, stops=old_goal.stops) if keeps_target else requested
     if keeps_flights and goal.stops == old_goal.stops:
         goal = replace(goal, flights=old_goal.flights)
     is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)
@@ -86,7 +92,7 @@ def resumed_goal(
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
     """Create the table of a campaign in a folder, or open it to resume the campaign.
 
-    Raises StoreError, also if the table has more flights than the goal.
+    Raises StoreError for a table that cannot be used, or that has more flights than the goal.
     """
     settings = {
         "name": base.name,
@@ -109,8 +115,8 @@ def fly_campaign(
 ) -> Estimate:
     """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
-    Flights are counted in the order of their indices, so that answer and table do not depend on the speed of the
-    workers; flights after the deciding flight are deleted. Flights completed before an error or Ctrl-C stay in the
+    Flights are counted in the order of their indices, and flights after the deciding flight are deleted.  Answer and
+    table therefore do not depend on the speed of the workers.  Flights completed before an error or Ctrl-C stay in the
     table.
     """
     estimator = Estimator(goal)
@@ -169,7 +175,7 @@ class _ProgressReport:
     def report(self, tally: Tally, is_last: bool = False) -> None:
         """Report flights, probability of success with its bounds, rate of flights and remaining time.
 
-        is_last: True reports even if no report is due.
+        is_last: True to report even if no report is due.
         """
         if self._advance is None or not tally.flown or not (self._rate.is_due() or is_last):
             return

@@ -34,12 +34,12 @@ def answer_line(result: GroundRiskResult) -> str:
 
 
 def density_text(population: Population | None) -> str:
-    """Return the highest density as text."""
+    """Return the highest population density as text."""
     return "population unknown" if population is None else f"at most {format_density(population.max_density)}"
 
 
 def _unknown_reason(result: GroundRiskResult) -> str:
-    """Return why the class is not judged."""
+    """Return the reason why the class is not judged."""
     if result.base.mission.home is None:
         return "the mission has no home, so its returns, which enlarge the volumes, were not simulated"
     if result.population is None:
@@ -53,14 +53,14 @@ def _unknown_reason(result: GroundRiskResult) -> str:
 
 
 def risk_lines(result: GroundRiskResult) -> list[str]:
-    """Return the lines below the answer: volumes, population, zones, flights, and what the result is not."""
+    """Return the lines below the answer: volumes, population, zones, flights, and limits of the result."""
     flown, formula = result.flown, result.formula
     lines = [
         f"flight geography: {result.half_width:.0f} m to either side of the path, up to {flown.height:.0f} m above"
         f" ground ({_share_text(result)} stay inside)",
         f"contingency volume: flights and turns of returns reach {flown.contingency_width:.0f} m beyond the flight"
         f" geography, and {flown.contingency_height:.0f} m above ground; Annex A requires {formula.width:.0f} m and"
-        f" {formula.height:.0f} m; returns on their way home reach {flown.return_distance:.0f} m",
+        f" {formula.height:.0f} m; returns on their way home reach {flown.return_distance:.0f} m beyond it",
         f"ground risk buffer: falls{' and glides' if result.goal.glide else ''} reach {flown.buffer_width:.0f} m"
         f" beyond flights and returns; the 1:1 rule requires {result.one_to_one_buffer:.0f} m{_glide_text(result)}",
         f"areas: operational volume {result.volume.area / 1e6:.2f} km², with its ground risk buffer"
@@ -75,12 +75,12 @@ def risk_lines(result: GroundRiskResult) -> list[str]:
 
 
 def _share_text(result: GroundRiskResult) -> str:
-    """Return the fraction of the flights in the flight geography."""
+    """Return a text on the fraction of the flights that stay in the flight geography."""
     return f"{result.goal.probability:.0%} of {count_text(len(result.rows), 'flight')}"
 
 
 def _glide_text(result: GroundRiskResult) -> str:
-    """Return the buffer by a glide, if it was asked for."""
+    """Return a text on the buffer by a glide, if it was requested."""
     if result.glide_buffer is None or result.glide_ratio is None:
         return ""
     return f", {result.glide_buffer:.0f} m by a glide of {result.glide_ratio:.1f} : 1"

@@ -153,8 +153,8 @@ class LocalPool:
     def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
         """Return the row of a flight, or None if its process has died.
 
-        Raises the PlanflyError of a flight, or of `check_script_guard`, RuntimeError for any other error of a flight,
-        and OSError if processes repeatedly end at their start.
+        Raises the PlanflyError of a flight or of `check_script_guard`.  Raises RuntimeError for any other error of a
+        flight, and OSError if processes repeatedly die at their start.
         """
         try:
             row = future.result()

@@ -260,7 +260,7 @@ _PANELS_PER_ROW = 5
 def draw_clearance_fan(
     clearance: Floats, has_failed: NDArray[np.bool_], terrain_altitudes: Floats, length: float, min_clearance: float
 ) -> Figure:
-    """Draw the height above ground of all flights along the path as quantile bands, and the ground below.
+    """Draw quantile bands of the flights' heights along the path, above the ground.
 
     clearance: minimum clearance of each flight on each of s equal pieces of the path, m, (n, s); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
@@ -316,7 +316,7 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
-    """Draw where the flights crossed each waypoint, seen along the path, a panel for each waypoint.
+    """Draw a panel for each waypoint with the positions at which flights crossed it, seen along the path.
 
     The panels show the ellipse of 95 % of the flights.
 
@@ -424,7 +424,7 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart, north up, of the winds in which a mission is flyable; edge: `max_speed`, m/s.
+    """Draw a polar chart, north up, of the winds in which a mission is flyable, up to `max_speed`, m/s.
 
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
@@ -481,16 +481,18 @@ def draw_go_no_go(
 def _draw_wind_areas(axes: Any, directions: Sequence[ChartDirection], max_speed: float) -> None:
     """Draw the areas of winds in which a mission is and is not flyable, and the boundary between them.
 
-    Next to a direction that is not judged nothing is known.
+    The sectors next to a direction that is not judged are grey.
     """
     angle = np.radians([direction.from_deg for direction in directions] + [directions[0].from_deg + 360.0])
     circle = [*directions, directions[0]]
     fine_angles = np.linspace(angle[0], angle[-1], 720)
 
     def interpolate(values: Sequence[float]) -> np.ndarray:
+        """Interpolate values at the directions to the fine grid of angles."""
         return np.interp(fine_angles, angle, values)
 
-    lower, upper = interpolate([point.low for point in circle]), interpolate([point.high for point in circle])
+    lower = interpolate([point.low for point in circle])
+    upper = interpolate([point.high for point in circle])
     boundary = interpolate([point.boundary for point in circle])
     is_known = interpolate([float(point.is_judged) for point in circle]) > 1.0 - 1e-9
     for start, end, mask, colour, alpha in (
@@ -658,7 +660,7 @@ def _move_legends(figure: Figure, legends: Sequence[Legend], columns: int) -> No
 
 
 def _narrow_map(figure: Figure) -> Figure:
-    """Change a map to a narrow layout: below it colour bar, compass and notes side by side, and then the legend."""
+    """Change a map to a narrow layout: colour bar, compass and notes in a row below it, then the legend."""
     map_axes, *side_axes = figure.axes
     old_width, old_height = figure.get_size_inches().tolist()
     map_box = map_axes.get_position()
@@ -690,13 +692,13 @@ def _narrow_map(figure: Figure) -> Figure:
 
 
 def _left_title(axes: Axes) -> list[Text]:
-    """Return the left title of a panel as a list of one text; empty without a title."""
+    """Return a list with the left title of a panel; empty without a title."""
     title = axes.get_title("left")
     return [child for child in axes.get_children() if isinstance(child, Text) and title and child.get_text() == title]
 
 
 def _wrap_text(text: Text, width: float) -> float:
-    """Break a text into lines of at most `width` (in), and return the total height of the lines, in."""
+    """Break a text into lines of at most `width` inches, and return the total height of the lines, inches."""
     size = float(text.get_fontsize()) / 72.0
     lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER_WIDTH_RATIO * size))))
     text.set_text("\n".join(lines))

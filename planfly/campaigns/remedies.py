@@ -24,7 +24,7 @@ _HEIGHT_RULES = ("clearance", "approach", "climbout")
 
 
 def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
-    """Return what would raise the probability, for the rules that most flights failed; () if no flight failed.
+    """Return changes that would raise the probability, for the most failed rules; () if no flight failed.
 
     scenario: scenario of the mission.
     """
@@ -36,9 +36,9 @@ def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
 
 
 def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) -> list[str]:
-    """Return what helps against the failures of a rule.
+    """Return the changes that would help against the failures of a rule.
 
-    low_margin: margin that one flight in twenty falls below, m; None if it is unknown.
+    low_margin: margin that 5 % of the flights fall below, m; None if it is unknown.
     """
     shortfall = 0.0 if low_margin is None else max(0.0, -low_margin)
     if rule == "touchdown":

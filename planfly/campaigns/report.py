@@ -72,6 +72,26 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
     """
     pictures = [draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
+    failure_rows = [
+        (RULE_WORDS[failures.rule].title, place_text(place), count)
+        for failures in summary.by_rule
+        for place, count in failures.places
+    ]
+    worst_rows = []
+    for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True):
+        failures_text = "; ".join(
+            f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failures[:4]
+        )
+        reason = failures_text or row.undecided_text or row.ended
+        worst_rows.append((row.draw.index, row.outcome, reason, closest_text(row), log))
+    dispersion_rows = []
+    for name, table in summary.dispersions.items():
+        if name in QUANTITY_BY_NAME:
+            quantity = QUANTITY_BY_NAME[name]
+            unit = quantity.combine if quantity.combine == "factor" else quantity.unit
+            parameters = {key: value for key, value in table.items() if key not in ("distribution", "source")}
+            parameters_text = ", ".join(f"{key} {value:g}" for key, value in parameters.items())
+            dispersion_rows.append((quantity.title, unit, parameters_text, table["distribution"], table["source"]))
     text = render_page(
         "campaign.html",
         command_name="campaign",
@@ -79,38 +99,11 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         heading="how likely is a flight to succeed",
         answer=summary.estimate.answer,
         lines=lines,
-        failures=[
-            (RULE_WORDS[failures.rule].title, place_text(place), count)
-            for failures in summary.by_rule
-            for place, count in failures.places
-        ],
+        failures=failure_rows,
         flights=summary.estimate.tally.flown,
-        worst=[
-            (
-                row.draw.index,
-                row.outcome,
-                "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failures[:4])
-                or row.undecided_text
-                or row.ended,
-                closest_text(row),
-                log,
-            )
-            for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True)
-        ],
+        worst=worst_rows,
         drawn=summary.dispersions.get("aircraft"),
-        dispersions=[
-            (
-                QUANTITY_BY_NAME[name].title,
-                QUANTITY_BY_NAME[name].combine
-                if QUANTITY_BY_NAME[name].combine == "factor"
-                else QUANTITY_BY_NAME[name].unit,
-                ", ".join(f"{key} {value:g}" for key, value in table.items() if key not in ("distribution", "source")),
-                table["distribution"],
-                table["source"],
-            )
-            for name, table in summary.dispersions.items()
-            if name in QUANTITY_BY_NAME
-        ],
+        dispersions=dispersion_rows,
         pictures=pictures,
         command=command,
         made_of=summary.made_of,
@@ -122,7 +115,8 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
     """Draw the figures of a campaign's report; return each with its caption."""
     outcomes = np.array(list(store.outcomes().values()))
-    speed, is_decided = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed")), outcomes != "undecided"
+    speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
+    is_decided = outcomes != "undecided"
     bins = group_by_speed(speed[is_decided], (outcomes == "flyable")[is_decided], summary.goal.confidence)
     counts = [
         (RULE_WORDS[entry.rule].title, place_text(place), count)
@@ -256,7 +250,7 @@ def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwri
 
     out: path of the folder, or None for a temporary folder, which is removed at the end.
 
-    Raises ArgumentError if a campaign is to be resumed without a folder.
+    Raises ArgumentError for a campaign to be resumed without a folder.
     """
     if out is not None:
         yield OutputDirectory(Path(out), table, resume, overwrite)
@@ -475,7 +469,7 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _unsettled_lines(winds: WindsResult) -> list[str]:
-    """Return lines that the search or some of its directions are not judged, and why; [] if all are judged."""
+    """Return lines which state that the search or some directions are not judged, and why; [] if all are."""
     reasons = winds.reasons
     word, total = "not judged" if all(reasons) else "not judged in full", len(reasons)
     lines = []
@@ -491,7 +485,8 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
         return lines
     unsettled_count = len(counts)
     directions_text = f"{count_text(total, 'direction')} {'has' if unsettled_count == 1 else 'have'}"
-    flights_text, max_width = count_range_text(counts, "flight"), 2.0 * BOUNDARY_ACCURACY_MPS
+    flights_text = count_range_text(counts, "flight")
+    max_width = 2.0 * BOUNDARY_ACCURACY_MPS
     return [
         *lines,
         f"{word}: {unsettled_count} of {directions_text} too few flights ({flights_text}): each requires at least"
@@ -509,13 +504,14 @@ def _lost_lines(winds: WindsResult) -> list[str]:
         for number in winds.lost[:10]
     )
     return [
-        f"lost      {len(winds.lost)} could not be flown because their workers died, and count as not flyable:"
+        f"lost      {len(winds.lost)} flights could not be flown, because their workers died; they"
+        " count as not flyable:"
         f" {flight_texts}"
     ]
 
 
 def _deciding_rules(winds: WindsResult) -> list[str]:
-    """Return the rule that fails most flights of each direction up to its boundary, or "" without failures."""
+    """Return, for each direction, the rule that fails the most flights up to its boundary; "" for none."""
     return [deciding_rule(by_rule) for by_rule in winds.failures] or [""] * len(winds.boundaries)
 
 
@@ -532,13 +528,13 @@ def _deciding_lines(winds: WindsResult) -> list[str]:
     if not directions_by_rule:
         return []
     texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
-    return [f"fails most often, up to the boundary: {'; '.join(texts)}"]
+    return [f"rule that fails most flights, up to the boundary: {'; '.join(texts)}"]
 
 
 def _lines_without_failures(winds: WindsResult) -> list[str]:
     """Return a line about the directions in which no flight failed; [] if there are none.
 
-    The line states the probability of success that the flights in the maximum wind of these directions prove alone.
+    The line states the probability of success that is proven by the flights in the maximum wind of these directions.
     """
     max_speed, confidence = winds.goal.most, winds.goal.confidence
     counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
@@ -546,7 +542,8 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
     counts = [counts_at_max[k] for k in range(len(winds.boundaries)) if k not in failed_directions and counts_at_max[k]]
     if not counts:
         return []
-    min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
+    min_count = min(counts)
+    probability_text = f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
         f"no flight failed in {len(counts)} of {count_text(len(winds.boundaries), 'direction')}:"
         f" {count_text(min_count, 'flight')} in {max_speed:g} m/s from each of them show P >= {probability_text}"
@@ -555,7 +552,7 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
 
 
 def _calm_lines(winds: WindsResult) -> list[str]:
-    """Return lines about the rules that fail in calm air; empty if the mission flies in calm air."""
+    """Return lines about the rules that fail in calm air; [] if the mission is flyable in calm air."""
     calm = winds.calm
     if calm is None or not calm.failed_count:
         return []
@@ -567,7 +564,7 @@ def _calm_lines(winds: WindsResult) -> list[str]:
 
 
 def _failing_lines(winds: WindsResult) -> list[str]:
-    """Return a line for each direction from which every flight fails, and whose boundary is not judged."""
+    """Return a line for each direction in which every flight fails and the boundary is not judged."""
     lines = []
     for direction, undecided_count in zip(chart_directions(winds), winds.undecided_counts(), strict=True):
         has_passed = any(flyable for _, _, flyable in direction.flights)
@@ -575,8 +572,8 @@ def _failing_lines(winds: WindsResult) -> list[str]:
             continue
         speed, count, _ = direction.flights[0]
         lines.append(
-            f"{direction.from_deg:g}°: fails in {speed:.1f} m/s, the weakest wind flown ({count} of"
-            f" {count_text(count, 'flight')}); the boundary is below {speed:.1f} m/s, not judged"
+            f"wind from {direction.from_deg:g}°: {count} of {count_text(count, 'flight')} fail in {speed:.1f} m/s, the"
+            f" weakest wind flown; the boundary is below {speed:.1f} m/s, and is not judged"
         )
     return lines
 
@@ -595,17 +592,19 @@ def _boundary_lines(winds: WindsResult) -> list[str]:
     target, max_speed, percent = winds.goal.target, winds.goal.most, f"{100 * winds.goal.confidence:g} %"
     lowest_text, highest_text = (_speed_text(direction.boundary, max_speed) for direction in (lowest, highest))
     if lowest.boundary >= CALM_MPS:
-        best_text = f", {highest_text} from {highest.from_deg:g}°" if highest_text != lowest_text else ""
+        best_text = ""
+        if highest_text != lowest_text:
+            best_text = f", and up to {highest_text} from {highest.from_deg:g}° (the highest)"
         return [
-            f"flies with P >= {target:g}, by the best estimate, in wind up to {lowest_text} from {lowest.from_deg:g}°"
+            f"by the best estimate, flyable with P >= {target:g} in wind up to {lowest_text} from {lowest.from_deg:g}°"
             f" (the lowest; {_interval_text(lowest.low, lowest.high, max_speed)} m/s at {percent}){best_text}"
         ]
     if highest.boundary < CALM_MPS:
-        basis = "" if winds.fails_in_calm_air else ", by the best estimate,"
-        return [f"does not fly with P >= {target:g}{basis} even in calm air"]
+        basis = "" if winds.fails_in_calm_air else "by the best estimate, "
+        return [f"{basis}not flyable with P >= {target:g} even in calm air"]
     return [
-        f"does not fly with P >= {target:g}, by the best estimate, in any wind from {lowest.from_deg:g}°,"
-        f" even a light one; it flies in wind up to {highest_text} from {highest.from_deg:g}°"
+        f"by the best estimate, not flyable with P >= {target:g} in any wind from {lowest.from_deg:g}°,"
+        f" even a light one; flyable in wind up to {highest_text} from {highest.from_deg:g}°"
     ]
 
 
@@ -638,8 +637,8 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 
     name: mission of the search.
 
-    The answer fails unless it is "judged".  A direction that is not judged is skipped, and a direction fails in which
-    the mission does not fly even in calm air.
+    The answer fails unless it is "judged".  A direction that is not judged is skipped.  A direction fails if the
+    mission is not flyable there even in calm air.
     """
     lines, reasons = wind_lines(winds), winds.reasons
     cases = [answer_case("" if winds.answer == "judged" else lines[0])]
@@ -648,7 +647,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
         if reason:
             case = case._replace(result="skipped", message=f"not judged: {reason}")
         elif direction.boundary < CALM_MPS:
-            message = f"does not fly with P >= {winds.goal.target:g} even in calm air"
+            message = f"not flyable with P >= {winds.goal.target:g} even in calm air"
             case = case._replace(result="failure", message=message)
         else:
             case = case._replace(text=f"wind up to {_speed_text(direction.boundary, winds.goal.most)}")
@@ -663,7 +662,7 @@ def winds_suite(name: str, winds: WindsResult) -> JunitSuite:
 def finish_campaign(
     base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
 ) -> CampaignSummary:
-    """Summarise a campaign from the unlocked table in its folder, and write its files.
+    """Summarise a campaign from the table in its folder, which must not be locked, and write its files.
 
     command: the command line that repeats the campaign, for the report.
     Raises a `world.errors.PlanflyError`, or OSError for a full disk.

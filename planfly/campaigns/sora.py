@@ -56,7 +56,7 @@ _MIN_GEOGRAPHY_DIMENSIONS = 3.0
 
 
 def min_geography_half_width(dimension: float) -> float:
-    """Return half of the least width of a flight geography, m.
+    """Return half of the minimum width of a flight geography, m.
 
     >>> min_geography_half_width(2.9)
     4.35
@@ -69,13 +69,13 @@ def ground_risk_class(
 ) -> int | None:
     """Return the intrinsic ground risk class by SORA 2.5, table 2; None if the operation is not part of SORA.
 
-    The column is the first whose dimension and speed are both kept.
+    The column of the table is the first whose limits of dimension and speed are both kept.
 
     density: highest population density in operational volume and ground risk buffer, people per km2.
     dimension: largest dimension of the aircraft, m.
     speed: highest speed of the aircraft, m/s.
     mass: take-off mass, kg.
-    controlled: True for a controlled ground area, where only involved people are.
+    controlled: True for a controlled ground area, in which only involved people stay.
 
     >>> ground_risk_class(312.0, 2.9, 33.0, 13.5), ground_risk_class(0.0, 2.9, 36.0, 13.5)
     (5, 4)
@@ -130,13 +130,13 @@ class ContingencyFormula:
 
     @property
     def width_terms(self) -> str:
-        """Terms of the width as text."""
+        """Terms of the width as a sum of numbers, in text."""
         errors = f"{_GNSS_ERROR_M:g} + {_POSITION_ERROR_M:g} + {_MAP_ERROR_M:g}"
         return f"{errors} + {self.reaction_distance:.1f} + {self.turn_distance:.1f}"
 
     @property
     def height_terms(self) -> str:
-        """Terms of the height as text."""
+        """Terms of the height as a sum of numbers, in text."""
         gains = f"{self.reaction_height:.1f} + {self.level_off_height:.1f}"
         return f"{self.flight_height:.1f} + {_BARO_ERROR_M:g} + {gains}"
 
@@ -153,7 +153,7 @@ def one_to_one_buffer(height: float, dimension: float) -> float:
 def ballistic_buffer(height: float, dimension: float, speed: float) -> float:
     """Return the width of the ground risk buffer by a fall without drag, S_GRB = v sqrt(2 H_CV / g) + CD / 2, m.
 
-    Annex A, LBA and FOCA have it for rotorcraft only.
+    Annex A, LBA and FOCA use it for rotorcraft only.
 
     >>> round(ballistic_buffer(78.48, 2.0, 25.0), 6)
     101.0

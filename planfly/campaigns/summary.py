@@ -69,7 +69,7 @@ class Sensitivity:
 
     @property
     def title(self) -> str:
-        """Name of the quantity for a person.
+        """Name of the quantity in texts.
 
         >>> Sensitivity("ident/lift-slope", 0.1, 0.2, 0.5).title
         "the aircraft's lift slope"
@@ -118,9 +118,9 @@ class DecidingRule:
 
     @property
     def drivers(self) -> tuple[Sensitivity, ...]:
-        """Quantities that are shown to explain the margin, the strongest first.
+        """Quantities that significantly explain the margin, the strongest first.
 
-        The probability that chance alone makes any quantity one of them is at most `_MAX_CHANCE` (Bonferroni).
+        The probability that any quantity is included by chance alone is at most `_MAX_CHANCE` (Bonferroni).
         """
         max_p_value = _MAX_CHANCE / max(1, len(self.sensitivities))
         return tuple(
@@ -240,9 +240,9 @@ def _margin_quantile(margins: Floats) -> float | None:
 
 
 def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]) -> tuple[str, ...]:
-    """Return the rules that decide the campaign: those that most flights failed, each the same number.
+    """Return the rules that decide the campaign: those that the most flights failed (ties included).
 
-    Without failures it is the rule with the smallest ratio of mean margin to its standard deviation.  Returns () if no
+    Without failures, it is the rule with the smallest ratio of mean margin to standard deviation.  Returns () if no
     margin is known.
     """
     if by_rule:
@@ -259,7 +259,7 @@ def _deciding_rules(margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, 
 def _rank_rules(
     store: Store, margins: Mapping[str, Floats], by_rule: tuple[RuleFailures, ...]
 ) -> tuple[RankedRule, ...]:
-    """Return the ranking of the rules; a failed rule is in it also if it has no margin."""
+    """Return the ranking of the rules; it includes failed rules without a margin."""
     failed_counts = {failures.rule: failures.flights for failures in by_rule}
     ranked = []
     for rule, rule_margins in margins.items():
@@ -271,11 +271,11 @@ def _rank_rules(
                 lowest = None
             low_margin, unit = _margin_quantile(rule_margins), _margin_unit(store, rule)
             ranked.append(RankedRule(rule, failed_counts.get(rule, 0), lowest, low_margin, unit))
-    return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled(entry))))
+    return tuple(sorted(ranked, key=lambda entry: (-entry.failed, _scaled_margin(entry))))
 
 
 def _margin_unit(store: Store, rule: str) -> str:
-    """Return the unit of a rule's margins in a table; of several units that of the first flight."""
+    """Return the unit of a rule's margins in a table, taken from the first flight that has one."""
     words = RULE_WORDS[rule]
     place_json = store.first_text(words.place_column)
     if place_json is not None:
@@ -283,8 +283,8 @@ def _margin_unit(store: Store, rule: str) -> str:
     return "" if words.margin is None else words.margin.unit
 
 
-def _scaled(entry: RankedRule) -> float:
-    """Return a rule's smallest margin as a multiple of the rule's scale; inf if it has none."""
+def _scaled_margin(entry: RankedRule) -> float:
+    """Return a rule's smallest margin as a multiple of the rule's scale; inf if the margin is unknown."""
     scale = RULE_WORDS[entry.rule].scale
     return math.inf if entry.lowest is None or scale is None else entry.lowest / scale
 
@@ -292,8 +292,8 @@ def _scaled(entry: RankedRule) -> float:
 def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tuple[Sensitivity, ...]:
     """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first.
 
-    A failed flight of unknown margin is given the smallest known margin, but at most zero.
-    The result is empty for fewer than `MIN_FLIGHTS_FOR_INDEX` flights with a margin.
+    A failed flight with an unknown margin gets the smallest known margin, but at most zero.  The result is empty for
+    fewer than `MIN_FLIGHTS_FOR_INDEX` flights with a margin.
 
     margins: margin of each flight, (n,), see `_read_margins`.
     """
@@ -305,7 +305,8 @@ def _rule_sensitivities(base: CampaignBase, store: Store, margins: Floats) -> tu
     sensitivities = []
     for name, all_values in _drawn_values(base, store).items():
         values = all_values[is_judged]
-        index, p_value = first_order_index(values, margin), chance_probability(values, margin)
+        index = first_order_index(values, margin)
+        p_value = chance_probability(values, margin)
         sensitivities.append(Sensitivity(name, index, rank_slope(values, margin), p_value))
     return tuple(sorted(sensitivities, key=lambda sensitivity: -sensitivity.index))
 
@@ -417,7 +418,7 @@ def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
 def closest_text(row: FlightRow) -> str:
     """Return the minimum margin of a flight with its rule and place as text; "" if no margin is known.
 
-    A failed rule comes first, also if it has no margin.
+    If a rule failed, the text is on this rule, even if it has no margin.
     """
     scaled_margins = [
         (fraction, rule, margin) for rule, margin in row.margins if (fraction := scale_margin(rule, margin)) is not None
@@ -449,8 +450,8 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     lines = [
         f"{_answer_text(summary)}: {_flyable_text(tally)}, {_share_text(tally)}"
         + ("; return not judged" if summary.unjudged_return else ""),
-        f"  at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
-        f"  two-sided at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
+        f"  P at least {estimate.lower:.4f}, at most {estimate.upper:.4f} (each at {confidence_text}; {goal.method})",
+        f"  two-sided interval of P at {confidence_text}: {estimate.interval.low:.4f} to {estimate.interval.high:.4f}",
         *_deciding_flights_lines(summary),
         *(f"  {line}" for line in flown_lines(summary.conditions)),
         *([f"  Not judged: return ({summary.unjudged_return})"] if summary.unjudged_return else []),
@@ -465,7 +466,9 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     ]
     if summary.lost:
         lost_text = ", ".join(map(str, summary.lost[:10]))
-        lines.append(f"  lost    {len(summary.lost)} could not be flown because their workers died: {lost_text}")
+        lines.append(
+            f"  lost    {len(summary.lost)} flights could not be flown, because their workers died: {lost_text}"
+        )
     return lines + deciding_lines(summary)
 
 
@@ -475,19 +478,23 @@ def undecided_lines(summary: CampaignSummary) -> list[str]:
     if not tally.undecided:
         return []
     flights_text = f"{tally.undecided} of {count_text(tally.flown, 'flight')}"
-    return [f"  Not judged: {flights_text}, the first of them because of {summary.undecided_text}"]
+    return [f"  Not judged: {flights_text}; reason of the first: {summary.undecided_text}"]
 
 
 def deciding_lines(summary: CampaignSummary) -> list[str]:
     """Return a line on the margin of each deciding rule and on what it depends on; [] if no margin is known."""
+    choice_text = (
+        "" if summary.by_rule else "no flight fails, and this margin is the smallest relative to its scatter; "
+    )
     return [
-        f"  decides {RULE_WORDS[entry.rule].title}: {_low_margin_text(summary, entry)}; {_drivers_text(entry)}"
+        f"  decides {RULE_WORDS[entry.rule].title}: {choice_text}{_low_margin_text(summary, entry)};"
+        f" {_drivers_text(entry)}"
         for entry in summary.deciding
     ]
 
 
 def _low_margin_text(summary: CampaignSummary, entry: DecidingRule) -> str:
-    """Describe the lowest margins of a deciding rule; if they are unknown, its failures."""
+    """Describe the lowest margins of a deciding rule, or its failures if the margins are unknown."""
     if entry.low_margin is not None:
         return f"5 % of the flights have a margin below {quantity_text(entry.low_margin, entry.unit)}"
     failed_count = next(failures.flights for failures in summary.by_rule if failures.rule == entry.rule)
@@ -500,8 +507,8 @@ def campaign_suite(name: str, summary: CampaignSummary) -> JunitSuite:
 
     name: mission of the campaign.
 
-    All cases fail if the target is missed or undecided, and all are skipped without a target.  If the target is
-    reached, all pass, and those of rules have their failures as text.
+    All cases are skipped without a target, and fail if the target is missed or undecided.  If the target is reached,
+    all cases pass, and the cases of rules contain their failures as text.
     """
     answer, lines = summary.estimate.answer, campaign_lines(summary)
     result: Literal["passed", "failure", "skipped"] = (
@@ -522,7 +529,7 @@ def _flyable_text(tally: Tally) -> str:
 
 
 def _share_text(tally: Tally) -> str:
-    """Return the fraction of flyable flights as text; with undecided flights both ends of its range."""
+    """Return the fraction of flyable flights as text; with undecided flights, its minimum and maximum."""
     if not tally.undecided:
         return f"P = {tally.share:.4f}"
     return f"P from {tally.share:.4f} to {(tally.flyable + tally.undecided) / tally.flown:.4f}"
@@ -538,7 +545,7 @@ def _answer_text(summary: CampaignSummary) -> str:
 def _drivers_text(entry: DecidingRule) -> str:
     """Return a clause on the quantities that explain most of the variance of a deciding rule's margin."""
     if not entry.sensitivities:
-        return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to say what it depends on"
+        return f"at least {MIN_FLIGHTS_FOR_INDEX} judged flights are needed to find what the margin depends on"
     if not entry.drivers:
         return "no dispersed quantity significantly explains the margin"
     return "of the margin's variance " + ", ".join(

@@ -16,7 +16,7 @@ _MAX_LISTED = 8
 
 
 def stored_value(value: Any, kind: str) -> Any:
-    """Return a value as SQLite reads it from a column.
+    """Convert a value to what SQLite will read back from a column.
 
     Numpy numbers become Python numbers, and NaN becomes None.
 
@@ -128,7 +128,7 @@ def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
-    """Sort rows into undamaged and damaged ones, by the checksum at the end of each row."""
+    """Separate undamaged from damaged rows by the checksum at the end of each row."""
     examination = Examination([], [])
     for *values, stored_checksum in rows:
         (examination.undamaged if stored_checksum == checksum(values) else examination.damaged).append(values[0])
@@ -146,7 +146,7 @@ def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[
 
 
 def _raise_if_locked(error: sqlite3.Error) -> None:
-    """Raise the error again if it means that another process has locked the file."""
+    """Re-raise an error if it means that another process has locked the file."""
     if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF in LOCKED_CODES:
         raise error
 

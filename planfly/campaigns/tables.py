@@ -98,7 +98,7 @@ def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
 
 
 def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
-    """Return True if two rows describe the same flight; the machine and its speed may differ."""
+    """Return True if two rows describe the same flight, ignoring the machine and its speed."""
     return first.draw.index == second.draw.index and not differing_columns(first, second)
 
 
@@ -183,13 +183,12 @@ class LockedTable:
         Raises StoreError for a table of another campaign, or with more flights than requested.
         """
         self._lock_file()
-        execute = self._connection.execute
-        tables = {name for (name,) in execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        tables = {name for (name,) in self._connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if tables:
             stored_settings = _read_settings(self._connection) if "campaign" in tables else {}
             self._check_same_campaign(stored_settings, settings)
             self._repair_file(stored_settings)
-        execute = self._connection.execute
+        execute = self._connection.execute  # a repair opens another connection
         for statement in self._create_statements():
             execute(statement)
         # Refuse the request before its settings are written, because they would stay in the file.
@@ -237,12 +236,12 @@ class LockedTable:
         if stored_settings.get("made_of") != self.made_of:
             inputs = [json.loads(json.dumps(request.get("inputs", {}))) for request in (stored_request, settings)]
             differences = describe_differences(*inputs) or "planfly's code differs"
-            raise StoreError(f"{self.path}: belongs to another campaign: {differences}", file=self.path)
+            raise StoreError(f"{self.path}: contains a campaign with other settings: {differences}", file=self.path)
         for name in self._kind.fixed:
             if stored_request[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the stored flights were requested"
-                    f" with {stored_request[name]}",
+                    f"{self.path}: {name} {settings[name]}: expected {stored_request[name]},"
+                    " as in the campaign that is resumed",
                     file=self.path,
                 )
 
@@ -268,7 +267,7 @@ class LockedTable:
         report_line(f"{self.path}: {examination.text()}")
 
     def _last_number(self) -> int:
-        """Return the largest flight number that can be read from either end of the table, or -1 if none."""
+        """Return the largest flight number that can be read from either end of the table; -1 without any."""
         last_number = -1
         for order in ("", " DESC"):
             with suppress(sqlite3.Error, UnicodeDecodeError):
@@ -309,7 +308,7 @@ class LockedTable:
             self._connection.execute(f"INSERT INTO flights VALUES ({placeholders})", [*row, checksum(row)])
 
     def delete_later_flights(self, first_number: int) -> None:
-        """Delete the flights with this number or a larger one, because an earlier flight decided the campaign.
+        """Delete the flights from this number on, because an earlier flight decided the campaign.
 
         Raises OSError for a table that was removed.
         """
@@ -464,7 +463,7 @@ class Store(LockedTable):
         ]
 
     def failures(self) -> list[tuple[tuple[str, Place], ...]]:
-        """Return rule and place of the failed findings of each flight, in order; () for an undecided flight."""
+        """Return rule and place of each flight's failed findings, in order; () for an undecided flight."""
         return [
             () if outcome == "undecided" else parse_failed_findings(text)
             for outcome, text in zip(self.texts("outcome"), self.texts("failed"), strict=True)
@@ -482,13 +481,13 @@ class Store(LockedTable):
         return [value for (value,) in self._connection.execute(query, (max_count,))]
 
     def has_track(self) -> list[bool]:
-        """Return a list with True for each flight whose path data are stored, in the order of flights."""
+        """Return True for each flight whose path data are stored, False for the others, in order."""
         return [
             bool(size) for (size,) in self._connection.execute("SELECT LENGTH(clearance) FROM flights ORDER BY flight")
         ]
 
     def worst_flights(self, max_count: int) -> list[FlightRow]:
-        """Return the worst flights: lost, then failed, then undecided flights, then the closest calls by margin."""
+        """Return the worst flights: lost, then failed, then undecided flights, then those with small margins."""
         ranks = "WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 WHEN 'undecided' THEN 2 ELSE 3"
         order = f"CASE outcome {ranks} END, closeness IS NULL, closeness"
         rows = self._connection.execute(f"{_SELECT_ROWS} ORDER BY {order}, flight LIMIT ?", (max_count,))
@@ -506,7 +505,10 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
-    """Return the name of a column.  Raises KeyError for an unknown name, which must not get into a query."""
+    """Check and return the name of a column.
+
+    Raises KeyError for an unknown name, which must not get into a query.
+    """
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
@@ -652,6 +654,20 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
                 )
                 column[start : start + len(values)] = shared_values
     return columns
+
+
+def check_rows(path: Path) -> None:
+    """Raise StoreError if rows of a campaign's table are damaged, or if another program changed them."""
+    with _open_to_read(path) as connection:
+        (last_number,) = connection.execute("SELECT COALESCE(MAX(flight), -1) FROM flights").fetchone()
+        examination = examine_table(connection, tuple(CAMPAIGN_KIND.columns), last_number + 1, last_number + 1)
+    if damaged := examination.damaged:
+        numbers_text = ", ".join(map(str, damaged[:10])) + (", ..." if len(damaged) > 10 else "")
+        raise StoreError(
+            f"{path}: {count_text(len(damaged), 'row')} damaged or changed by another program (flights {numbers_text});"
+            " `planfly campaign --resume` flies these flights again",
+            file=path,
+        )
 
 
 def count_flights(path: Path) -> int:

@@ -29,14 +29,14 @@ _MAX_LABELS = 26
 
 
 def draw_window(result: WindowResult) -> Figure:
-    """Draw the departures of a window: probability with its interval and deciding rule, mean wind, and least energy."""
+    """Draw each departure's probability with interval and deciding rule, its mean wind and least energy."""
     with clean_style():
         figure = new_figure(6.4)
         probability = figure.add_axes((0.08, 0.54, 0.89, 0.37))
         wind = figure.add_axes((0.08, 0.30, 0.89, 0.17), sharex=probability)
         energy = figure.add_axes((0.08, 0.09, 0.89, 0.15), sharex=probability)
         departures = result.departures
-        times = [_number_of(departure.time) for departure in departures]
+        times = [_to_matplotlib_days(departure.time) for departure in departures]
         width = 0.8 * min((after - before for before, after in itertools.pairwise(times)), default=1.0 / 24.0)
         _draw_probability(probability, result, times, width)
         for axes in (probability, wind, energy):
@@ -75,8 +75,8 @@ def draw_window(result: WindowResult) -> Figure:
     return figure
 
 
-def _number_of(time: datetime) -> float:
-    """Return a time as matplotlib's number of days since 1970."""
+def _to_matplotlib_days(time: datetime) -> float:
+    """Convert a time to matplotlib's number of days since 1970."""
     return time.timestamp() / 86_400.0
 
 
@@ -121,7 +121,7 @@ def _draw_probability(axes: Axes, result: WindowResult, times: list[float], widt
             axes.text(time, 0.03, text, rotation=90, ha="right", va="bottom", color=_INK_COLOUR, fontsize=7.5)
     axes.axhline(result.goal.probability, color=_INK_COLOUR, linewidth=1.0, linestyle="--")
     if result.goal.asked is not None:
-        place = (_number_of(result.goal.asked), 1.03)
+        place = (_to_matplotlib_days(result.goal.asked), 1.03)
         axes.annotate("asked", place, color=_WIND_COLOUR, ha="center", va="bottom", fontsize=8, fontweight="bold")
     axes.set_ylim(0.0, 1.15)
     axes.set_yticks([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])

@@ -11,7 +11,7 @@ TIME_FORMAT = "%Y-%m-%d %H:%M"
 
 
 def answer_line(result: WindowResult) -> str:
-    """Return the answer in one line: the asked departure, or the windows."""
+    """Return the answer in one line: the result for the requested departure, or the windows."""
     goal, asked = result.goal, result.asked
     windows = ", ".join(_window_text(*window) for window in result.windows)
     open_text = f"open for take-off: {windows} UTC" if windows else "no take-off time is open"
@@ -31,7 +31,7 @@ def answer_line(result: WindowResult) -> str:
 
 
 def _window_text(first: datetime, last: datetime) -> str:
-    """Return a window as text; the last time without its date if it is the same day."""
+    """Return a window as text; the date is not repeated if the window ends on the same day."""
     if first == last:
         return f"{first:{TIME_FORMAT}}"
     return f"{first:{TIME_FORMAT}} to {last:{'%H:%M' if first.date() == last.date() else TIME_FORMAT}}"
@@ -59,7 +59,7 @@ DEPARTURE_COLUMNS = ("flyable", "95 % interval", "wind at the start", "least ene
 
 
 def departure_cells(departure: Departure) -> tuple[str, ...]:
-    """Return the cells of a departure below `DEPARTURE_COLUMNS`; a single cell with the reason if it was not flown."""
+    """Return a departure's cells for `DEPARTURE_COLUMNS`; a single cell with the reason if not flown."""
     if not departure.rows:
         return (f"not judged: {departure.not_judged}",)
     speed, from_deg = departure.wind
@@ -74,7 +74,7 @@ def departure_cells(departure: Departure) -> tuple[str, ...]:
 
 
 def rules_text(departure: Departure) -> str:
-    """Return the titles of the rules that fail most flights of a departure; "" without failures."""
+    """Return the titles of the rules that fail the most flights of a departure; "" without failures."""
     return ", ".join(RULE_WORDS[rule].title.lower() for rule in departure.rules)
 
 

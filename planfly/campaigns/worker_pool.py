@@ -122,5 +122,5 @@ class FlightRate:
         return True
 
     def flights_per_second(self, flights: int) -> float:
-        """Return the flights per second since the start; flights: number of flights, with those stored before."""
+        """Return the flights per second since the start; `flights` includes the flights stored before."""
         return (flights - self._stored_count) / max(time.monotonic() - self._start_time, 1e-3)

@@ -70,7 +70,9 @@ def add_aircraft_parser(command_line: LineParser) -> None:
             dest="logs",
             metavar="LOG",
             nargs="+",
-            help=".BIN or .tlog of ArduPlane, .ulg of PX4, or a table of columns; needs planfly[identification]",
+            help="identify the aircraft from these logs: .BIN or .tlog of ArduPlane, .ulg of PX4, or a"
+            " table of columns;"
+            " requires planfly[identification]",
         ),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
@@ -83,19 +85,21 @@ def add_aircraft_parser(command_line: LineParser) -> None:
         complete_aircraft,
     )
     with_completer(
-        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log to predict"),
+        log_group.add_argument(
+            "--check", metavar="LOG", help="with --identify: another log, on which the identified aircraft is tested"
+        ),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     log_group.add_argument(
         "--until",
         metavar="S",
         type=number_parser("until"),
-        help="with --identify: use only rows before this time of the log; 'planfly predict' judges the rest",
+        help="with --identify: use only the log before this time, s; 'planfly predict' can then be tested on the rest",
     )
     add_result_options(
         parser,
-        "folder for the pictures (default: runs/aircraft-NAME; an existing one is replaced), "
-        "or with --identify the aircraft's folder",
+        "folder for the pictures (default: runs/aircraft-NAME; an existing one is replaced); "
+        "with --identify, the folder to make for the aircraft",
     )
 
 
@@ -108,21 +112,24 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
         "area": ("M2", "wing area, m2 (default: the area that carries the mass at the stall speed)"),
         "cruise": ("M/S", "cruise airspeed"),
         "stall": ("M/S", "minimum airspeed of level flight"),
-        "top": ("M/S", "airspeed of fastest level flight (default: 1.65 times the cruise's)"),
-        "bank": ("DEG", "steepest bank in turns (default: 35)"),
-        "climb": ("DEG", "steepest climb at cruise (default: 12, or the climb that fits the top speed)"),
-        "motor": ("KV", "rpm per volt"),
+        "top": ("M/S", "airspeed of fastest level flight (default: 1.65 times the cruise airspeed)"),
+        "bank": ("DEG", "steepest bank in turns, degrees (default: 35)"),
+        "climb": (
+            "DEG",
+            "steepest climb at the cruise airspeed, degrees (default: 12, or the climb that fits the top speed)",
+        ),
+        "motor": ("KV", "motor constant, rpm per volt"),
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
     for name, (unit, text) in numbers.items():
         group.add_argument(f"--{name}", metavar=unit, type=float, help=text)
     group.add_argument("--battery", metavar="V,AH", help="battery, such as 14.8V,5Ah")
-    group.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
+    group.add_argument("--prop", metavar="DxP", help="diameter and pitch of the propeller, inches, such as 12x6")
     group.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
     group.add_argument(
         "--params",
         metavar="FILE",
-        help="a parameter file of ArduPlane or PX4, from which facts about the aircraft are taken",
+        help="parameter file of ArduPlane or PX4; the airspeeds and limits that it states are used",
     )
 
 
@@ -132,14 +139,14 @@ def aircraft(args: argparse.Namespace) -> int:
         return _identify(args)
     for name in ("base", "check", "until"):
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "only with `logs` LOG", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "allowed only with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
     for name in _DATA_SHEET_KEYWORDS:
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "only with `folder` FOLDER", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "allowed only with `folder` FOLDER", shown="")
     if args.source is not None:
-        allowed = "only with `folder` FOLDER, the folder to make"
+        allowed = "allowed only with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
         embedded_aircraft = list(planfly.aircraft().values())
@@ -169,11 +176,11 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 def _make_folder(args: argparse.Namespace) -> int:
     """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
     if args.name is not None:
-        message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
+        message = f"{args.name}: cannot be combined with --new FOLDER; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
     for field, is_given, reason in (
         ("--out", args.out is not None, "--new names the folder to make"),
-        ("--motor-braking", args.motor_braking, "it is chosen for each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
     ):
         if is_given:
             raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
@@ -211,7 +218,7 @@ def _identify(args: argparse.Namespace) -> int:
     """Identify an aircraft from logs, and make its folder."""
     for name in ("mass", "span", "out"):
         if getattr(args, name) is None:
-            reason = "the folder to make" if name == "out" else f"the {name} of the aircraft as flown"
+            reason = "the folder to make" if name == "out" else f"the {name} of the aircraft in these flights"
             raise PlanflyError(f"--identify needs --{name}, {reason}", field=f"--{name}")
     extra_names = [
         name
@@ -224,7 +231,7 @@ def _identify(args: argparse.Namespace) -> int:
     for field, is_given, reason_text in (
         ("--params", args.params is not None, "the parameters come from the logs"),
         ("--from", args.source is not None, "--base names the aircraft to start from"),
-        ("--motor-braking", args.motor_braking, "it is chosen for each flight"),
+        ("--motor-braking", args.motor_braking, "it is an option of each flight"),
     ):
         if is_given:
             raise PlanflyError(f"--identify cannot be combined with {field}: {reason_text}", field=field)
@@ -303,7 +310,8 @@ def _print_data_sheet_performance(aircraft: "Aircraft") -> None:
         f" {envelope.level_speeds(500.0)[1]:.1f}; guidance flies at up to {aircraft.airspeed_max:g} m/s"
     )
     if uncertainty is not None:
-        climb_sd, descent_sd = math.degrees(uncertainty.climb_sd), math.degrees(uncertainty.descent_sd)
+        climb_sd = math.degrees(uncertainty.climb_sd)
+        descent_sd = math.degrees(uncertainty.descent_sd)
         print(
             f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
             f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
@@ -356,7 +364,8 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         f" {math.degrees(aircraft.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
-        climb_sd, descent_sd = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
+        climb_sd = math.degrees(envelope.climb_sd)
+        descent_sd = math.degrees(envelope.descent_sd)
         print(
             f"  accuracy from {envelope.source}: climb ± {climb_sd:.1f} deg, descent ± {descent_sd:.1f}, fastest level"
             f" flight ± {envelope.fastest_sd:.1f} m/s, power within a factor of {math.exp(envelope.power_sd):.2f}"
@@ -435,6 +444,7 @@ def _angle_pair_text(climb: float, descent: float) -> str:
     """Return two angles (rad) as text in degrees, such as "5.2 / 8.0"; "-" replaces NaN."""
 
     def angle_text(angle: float) -> str:
+        """Return an angle (rad) in degrees as text; "-" for NaN."""
         return "-" if math.isnan(angle) else f"{math.degrees(angle):.1f}"
 
     return f"{angle_text(climb)} / {angle_text(descent)}"

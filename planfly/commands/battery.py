@@ -28,14 +28,15 @@ def add_battery_parser(command_line: LineParser) -> None:
     group = parser.add_group("the battery")
     for name, unit, text in (
         ("probability", "P", "probability with which the reserve is kept (default: 0.95)"),
-        ("reserve", "F", "fraction of the battery that is to be left (default: 0.2)"),
+        ("reserve", "F", "fraction of the battery that must be left (default: 0.2)"),
         (
             "specific_energy",
             "WH/KG",
-            "energy per battery mass, with which the mass changes (default: the mass is kept)",
+            "energy per battery mass: the aircraft becomes heavier with a larger battery (default: its"
+            " mass stays the same)",
         ),
-        ("every", "S", "time between two returns, s (default: 10)"),
-        ("confidence", "C", "confidence of the capacity's interval (default: 0.95)"),
+        ("every", "S", "time between the starts of two returns, s (default: 10)"),
+        ("confidence", "C", "confidence level of the interval of the capacity (default: 0.95)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
@@ -44,7 +45,7 @@ def add_battery_parser(command_line: LineParser) -> None:
         type=number_parser("sample_flights"),
         help="number of flights, 20 to 100,000 (default: 100)",
     )
-    add_result_options(parser, "folder for the page, report.html, and the chart, battery.png (default: none)")
+    add_result_options(parser, "folder for the page (report.html) and the chart (battery.png) (default: no files)")
 
 
 def battery(args: argparse.Namespace) -> int:
@@ -68,7 +69,7 @@ def battery(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly battery`` for --json."""
     from planfly.campaigns.battery_text import answer_line
     from planfly.terminal.battery_answers import BatteryAnswer, DecisionEntry, finite
 
@@ -92,9 +93,11 @@ def _json_answer(target: str, result: "BatteryResult", code: int) -> "BatteryAns
         kept_by_own_battery=result.kept,
         decisions=[
             DecisionEntry(
-                flights=one.flights, returns_from_leg=None if one.leg < 0 else one.leg, start_s=finite(one.time)
+                flights=decision.flights,
+                returns_from_leg=None if decision.leg < 0 else decision.leg,
+                start_s=finite(decision.time),
             )
-            for one in result.decisions
+            for decision in result.decisions
         ],
         leg_energies_wh=[round(float(energy), 3) for energy in result.leg_energies],
         conditions=result.base.conditions(),

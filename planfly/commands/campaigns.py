@@ -50,13 +50,13 @@ def add_campaign_parser(command_line: LineParser) -> None:
         "--prove",
         metavar="P",
         type=number_parser("prove"),
-        help="fly until it is shown whether the probability is at least P",
+        help="fly until the flights show whether the probability of a flyable flight is at least P",
     )
     goal.add_argument(
         "--at-least",
         metavar="P",
         type=number_parser("at_least"),
-        help="decide after all flights whether the probability is at least P",
+        help="fly a fixed number of flights, and then decide whether the probability of a flyable flight is at least P",
     )
     parser.add_argument(
         "--flights",
@@ -69,10 +69,13 @@ def add_campaign_parser(command_line: LineParser) -> None:
         "--confidence",
         metavar="C",
         type=number_parser("confidence"),
-        help="confidence of each bound (default: 0.95, or with --resume the previous value)",
+        help="confidence level of each bound (default: 0.95, or with --resume the previous value)",
     )
     parser.add_argument(
-        "--refly", metavar="K", type=number_parser("index"), help="repeat flight K of the campaign in --out, with a log"
+        "--refly",
+        metavar="K",
+        type=number_parser("index"),
+        help="fly flight K of the campaign in --out again, and write its log",
     )
 
 
@@ -90,14 +93,14 @@ def add_winds_parser(command_line: LineParser) -> None:
         metavar="P",
         type=number_parser("prove"),
         default=0.99,
-        help="probability of success to prove (default: 0.99)",
+        help="probability of a flyable flight that is to be proved (default: 0.99)",
     )
     parser.add_argument(
         "--confidence",
         metavar="C",
         type=number_parser("confidence"),
         default=0.95,
-        help="confidence of each interval (default: 0.95)",
+        help="confidence level of each interval (default: 0.95)",
     )
     parser.add_argument(
         "--directions",
@@ -144,17 +147,24 @@ def add_flights_options(parser: CommandParser) -> None:
     add_aircraft_and_wind_options(parser)
     add_steering_options(parser)
     with_completer(
-        parser.add_argument("--spread", metavar="FILE", help="dispersions, as TOML (default: planfly's own)"),
+        parser.add_argument(
+            "--spread",
+            metavar="FILE",
+            help="TOML file of dispersions, which states how flights vary (default: planfly's own)",
+        ),
         file_completer("toml"),
     )
     parser.add_argument(
-        "--seed", metavar="N", type=number_parser("seed"), help="seed of plan and draws (default: the scenario's, or 1)"
+        "--seed",
+        metavar="N",
+        type=number_parser("seed"),
+        help="seed of the plan and of the random draws (default: the scenario's, or 1)",
     )
     parser.add_argument(
         "--workers",
         metavar="N",
         type=number_parser("workers"),
-        help="processes on this machine (default: one per core)",
+        help="number of processes on this machine (default: one per core)",
     )
     parser.add_argument(
         "--scheduler",

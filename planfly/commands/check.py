@@ -113,7 +113,7 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     for name in _SINGLE_AUTOPILOT_OPTIONS:
         if (value := getattr(args, name)) not in (None, False):
             raise ArgumentError.of_argument(
-                name, value, "cannot be combined with --for, which judges by several autopilots"
+                name, value, "cannot be combined with --for, which flies with several autopilots"
             )
     flights = call_api(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: flight.verdict for name, flight in flights.items()}
@@ -125,7 +125,7 @@ def _check_for_each_autopilot(args: argparse.Namespace) -> int:
 
 
 def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly check`` with several autopilots for --json."""
     from planfly.terminal.verdict_answers import VerdictsDocument
 
     documents = {name: verdict.document() for name, verdict in verdicts.items()}
@@ -133,7 +133,7 @@ def _answer_for_each_autopilot(verdicts: Mapping[str, "Verdict"], mission: str, 
 
 
 def _verdict_answer(verdict: "Verdict", returns: "ReturnSummary", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly check`` for --json."""
     from planfly.terminal.verdict_answers import CheckAnswer, count_returns
 
     document = verdict.document()

@@ -30,7 +30,7 @@ def add_compare_parser(command_line: LineParser) -> None:
     add_log_argument(parser, "first", "A", "a flight log (.mcap), or the folder of a campaign")
     add_log_argument(parser, "second", "B", "another")
     parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
-    add_result_options(parser, "folder for pictures and compare.html (default: only the table)")
+    add_result_options(parser, "folder for pictures and compare.html (default: no files, only the table)")
 
 
 def compare(args: argparse.Namespace) -> int:
@@ -68,7 +68,9 @@ def _compare_campaigns(args: argparse.Namespace) -> int:
     """Print the comparison of two campaigns."""
     for option, value in (("--out", args.out), ("--svg", args.svg)):
         if value:
-            raise PlanflyError(f"{option}: only with two flight logs, not with campaigns", field=option, value=value)
+            raise PlanflyError(
+                f"{option}: allowed only with two flight logs, not with campaigns", field=option, value=value
+            )
     comparison = planfly.compare_campaigns(args.first, args.second)
     from planfly.campaigns.compare_campaigns import comparison_lines
 
@@ -78,7 +80,7 @@ def _compare_campaigns(args: argparse.Namespace) -> int:
 
 
 def _campaigns_answer(comparison: "CampaignComparison") -> object:
-    """Return the answer of the command on two campaigns for --json."""
+    """Return the answer of ``planfly compare`` on two campaigns for --json."""
     from planfly.terminal.answers import ChangedRule, CompareCampaignsAnswer, ComparedCampaignEntry
 
     return CompareCampaignsAnswer(
@@ -107,10 +109,11 @@ def _campaigns_answer(comparison: "CampaignComparison") -> object:
 
 
 def _json_answer(comparison: "Comparison", files: list[Path], code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly compare`` for --json."""
     from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:
+        """Return a finite number unchanged, and None for NaN and infinity."""
         return value if math.isfinite(value) else None
 
     return CompareAnswer(

@@ -43,7 +43,9 @@ def add_export_parser(command_line: LineParser) -> None:
     )
     with_completer(
         parser.add_argument(
-            "--scenario", metavar="SCENARIO", help="scenario of the mission, as for planfly check: TOML file or name"
+            "--scenario",
+            metavar="SCENARIO",
+            help="scenario of the mission: a TOML file, or the name of a built-in scenario",
         ),
         complete_scenario,
     )
@@ -58,7 +60,7 @@ def add_export_parser(command_line: LineParser) -> None:
     aircraft_option = group.add_argument(
         "--aircraft",
         metavar="AIRCRAFT",
-        help="aircraft of the mission, whose cruise speed a .plan states and whose parameters a .parm completes"
+        help="aircraft of the mission: a .plan contains its cruise speed, and a .parm its parameters"
         " (default: aerosonde)",
     )
     with_completer(aircraft_option, complete_aircraft)
@@ -78,6 +80,7 @@ def export(args: argparse.Namespace) -> int:
     code = INCOMPLETE if result.loss else FLYABLE
 
     def json_answer() -> object:
+        """Return the answer of ``planfly export`` for --json."""
         from planfly.terminal.answers import ExportAnswer, ExportedFile
 
         pairs = zip(result.files, result.contents, strict=True)

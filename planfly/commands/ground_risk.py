@@ -37,19 +37,23 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--population-unit",
         choices=CHOICES["population_unit"],
-        help="unit of its numbers: people per cell (default) or per km2",
+        help="unit of the numbers in --population: people per cell (default) or per km2",
     )
     group.add_argument(
-        "--controlled", action="store_true", help="controlled ground area: only involved people are below"
+        "--controlled",
+        action="store_true",
+        help="the ground below is a controlled area: only people who are involved in the flight are there",
     )
     for name, unit, text in (
         ("max_speed", "M/S", "highest speed of the aircraft (default: the highest airspeed of its model)"),
-        ("probability", "P", "fraction of the flights that the flight geography holds (default: 0.95)"),
-        ("every", "S", "time between two returns, s (default: 10)"),
+        ("probability", "P", "fraction of the flights that stay inside the flight geography (default: 0.95)"),
+        ("every", "S", "time between the starts of two returns, s (default: 10)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
-        "--glide", action="store_true", help="the ground risk buffer also holds glides after an engine failure"
+        "--glide",
+        action="store_true",
+        help="make the ground risk buffer wide enough for glides after an engine failure, too",
     )
     group.add_argument(
         "--flights",
@@ -83,7 +87,7 @@ def ground_risk(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "GroundRiskResult", code: int) -> "GroundRiskAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly ground-risk`` for --json."""
     from planfly.campaigns.ground_risk_text import answer_line
     from planfly.terminal.ground_risk_answers import GroundRiskAnswer, PopulationEntry
 

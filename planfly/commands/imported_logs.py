@@ -50,8 +50,9 @@ def add_import_log_parser(command_line: LineParser) -> None:
             dest="files",
             metavar="FILE",
             nargs="+",
-            help="write a table of columns for these CSV, MAT, Parquet or HDF5 files to LOG, guessed from names and"
-            " values, for you to check; needs the extra planfly[data-logs]",
+            help="guess a table of columns for these CSV, MAT, Parquet or HDF5 files from names and values,"
+            " and write it"
+            " to LOG for you to check; requires planfly[data-logs]",
         ),
         file_completer("csv", "mat", "parquet", "h5", "hdf5"),
     )
@@ -93,7 +94,7 @@ def _guess_columns(args: argparse.Namespace) -> int:
 
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly import`` for --json."""
     from planfly.terminal.answers import ImportAnswer
 
     return ImportAnswer(
@@ -145,7 +146,7 @@ def refly(args: argparse.Namespace) -> int:
 
 
 def _refly_answer(result: "Reflown", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly refly`` for --json."""
     from planfly.terminal.answers import ReflyAnswer
 
     return ReflyAnswer(exit_code=code, lines=list(result.lines), files=[str(file) for file in result.files])

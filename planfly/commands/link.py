@@ -36,14 +36,14 @@ def add_link_parser(command_line: LineParser) -> None:
     group = parser.add_group("the link (each replaces an entry of the scenario's [link])")
     for name, unit, text in (
         ("frequency", "MHZ", "frequency, MHz"),
-        ("power", "DBM", "output of the transmitter, dBm"),
+        ("power", "DBM", "output power of the transmitter, dBm"),
         ("sensitivity", "DBM", "power at which the receiver still works, dBm"),
         ("antenna", "M", "height of the station's antenna above ground, m (default: 3)"),
         ("station_gain", "DBI", "gain of the station's antenna, dBi (default: 0)"),
         ("aircraft_gain", "DBI", "gain of the aircraft's antenna, dBi (default: 0)"),
         ("cable_loss", "DB", "losses of cables and connectors at both ends, dB (default: 0)"),
-        ("fade_margin", "DB", "power that the link has to keep above the sensitivity, dB (default: 10)"),
-        ("max_outage", "S", "longest accepted time below the fade margin, s (default: 0)"),
+        ("fade_margin", "DB", "required margin of the received power above the sensitivity, dB (default: 10)"),
+        ("max_outage", "S", "longest time below the fade margin that is accepted, s (default: 0)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(
@@ -55,8 +55,8 @@ def add_link_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--use",
         choices=CHOICES["use"],
-        help="the ground station's link or the remote control, whose loss the autopilot handles differently (default:"
-        " telemetry)",
+        help="link to the ground station (telemetry) or of the remote control (control): the autopilot reacts"
+        " differently to their loss (default: telemetry)",
     )
     add_imported_log_options(parser)
     add_world_options(parser)
@@ -90,7 +90,7 @@ def link(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly link`` for --json."""
     from logs.verdict.conditions import judging_conditions
     from logs.verdict.returns.returns_text import headline
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry

@@ -29,7 +29,7 @@ def add_new_parser(command_line: LineParser) -> None:
             metavar="LAT,LON",
             type=parse_position,
             required=True,
-            help="latitude and longitude, degrees",
+            help=f"position of the {keyword}: latitude and longitude, degrees",
         )
     route_group.add_argument(
         "--height",
@@ -74,6 +74,7 @@ def new(args: argparse.Namespace) -> int:
     print(f"next      planfly run {shlex.quote(str(file))}")
 
     def json_answer() -> object:
+        """Return the answer of ``planfly new`` for --json."""
         from planfly.terminal.answers import NewAnswer
 
         return NewAnswer(exit_code=code, file=str(file), safe=plan.safe, waypoints=len(plan.waypoints))

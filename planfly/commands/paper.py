@@ -55,6 +55,7 @@ def paper(args: argparse.Namespace) -> int:
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
 
     def json_answer() -> object:
+        """Return the answer of ``planfly paper`` for --json."""
         from planfly.terminal.answers import PaperAnswer, PaperRow
 
         return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in tables.rows])

@@ -50,7 +50,7 @@ def add_plan_parser(command_line: LineParser) -> None:
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the planner (default: the scenario's, or 1)"
     )
     planning_group.add_argument(
-        "--algorithm", metavar="A", help="the planner's algorithm, in place of the scenario's (see below)"
+        "--algorithm", metavar="A", help="algorithm of the planner instead of the scenario's (see below)"
     )
     planning_group.add_argument(
         "--budget",
@@ -64,10 +64,9 @@ def add_plan_parser(command_line: LineParser) -> None:
         metavar="N",
         type=number_parser("front"),
         help=(
-            "plan up to N alternatives (2 to 100); none is better than another in length, exposure "
-            "to radars, height above ground and energy at once (time for energy with [planner] "
-            'objective = "time"); --out is then a folder of plan-1.json ..., front.csv, front.json '
-            "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
+            "plan up to N alternatives (2 to 100) that trade length, exposure to radars, height above ground and "
+            "energy or time against each other; --out is then a folder (default: runs/<name>-seed<N>-front; an "
+            "existing one is replaced)"
         ),
     )
     add_flights_option(planning_group)
@@ -77,7 +76,10 @@ def add_plan_parser(command_line: LineParser) -> None:
         file_completer("json"),
     )
     replanning_group.add_argument(
-        "--at-leg", metavar="K", type=number_parser("at_leg"), help="keep the legs before leg K, which have been flown"
+        "--at-leg",
+        metavar="K",
+        type=number_parser("at_leg"),
+        help="number of the next leg: the legs before leg K have been flown, and are kept",
     )
     replanning_group.add_argument(
         "--add-threat",
@@ -102,7 +104,7 @@ def _algorithms_help() -> str:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """Plan a path, and write the plan file; return 4 if the plan is not safe, or does not hold in its flights."""
+    """Plan a path, and write the plan file; return 4 if the plan is not safe, or fails in its flights."""
     _check_replanning(args)
     check_flights_option(args, "front")
     if args.front is not None:
@@ -140,10 +142,10 @@ def _plan_front(args: argparse.Namespace) -> int:
 
     for name in ("old", "algorithm"):
         if (value := getattr(args, name)) is not None:
-            raise ScenarioError.of_argument(name, value, "not with `front` N, which uses a search of its own")
+            raise ScenarioError.of_argument(name, value, "cannot be combined with `front` N, which has its own search")
     evaluations, seconds = args.budget or (None, None)
     if evaluations is not None:
-        allowed = "with `front` N: expected a number of seconds, as in 10s"
+        allowed = "with `front` N the budget is a number of seconds, such as 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
     with _stop_on_interrupt() as should_stop:
@@ -168,7 +170,7 @@ def _plan_front(args: argparse.Namespace) -> int:
 def _json_answer(
     plan: "Plan", target: "Path", code: int, risks: tuple[str, ...], dispersed: "DispersedFlights | None"
 ) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly plan`` for --json."""
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
 
@@ -197,6 +199,7 @@ def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
     is_interrupted = False
 
     def handle_signal(_signal: int, _frame: FrameType | None) -> None:
+        """Note the first Ctrl-C; interrupt the command at the second."""
         nonlocal is_interrupted
         if is_interrupted:
             interrupt(signal.SIGINT)
@@ -214,10 +217,10 @@ def _check_replanning(args: argparse.Namespace) -> None:
     if args.old is None:
         for name in ("at_leg", "threats"):
             if (value := getattr(args, name)) is not None:
-                allowed = "only with `old` PLAN.json, the plan that is being flown"
+                allowed = "allowed only with `old` PLAN.json, the plan that is being flown"
                 raise ScenarioError.of_argument(name, value, allowed, shown="")
     elif args.at_leg is None:
-        allowed = "`at_leg` K is missing: the leg that is about to be flown"
+        allowed = "`at_leg` K is missing; it names the leg that is flown next"
         raise ScenarioError.of_argument("old", args.old, allowed, shown="")
 
 
@@ -239,10 +242,12 @@ def _print_plan(plan: "Plan", risks: tuple[str, ...], *, is_dispersed: bool) -> 
     conditions = conditions_of_plan(plan)
     print("\n".join([*condition_lines(conditions), autopilot_line(conditions, is_flown=False)]))
     if plan.feasible and not is_dispersed:
-        print("Judged: in the stated wind over the terrain of the map; dispersions are not included (--flights 40)")
+        print("Judged: in the scenario's wind and over its terrain, without dispersions (--flights 40 flies with them)")
     if plan.ended != "completed":
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
-        print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")
+        print(
+            f"  note    the search ended {reason}, after {plan.evaluations:,} evaluations; this is the best plan so far"
+        )
     if plan.flown_legs:
         print(
             f"  note    legs 0..{plan.flown_legs - 1} are already flown and unchanged;"

@@ -37,8 +37,8 @@ def add_predict_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--by",
         choices=("controls", "mission"),
-        help="follow the logged controls over windows of 2 s, or fly the mission with the simulated autopilot in the"
-        " logged wind (default: controls, if the log has them)",
+        help="controls follows the logged controls over windows of 2 s; mission flies the mission with the simulated"
+        " autopilot in the logged wind (default: controls, if the log has them)",
     )
     group.add_argument(
         "--from",
@@ -65,10 +65,11 @@ def predict(args: argparse.Namespace) -> int:
 
 
 def _prediction_answer(result: "Predicted") -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly predict`` for --json."""
     from planfly.terminal.answers import PredictAnswer, PredictedQuantity
 
     def none_if_nan(value: float) -> float | None:
+        """Return None for NaN, and any other number unchanged."""
         return None if math.isnan(value) else value
 
     quantities = [

@@ -39,7 +39,7 @@ def recover(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: Path | None, rows: int | None, end_time: float | None) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly recover`` for --json."""
     from planfly.terminal.answers import RecoverAnswer
 
     code = FLYABLE if target is None else INCOMPLETE

@@ -65,7 +65,7 @@ def report(args: argparse.Namespace) -> int:
 
 
 def _json_answer(files: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly report`` for --json."""
     from planfly.terminal.answers import ReportAnswer
 
     document = None if verdict is None else verdict.document()

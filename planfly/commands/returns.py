@@ -46,7 +46,7 @@ def add_returns_parser(command_line: LineParser) -> None:
         metavar="S",
         type=number_parser("every"),
         default=1.0,
-        help="seconds between two returns (default: 1)",
+        help="time between the starts of two returns, s (default: 1)",
     )
     group.add_argument(
         "--suggest",
@@ -56,9 +56,8 @@ def add_returns_parser(command_line: LineParser) -> None:
     )
     add_sitl_option(
         group,
-        "also fly the worst returns with ArduPlane itself, and say whether it agrees with the"
-        " simulation: path of its program,"
-        " built for software in the loop (extra planfly[live])",
+        "also fly the worst returns with ArduPlane itself, and compare them with the simulated returns: PATH is its"
+        " program, built for software in the loop (requires planfly[live])",
     )
     group.add_argument(
         "--points",
@@ -120,7 +119,7 @@ def returns(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly returns`` for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,

@@ -63,7 +63,7 @@ def add_run_parser(command_line: LineParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report, with up to N more rounds for ``--refine N``.
 
-    Returns the code of the verdict, or 4 if the plan does not hold in the flights of ``--flights N``.
+    Returns the exit code of the verdict, or 4 if the plan fails in the flights of ``--flights N``.
     """
     check_flights_option(args, "sitl")
     result = call_api(planfly.run, args, on_round=_print_round)
@@ -80,12 +80,12 @@ def _last_plan(result: "RunResult") -> "Plan":
     """Read the plan of the last round, in the scenario without the limits that were tightened for it."""
     from planner.plan import read_plan
 
-    first, last = (read_plan(one.folder / "plan.json") for one in (result.rounds[0], result.rounds[-1]))
+    first, last = (read_plan(shown_round.folder / "plan.json") for shown_round in (result.rounds[0], result.rounds[-1]))
     return replace(last, scenario=first.scenario)
 
 
 def _json_answer(result: "RunResult", has_rounds: bool, code: int, dispersed: "DispersedFlights | None") -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly run`` for --json."""
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
     rounds = [

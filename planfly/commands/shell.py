@@ -102,6 +102,7 @@ def scenarios(args: argparse.Namespace) -> int:
         print(f"{name:<12} {description}")
 
     def json_answer() -> object:
+        """Return the answer of ``planfly scenarios`` for --json."""
         from planfly.terminal.answers import ScenarioEntry, ScenariosAnswer
 
         entries = [ScenarioEntry(name=name, description=description) for name, description in descriptions.items()]

@@ -72,7 +72,9 @@ def add_studio_parser(command_line: LineParser) -> None:
         help="seed of planner and turbulence (default: the scenario's, or 1)",
     )
     parser.add_argument(
-        "--keep", metavar="DIR", help="folder of the session that the next start restores (default: runs/studio)"
+        "--keep",
+        metavar="DIR",
+        help="folder in which the session is saved, and from which the next start restores it (default: runs/studio)",
     )
     add_world_options(parser)
     add_aircraft_and_wind_options(parser)

@@ -40,17 +40,16 @@ def add_survey_parser(command_line: LineParser) -> None:
         metavar="WxH,FOCAL",
         type=parse_camera,
         help=(
-            "width and height of the camera's sensor (across and along the track) and its focal "
-            "length, mm, optionally followed by the required overlaps along and across the lines, "
-            "percent: 23.5x15.6,16 or 23.5x15.6,16,75,60; the camera looks straight down (default: "
-            "the camera of a .plan)"
+            "camera, which looks straight down: width and height of its sensor (across and along the track) and "
+            "focal length, mm; then, if required, the overlaps along and across the lines, percent. Examples: "
+            "23.5x15.6,16 and 23.5x15.6,16,75,60 (default: the camera of a .plan)"
         ),
     )
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for a distance between photos, turn-arounds, an order or a course of the lines, a parameter or an "
-        "airspeed that makes all lines usable; each is flown",
+        help="look for a change that makes all lines usable: the distance between photos, turn-arounds, the order or "
+        "course of the lines, a parameter or the airspeed; each change is flown",
     )
     add_world_options(parser)
     add_aircraft_and_wind_options(parser)
@@ -117,7 +116,7 @@ def _camera_option(result: "SurveyResult") -> str:
 
 
 def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly survey`` for --json."""
     from logs.verdict.conditions import judging_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,

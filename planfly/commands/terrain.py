@@ -26,7 +26,7 @@ def add_terrain_parser(command_line: LineParser) -> None:
     area_group = parser.add_group("the area")
     with_completer(
         area_group.add_argument(
-            "--around", metavar="MISSION", help=".waypoints or .plan file, all of whose positions are covered"
+            "--around", metavar="MISSION", help="mission (.waypoints or .plan) whose positions lie in the area"
         ),
         file_completer(*MISSION_SUFFIXES),
     )
@@ -42,8 +42,8 @@ def add_terrain_parser(command_line: LineParser) -> None:
     tile_group.add_argument(
         "--source",
         metavar="DIR|URL",
-        help="a folder of tiles or an elevation file; or a server of GLO-30 tiles of the Copernicus DEM (default: the "
-        "public one in Amazon's registry of open data, from which the needed parts are fetched and kept)",
+        help="a folder of tiles, an elevation file, or a server of the Copernicus DEM's GLO-30 tiles (default: the "
+        "public server in Amazon's registry of open data; fetched parts are kept)",
     )
     tile_group.add_argument(
         "--sea",
@@ -76,6 +76,7 @@ def terrain(args: argparse.Namespace) -> int:
     print(f"next      planfly fly MISSION --terrain {shlex.quote(str(result.file))}")
 
     def json_answer() -> object:
+        """Return the answer of ``planfly terrain`` for --json."""
         from planfly.terminal.answers import TerrainAnswer
 
         return TerrainAnswer(

@@ -32,12 +32,12 @@ def add_window_parser(command_line: LineParser) -> None:
     ):
         group.add_argument(option, dest=keyword, metavar="TIME", help=text)
         parser.alias_keyword(keyword, option)
-    group.add_argument("--every", metavar="STEP", help="time between two departures, as 30min or 1h (default: 1h)")
+    group.add_argument("--every", metavar="STEP", help="time between two departures, such as 30min or 1h (default: 1h)")
     group.add_argument(
         "--probability",
         metavar="P",
         type=number_parser("probability"),
-        help="probability of a flyable flight at which a departure is open (default: 0.9)",
+        help="a departure is open if its flights are flyable with at least this probability (default: 0.9)",
     )
     group.add_argument(
         "--flights",
@@ -45,14 +45,14 @@ def add_window_parser(command_line: LineParser) -> None:
         type=number_parser("window_flights"),
         help="number of flights of each departure, 10 to 10,000 (default: 40)",
     )
-    add_result_options(parser, "folder for the page, report.html, and the chart, window.png (default: none)")
+    add_result_options(parser, "folder for the page (report.html) and the chart (window.png) (default: no files)")
 
 
 def window(args: argparse.Namespace) -> int:
     """Find the departures; return the exit code.
 
-    The exit code is 0 if the asked departure is open (or any, if none is asked), 4 if not, and 3 if it is not judged
-    in full.
+    The exit code is 0 if the requested departure is open (or any departure if none is requested), 4 if not, and 3 if it
+    is not judged in full.
     """
     from logs.verdict.conditions import flown_lines
     from planfly.campaigns.window_text import answer_line, unjudged_lines, window_lines
@@ -70,7 +70,7 @@ def window(args: argparse.Namespace) -> int:
 
 
 def _json_answer(target: str, result: "WindowResult", code: int) -> "WindowAnswer":
-    """Return the answer of the command for --json."""
+    """Return the answer of ``planfly window`` for --json."""
     from planfly.campaigns.failure_counts import failures_document
     from planfly.campaigns.window_text import answer_line, unjudged_lines
     from planfly.terminal.battery_answers import finite

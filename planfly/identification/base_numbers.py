@@ -120,10 +120,8 @@ class _Probe:
             fdm.properties.getter(name)
             for name in (f"forces/fbx-{source}-lbs", f"moments/l-{source}-lbsft", "atmosphere/rho-slugs_ft3")
         )
-        airspeeds, throttles = (
-            np.linspace(*_TABLE_SPEEDS, _TABLE_ROWS) * self._airspeed,
-            np.linspace(0.0, 1.0, _TABLE_ROWS),
-        )
+        airspeeds = np.linspace(*_TABLE_SPEEDS, _TABLE_ROWS) * self._airspeed
+        throttles = np.linspace(0.0, 1.0, _TABLE_ROWS)
         rows = []
         for airspeed in airspeeds.tolist():
             for throttle in throttles.tolist():
@@ -153,7 +151,8 @@ class _Probe:
         elevator, aileron, rudder = (
             self._derivative(partial(self._with_deflection, k), _SURFACE_STEP_RAD) for k in range(3)
         )
-        half_span_time, half_chord_time = self._span / (2.0 * self._airspeed), self.chord / (2.0 * self._airspeed)
+        half_span_time = self._span / (2.0 * self._airspeed)
+        half_chord_time = self.chord / (2.0 * self._airspeed)
         roll, pitch, yaw = (
             self._derivative(partial(self._with_rate, k), _RATE_STEP_RAD_S) / size
             for k, size in enumerate((half_span_time, half_chord_time, half_span_time))
@@ -293,6 +292,7 @@ def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float
     """
 
     def numbers(name: str) -> list[float]:
+        """Return the numbers in the JSBSim function with this name."""
         return _function_values(functions[name])
 
     (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))

@@ -104,7 +104,7 @@ class Identified:
     def aircraft_draws(self) -> Draws:
         """Return the draws as values of the model's properties.
 
-        If no current was logged, the factor on battery power is one of them.
+        If no current was logged, they include the factor on battery power.
         """
         properties = tuple(parameter.property_name for parameter in PARAMETERS)
         if self.estimate.with_current:
@@ -200,7 +200,7 @@ def _check_level_flight_at_cruise(identified: Identified, aircraft: Aircraft) ->
 
 
 def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
-    """Return cruise, minimum and maximum airspeed by a log's parameters, as true airspeeds at `AMSL`.
+    """Return cruise, minimum and maximum airspeed from a log's parameters, as true airspeeds at `AMSL`.
 
     The unit is m/s.
 

@@ -298,6 +298,7 @@ def _table_functions(motor: MotorTable) -> dict[str, str]:
     density_ratio = f"<quotient> {_RHO} <v> {number(motor.density)} </v> </quotient>"
 
     def table(values: Floats) -> str:
+        """Return a JSBSim table of values by scaled airspeed (rows) and throttle (columns)."""
         header = "  ".join(number(throttle) for throttle in motor.throttles.tolist())
         rows = "\n".join(
             "  ".join(number(value) for value in (airspeed, *row))
@@ -308,6 +309,7 @@ def _table_functions(motor: MotorTable) -> dict[str, str]:
           <tableData>\n{header}\n{rows}\n</tableData> </table>"""
 
     def scaled(values: Floats, factor: str, power: int) -> str:
+        """Return the XML product of a table, a factor, the density ratio and a power of the speed factor."""
         return f"<product> {factor} {density_ratio} {power * speed} {table(values)} </product>"
 
     load = "<p> ident/propeller-torque </p>"
@@ -339,6 +341,7 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     )
 
     def positive_root(b: str, c: str) -> str:
+        """Return the XML of the positive root of the quadratic equation with terms `b` and `c`."""
         discriminant = f"""<difference> <product> {b} {b} </product>
           <product> <v> 4 </v> <p> motor/q2 </p> <sum> <p> motor/q0 </p> {c} </sum> </product> </difference>"""
         return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {discriminant} </max> </sqrt> {b} </difference>

@@ -27,7 +27,7 @@ class PowerConflict:
 
     @property
     def text(self) -> str:
-        """Description of the conflict, and what would settle it.
+        """Description of the conflict, and of the log that would resolve it.
 
         >>> PowerConflict(55.0, 58.0, 200.0).text
         'drag takes 55 W, so 58 W would need an efficiency of 95 %: power may be up to 200 W; log the current (BAT)'

@@ -369,7 +369,8 @@ def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, flo
     The sign is -1 if the output is reversed, otherwise 1.
     """
     value = log.parameters.get
-    min_pulse, max_pulse = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
+    min_pulse = value(f"SERVO{number}_MIN", 1100.0)
+    max_pulse = value(f"SERVO{number}_MAX", 1900.0)
     trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
     return min_pulse, trim_pulse, max_pulse, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
 
@@ -377,7 +378,8 @@ def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, flo
 def _time_grid(log: MotionLog) -> Floats:
     """Return the times (n,) of the common grid, s: at `GRID_HZ` over the period that all series cover."""
     series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
-    start_time, end_time = max(samples.time[0] for samples in series), min(samples.time[-1] for samples in series)
+    start_time = max(samples.time[0] for samples in series)
+    end_time = min(samples.time[-1] for samples in series)
     return np.arange(start_time, end_time, 1.0 / GRID_HZ)
 
 
@@ -410,8 +412,10 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
             rows |= (grid >= start) & (grid < end)
     for start, end in log.hovering:
         rows |= (grid >= start) & (grid < end)
-    for number, function in _servo_functions(log).items() if len(log.outputs.time) else ():
-        if function in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
+    if not len(log.outputs.time) or log.parameters.get("Q_ENABLE", 0.0) <= 0.0:
+        return rows
+    for number, function in _servo_functions(log).items():
+        if function in _LIFT_MOTORS:
             rows |= pulses[:, number - 1] > 1100.0
     return rows
 
@@ -457,13 +461,14 @@ def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floa
 
 
 def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags:
-    """Return `usable` with the rows of a blocked airspeed sensor set to False.
+    """Set the rows of a blocked airspeed sensor to False in a copy of `usable`.
 
     Raises LogError if too many usable rows are blocked.
 
     is_blocked: True where the airspeed sensor is blocked, (n,).
     """
-    blocked_seconds, seconds = float((usable & is_blocked).sum()) / GRID_HZ, float(usable.sum()) / GRID_HZ
+    blocked_seconds = float((usable & is_blocked).sum()) / GRID_HZ
+    seconds = float(usable.sum()) / GRID_HZ
     if blocked_seconds > _MAX_BLOCKED_FRACTION * seconds:
         shown = f"hardly varies for {blocked_seconds:.0f} s of {seconds:.0f} s of flight"
         allowed = "ground velocity minus wind does: check the sensor"

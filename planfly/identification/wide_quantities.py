@@ -29,16 +29,16 @@ class WideQuantity:
         """Description of the quantity, its interval, and the flight that would narrow the interval.
 
         >>> WideQuantity("sink at idle", 0.23, "glides").text
-        'sink at idle: known to ±23 % only; fly glides'
+        'sink at idle: known only to ±23 %; to improve this, fly glides'
         """
-        return f"{self.title}: known to ±{100.0 * self.half:.0f} % only; fly {self.show}"
+        return f"{self.title}: known only to ±{100.0 * self.half:.0f} %; to improve this, fly {self.show}"
 
 
 Interval = tuple[float, float, float]
 
 
 def wide_quantities(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideQuantity, ...]:
-    """Return those of sink rate and power in level flight whose 95 % interval is too wide.
+    """Return sink rate and power in level flight, each only if its 95 % interval is too wide.
 
     sink, power: lower bound, estimate and upper bound, in any unit.
     with_current: True if the battery's current was logged; without it the propeller power is unknown.

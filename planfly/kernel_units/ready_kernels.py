@@ -145,6 +145,7 @@ def run_unit(unit: str, report: Callable[[str], None]) -> None:
     pending = list(UNIT_KERNELS[unit])
 
     def report_ready() -> None:
+        """Report the pending kernels that are now compiled."""
         for name in [kernel for kernel in pending if is_ready(kernel)]:
             pending.remove(name)
             report(f"ready {name}")

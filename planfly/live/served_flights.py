@@ -47,7 +47,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import deciding_text, place_text
+from logs.verdict.wording import deciding_text, noun_with_place
 from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import read_named_fences
 from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
@@ -392,4 +392,4 @@ def _finding_heading(finding: Finding) -> str:
     The place is left out if the reason of the finding names it.
     """
     rule_name = rule_word(finding.rule)
-    return rule_name if finding.placed else f"{rule_name} at {place_text(finding.place)}"
+    return rule_name if finding.placed else noun_with_place(rule_name, finding.place)

@@ -30,7 +30,7 @@ _STRIP_STEP_M = 10.0
 
 
 def expected_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
-    """Return the known causes of failures of a safe plan, each with what would help; () for a plan that is not safe.
+    """Return the known causes of failures of a safe plan, each with a remedy; () if the plan is not safe.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -46,7 +46,7 @@ def expected_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
 
 
 def _loose_limits_text(plan: Plan, airframe: Airframe) -> str:
-    """Return the first part of a plan that is beyond the aircraft, because the scenario's limits allow it, or ""."""
+    """Describe the first part of a plan that the scenario's limits allow but the aircraft cannot fly; or ""."""
     limits = airframe.limits
     aircraft_limits = replace(limits, max_turn=None, max_climb=None, max_dive=None, tracking=None)
     if (limits.max_turn, limits.max_climb, limits.max_dive) == (None, None, None):
@@ -61,7 +61,7 @@ def _loose_limits_text(plan: Plan, airframe: Airframe) -> str:
 
 
 def _short_strip_text(plan: Plan) -> str:
-    """Return why a strip is too short for the touchdowns to expect, or ""."""
+    """Explain why a strip is too short for the expected touchdowns; return "" if it is long enough."""
     strip, descent = plan.scenario.landing, None if plan.ways is None else plan.ways.descent
     if strip is None or descent is None:
         return ""
@@ -83,14 +83,14 @@ def _short_strip_text(plan: Plan) -> str:
     source = "the elevation file" if strip.height_sd is None else "its survey"
     return (
         f"only {100.0 * probability:.0f} % of the landings are expected to touch down on the strip of"
-        f" {strip.length:.0f} m: the altitude of the strip has a standard deviation of {height_sd:.1f} m ({source}),"
-        f" and the touchdown point one of {touchdown_sd:.0f} m (largest scatter of measured landings);"
-        f" to improve this, {', or '.join(remedies)}"
+        f" {strip.length:.0f} m. The altitude of the strip has a standard deviation of {height_sd:.1f} m ({source}),"
+        f" and the touchdown point one of {touchdown_sd:.0f} m (largest scatter of measured landings)."
+        f" To improve this, {', or '.join(remedies)}"
     )
 
 
 def _sufficient_strip_length(touchdown_sd: float) -> float:
-    """Return the strip length on which 95 % of the touchdowns are, m, rounded up.
+    """Return the strip length that contains 95 % of the touchdowns, m, rounded up.
 
     touchdown_sd: standard deviation of the touchdown along the strip, m.
     """

@@ -141,19 +141,17 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
 
 
 def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
-    """Return the problem of an aircraft that climbs too slowly for any margin against downdrafts.
+    """Describe the problem of an aircraft that climbs too slowly for any margin against downdrafts.
 
-    Returns "" otherwise.
+    Return "" for any other aircraft.
 
     With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, more downdrafts arrive before the aircraft has climbed back.
     Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none
     did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
-    climb_rate, min_climb_rate = (
-        airframe.limits.with_margin().max_climb_and_sink_rates(amsl)[0],
-        MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence),
-    )
+    climb_rate = airframe.limits.with_margin().max_climb_and_sink_rates(amsl)[0]
+    min_climb_rate = MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence)
     if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
@@ -276,7 +274,7 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard.
+    """Find where each kind of gust displaces the aircraft deepest into each kind of hazard, if at all.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
@@ -312,7 +310,7 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
     """Cut the legs near the ends of a path into short parts.
 
-    The needed margin grows with the distance from the end there.
+    Near an end, the needed margin grows with the distance from the end.
 
     Legs are not cut within turns.
 
@@ -336,10 +334,8 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
         legs.append(leg)
     path, part_margins = np.array(points), margins[legs]
     end_distances = np.array([np.linalg.norm(path - end, axis=1) for end in ends])
-    fraction, nearest_end_margin = (
-        np.minimum(1.0, end_distances.min(axis=0) / _FULL_HEIGHT_DISTANCE_M),
-        end_margins[end_distances.argmin(axis=0)],
-    )
+    fraction = np.minimum(1.0, end_distances.min(axis=0) / _FULL_HEIGHT_DISTANCE_M)
+    nearest_end_margin = end_margins[end_distances.argmin(axis=0)]
     margin_before, margin_after = (
         nearest_end_margin + fraction * (margins_of_side - nearest_end_margin)
         for margins_of_side in ([*part_margins[:1], *part_margins], [*part_margins, *part_margins[-1:]])

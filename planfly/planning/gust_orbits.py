@@ -37,7 +37,7 @@ def limit_waypoint_orbits(
     *,
     keeps_waypoints: bool = False,
 ) -> Plan:
-    """Return a plan with so few waypoints that gusts rarely make the aircraft orbit at one of them.
+    """Return a plan with few enough waypoints that gusts rarely make the aircraft orbit at one of them.
 
     The given plan is returned if it has few enough waypoints, otherwise a plan with fewer waypoints.
 
@@ -72,7 +72,8 @@ def limit_waypoint_orbits(
     shorter_plan = plan if keeps_waypoints else drop_waypoints(plan, limits if search_limits is None else search_limits)
     if _is_safe_in_gusts(shorter_plan, airframe):
         return shorter_plan
-    remaining_orbits, count = expected_orbits(shorter_plan, autopilot, limits), len(shorter_plan.waypoints) - 2
+    remaining_orbits = expected_orbits(shorter_plan, autopilot, limits)
+    count = len(shorter_plan.waypoints) - 2
     if search is not None:
         # Assume the orbit probability per waypoint of this path; it may be lower on another path.
         allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / remaining_orbits)), plan.scenario
@@ -112,7 +113,8 @@ def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
     limits = airframe.limits
     if (tracking := limits.tracking) is None:
         return []
-    turns, speeds = turning_angles(plan.waypoints), corner_speeds(plan.scenario, plan.waypoints, limits.airspeed)
+    turns = turning_angles(plan.waypoints)
+    speeds = corner_speeds(plan.scenario, plan.waypoints, limits.airspeed)
     return [
         tracking.corner_excursion(float(turn), speed) + GUST_CORNER_MARGIN_M
         for turn, speed in zip(turns, speeds, strict=True)

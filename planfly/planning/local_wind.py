@@ -67,7 +67,8 @@ def ensure_local_wind(plan: Plan, airframe: Airframe, search: Callable[[Airframe
     map_ratio = max_ground_speed_ratio(scenario, airframe.limits.airspeed, float(requirements.path.times[-1]))
     while search is not None and ratio < map_ratio:
         path_ratio = _path_ground_speed_ratio(requirements) if searches < _PATH_SEARCHES else ratio
-        ratio, searches = path_ratio if ratio < path_ratio < map_ratio else map_ratio, searches + 1
+        ratio = path_ratio if ratio < path_ratio < map_ratio else map_ratio
+        searches = searches + 1
         other_plan = search(replace(airframe, limits=limits_at_ground_speed(airframe.limits, ratio)))
         if not other_plan.safe:
             break
@@ -87,7 +88,7 @@ def _plan_requirements(plan: Plan, airframe: Airframe) -> RouteRequirements:
 
 
 def _wind_failures(plan: Plan, requirements: RouteRequirements) -> list[Finding]:
-    """Return the failed findings on a plan's slopes and turns, without those on legs that are already flown."""
+    """Return the failed findings on a plan's slopes and turns, except on legs that are already flown."""
     judges = [judge for name in _RULES if (judge := RULES[name].judge) is not None]
     findings = [finding for judge in judges for finding in judge(requirements, None, geometric=True)]
     return [finding for finding in findings if finding.ok is False and (finding.place.index or 0) >= plan.flown_legs]
@@ -99,12 +100,13 @@ def _failure_text(failure: Finding) -> str:
 
 
 def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
-    """Return limits whose slopes and turns hold at ground speeds that are higher by a ratio than in the mean wind.
+    """Return limits that hold at ground speeds that are higher, by a ratio, than in the mean wind.
 
     Slopes over the ground are inversely proportional to the ground speed, and radii to its square.
     """
 
     def flatten(angles: Floats) -> Floats:
+        """Reduce climb or dive angles (rad) to those at the higher ground speed."""
         return np.where(angles > 0.0, np.arcsin(np.sin(angles) / ratio), angles)
 
     envelope, tracking = limits.envelope, limits.tracking
@@ -119,9 +121,10 @@ def limits_at_ground_speed(limits: Limits, ratio: float) -> Limits:
 
 
 def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float) -> float:
-    """Return the largest ratio of the ground speed in the local wind to that in the mean wind, on any course.
+    """Return the largest ratio of ground speed in the local wind to ground speed in the mean wind.
 
-    It is taken anywhere on the map between its floor and its ceiling, during a flight, and is at least 1.
+    The ratio covers all courses, the whole map between its floor and its ceiling, and the time of a flight.  It is at
+    least 1.
 
     airspeed: m/s.
     duration: duration of the flight, s.
@@ -135,7 +138,7 @@ def max_ground_speed_ratio(scenario: Scenario, airspeed: float, duration: float)
 
 
 def _path_ground_speed_ratio(requirements: RouteRequirements) -> float:
-    """Return the largest ratio of the ground speed in the local wind to that in the mean wind along a planned path."""
+    """Return the largest ratio of ground speed in the local wind to that in the mean wind on a planned path."""
     path, airspeed = requirements.path, float(requirements.route.leg_airspeeds.min())
     steps = np.diff(path.points, axis=0)
     samples = np.column_stack([path.points[:-1] + 0.5 * steps, 0.5 * (path.times[:-1] + path.times[1:])])
@@ -143,7 +146,7 @@ def _path_ground_speed_ratio(requirements: RouteRequirements) -> float:
 
 
 def _ground_speed_ratio(scenario: Scenario, airspeed: float, samples: Floats, courses: Floats) -> float:
-    """Return the largest ratio of the ground speed in the local wind to that in the mean wind, at least 1.
+    """Return the largest ratio, at least 1, of ground speed in the local wind to that in the mean wind.
 
     samples: (n, 4) east, north and altitude, m, and time after take-off, s.
     courses: (n,) rad, or (c, 1) to combine each of c courses with each sample.

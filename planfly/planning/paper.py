@@ -144,10 +144,8 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
     scenario = load_scenario(problem_name(threats))
     searched_algorithm = algorithm
     if algorithm == STRIP_ALGORITHM:
-        scenario, searched_algorithm = (
-            with_planner(scenario, STRIP_ALGORITHM, across_m=STRIP_HALF_WIDTHS_M[threats]),
-            PAPER_ALGORITHM,
-        )
+        scenario = with_planner(scenario, STRIP_ALGORITHM, across_m=STRIP_HALF_WIDTHS_M[threats])
+        searched_algorithm = PAPER_ALGORITHM
     airframe = load_airframe(scenario)
     start_time = time.process_time()
     plan = make_plan(scenario, airframe, seed, searched_algorithm)

@@ -33,6 +33,7 @@ def make_pareto_plans(
     default_plan = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
 
     def finish_alternative(plan: Plan) -> Plan:
+        """Complete an alternative plan; mark it as not safe if it leaves the forecast."""
         try:
             return finish_plan(plan, airframe, continues=continues)
         except ForecastError as error:

@@ -46,8 +46,8 @@ def play_to_foxglove(
 
     allowed: origins of web pages that are accepted in addition to `planfly.replays.origin_gate.VIEWERS`.
 
-    Wait at most ``wait`` seconds for the first client that subscribes; a later client is sent the current scenes.
-    Raises FlightError if no client subscribes in time, and OSError for a port in use.
+    The server waits at most ``wait`` seconds for the first client that subscribes.  Later clients receive the current
+    scenes.  Raises FlightError if no client subscribes in time, and OSError for a port in use.
     """
     import foxglove
 
@@ -174,7 +174,7 @@ class _Broadcast:
             channel.log(message.data, log_time=message.log_time)
 
     def serve_new_subscribers(self) -> None:
-        """Send the newest scenes to the subscribers whose subscription has just become active."""
+        """Send the newest scenes to clients whose subscription has just become active."""
         while not self._arrivals.empty():
             self._waiting.append(self._arrivals.get())
         now = time.monotonic()

@@ -89,7 +89,7 @@ def _make_palette(frame: Image.Image) -> Image.Image:
 
     It has the exact drawing colours, and the main colours of `frame`.
 
-    If colors were chosen only by area, thin lines and small marks would get the colors of the ground.
+    If the colours were chosen by area alone, thin lines and small marks would get the colours of the ground.
     """
     drawing_colours = [ImageColor.getrgb(colour)[:3] for colour in palette_colours()]
     blended_palette = frame.quantize(_TRANSPARENT - len(drawing_colours), dither=Image.Dither.NONE).getpalette() or []

@@ -89,7 +89,7 @@ class OriginGate:
         self._closed = asyncio.Event()
 
     def start_forwarding(self, port: int, certificate: Certificate) -> None:
-        """Begin to forward to a TLS server with this certificate, which no browser trusts."""
+        """Start forwarding to a TLS server with this certificate, which no browser trusts."""
         self._server_port = port
         self._tls = ssl.create_default_context(cadata=certificate.certificate)
         self._loop = asyncio.new_event_loop()

@@ -129,7 +129,7 @@ def find_nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApp
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
     """Make a mission that flies through the start of a return and then commands RTL.
 
-    It passes the start on the course and slope of the flight there.
+    The mission passes the start on the flight's course and slope at this point.
     """
     east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))

@@ -83,12 +83,12 @@ def return_summary(
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
     is_replaced = world.stands_in and not world.has_other_law
-    replacement_text = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
+    replacement_text = f" (simulated with ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
     return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)
 
 
 def return_law_lines(setup: FlightSetup) -> list[str]:
-    """Return lines on the autopilot whose returns are simulated, its path, and the parts that are not judged.
+    """Return lines on the autopilot whose returns are simulated, their path, and their unjudged parts.
 
     Return [] for a mission without a home.
     """
@@ -96,7 +96,7 @@ def return_law_lines(setup: FlightSetup) -> list[str]:
         return []
     world = make_return_world(setup)
     behaviour, unjudged = world.autopilot.returns, world.unjudged_parts
-    lines = [f"returns to launch are simulated with {world.autopilot.title}'s control of a point mass"]
+    lines = [f"returns to launch are simulated by {world.autopilot.title}'s control laws flying a point mass"]
     lines += [behaviour.path_text] if behaviour.path_text else []
     if unjudged:
         extent = "in full" if world.is_simulated else "at all"

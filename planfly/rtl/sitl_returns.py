@@ -115,7 +115,7 @@ class ProgramReturns:
             else f"{agreeing_count} of them agree with the simulation"
         )
         comparison += f"; {worse_count} ended worse than in the simulation" if worse_count else ""
-        return f"by {self.program} itself: {len(self.flown_pairs)} of the worst returns flown, {comparison}"
+        return f"{len(self.flown_pairs)} of the worst returns also flown by {self.program} itself: {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
         """Return a line for each return.
@@ -161,9 +161,9 @@ def check_is_arduplane(program: Path) -> None:
 
 
 def check_returns_as_arduplane(world: ReturnWorld, program: Path) -> None:
-    """Raise ArgumentError if the simulated returns are not those of ArduPlane, which its program could not check."""
+    """Raise ArgumentError if the simulated returns are not ArduPlane's, so that its program cannot check them."""
     if not isinstance(world.autopilot, ArduPlane):
-        allowed = f"ArduPlane's program does not fly the returns of {world.autopilot.title}"
+        allowed = f"the program of ArduPlane cannot check the returns of {world.autopilot.title}"
         raise ArgumentError.of_argument("sitl", str(program), allowed)
 
 
@@ -172,10 +172,10 @@ def choose_worst_returns(
 ) -> list[tuple[SimulatedReturn, int]]:
     """Choose at most `points` returns for the program to fly.
 
-    Returns each with the index of its start, worst first.
+    Each return comes with the index of its start, the worst first.
 
-    Skipped are starts closer to a chosen start than half the path length divided by `points`, because returns from
-    neighbouring starts are alike, and starts that the program cannot reach safely.
+    Starts that the program cannot reach safely are skipped.  Returns from neighbouring starts are similar, so starts
+    closer to a chosen start than half the path length divided by `points` are skipped, too.
     """
     start_rows = starts.rows
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
@@ -259,7 +259,7 @@ def _judge_flown_return(
 ) -> SimulatedReturn | None:
     """Judge a return flown by the program.
 
-    simulated_return: simulation of the same return, whose required height and energy at the start apply.
+    simulated_return: simulation of the same return; its required height and its energy at the start are used.
     start: state at the start of the return.
     Returns None if the flight did not reach the start.
     """
@@ -283,11 +283,12 @@ def _judge_flown_return(
         clearance, lowest_position, *_ = find_nearest_approaches(
             world, _cut_at_nearest_point(target.landing.position, position)
         )
-    record["outcome"] = (
-        RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
-    )
     if math.isnan(clearance):
         record["outcome"] = RETURN_OFF_TERRAIN
+    elif hits_ground or clearance <= 0.0:
+        record["outcome"] = RETURN_GROUND_IMPACT
+    else:
+        record["outcome"] = RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     record["clearance"], record["sphere_distance"], record["threat"] = clearance, approach.outside, approach.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
     remaining_energy = simulated_return.energy_left + simulated_return.energy - used_energy
@@ -309,7 +310,7 @@ def _judge_flown_return(
 def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
     """Return the position where the judgement of a return ends.
 
-    This is the loiter centre, or the last waypoint before the landing.
+    The position is the loiter centre, or the last waypoint before the landing.
     """
     if target.landing is None:
         return target.position
@@ -336,13 +337,14 @@ def _cut_at_nearest_point(point: tuple[float, float, float], position: Floats) -
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
     """Identify the target of a flown return.
 
-    This is the target at which the path ends, or for which its last course heads.
+    It is the target at which the path ends, or for which the last course heads.
 
     All possible targets of a return are tried.  If none fits, the target of the simulated ArduPlane is returned.
 
     position: path points, (t, 3) m.
     """
-    end_point, earlier_point = position[-1, :2], position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
+    end_point = position[-1, :2]
+    earlier_point = position[max(0, len(position) - 5 * _ROWS_PER_SECOND), :2]
     course = math.atan2(*(end_point - earlier_point))
     best_target, best_rank = simulated_target, math.inf
     for target in (simulated_target, *_other_targets(world, simulated_target)):

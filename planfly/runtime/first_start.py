@@ -127,7 +127,7 @@ _compiled_units: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels that the ``with`` block needs when it first calls a kernel that is not cached.
+    """Compile all kernels of the ``with`` block as soon as it calls a kernel that is not cached.
 
     The kernels are compiled in two processes before the code continues; if the cache cannot be written, each kernel is
     compiled when it is called.
@@ -136,6 +136,7 @@ def warm_up(*units: str) -> Iterator[None]:
     has_reported = False
 
     def compile_all() -> None:
+        """Compile the units that this process has not compiled, at the first call only."""
         nonlocal has_reported
         if not has_reported:
             has_reported = True
@@ -153,8 +154,11 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Parameters, _Result]], Call
     """
 
     def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
+        """Wrap a function so that it runs inside `warm_up`."""
+
         @functools.wraps(function)
         def with_kernels(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Result:
+            """Call the function inside `warm_up`."""
             with warm_up(*units):
                 return function(*args, **kwargs)
 

@@ -47,10 +47,10 @@ def prepare_child() -> None:
 
 
 def end_repeated_call() -> None:
-    """End this process without a word if it is a worker that is still importing the script of its parent.
+    """End this process silently if it is a worker that is still importing the script of its parent.
 
-    Call this function first in functions that start processes. Without ``if __name__ == "__main__":`` the import calls
-    the same function again; the parent then reports it (`check_script_guard`).
+    Call this function first in functions that start processes.  If the script has no ``if __name__ == "__main__":``,
+    the import calls the same function again.  The parent process then reports this (`check_script_guard`).
     """
     from multiprocessing import current_process
 
@@ -60,7 +60,7 @@ def end_repeated_call() -> None:
 
 
 def check_script_guard(workers: "Iterable[BaseProcess]") -> None:
-    """Raise PlanflyError if one of these processes has ended by `end_repeated_call`."""
+    """Raise PlanflyError if `end_repeated_call` has ended one of these processes."""
     if not any(worker.exitcode == _REPEATED_CALL_EXIT_CODE for worker in workers):
         return
     # Imported here: `import planfly` loads nothing else.
@@ -72,7 +72,7 @@ def check_script_guard(workers: "Iterable[BaseProcess]") -> None:
 
 
 def watch_address_space() -> None:
-    """Let imports fail early if a module does not fit into a limited address space.
+    """Make imports fail early if a module does not fit into a limited address space.
 
     Without a limit nothing is changed.
     """

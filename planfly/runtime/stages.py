@@ -45,7 +45,7 @@ def send_progress_to(receiver: Receiver) -> Iterator[None]:
 def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
     """Return the context of a stage of work.
 
-    It yields a function to report the units done, the total and a remark.
+    The context yields a function to report the units done, the total and a remark.
 
     kind: common name of stages with the same pace, if the title is more specific ("planning" for any scenario).
 
@@ -69,7 +69,7 @@ def report_line(line: str) -> None:
 
 
 def report_replaced(*files: Path) -> None:
-    """Report each of the files that exists, and that the caller is about to replace."""
+    """Report each existing file that the caller is about to replace."""
     for file in files:
         if file.exists():
             report_line(f"{file} exists and is replaced")
@@ -104,6 +104,7 @@ def progress(callback: Callable[[str, float, float, str], None]) -> AbstractCont
 
     @contextmanager
     def start_stage(title: str, _kind: str) -> Iterator[Advance]:
+        """Yield a function that passes the progress of a stage to the callback."""
         yield lambda done, total, remark: callback(title, done, total, remark)
 
     return send_progress_to(Receiver(start_stage, lambda line: callback(line, 0.0, 0.0, "")))

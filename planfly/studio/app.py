@@ -44,6 +44,7 @@ def make_app(server: Server, port: int) -> App:
     files = page_files()
 
     def serve_file(request: Request) -> Response:
+        """Answer a request for a page file."""
         data, media_type = files[request.url.path]
         return Response(data, media_type=media_type)
 

@@ -6,6 +6,7 @@ studio has written over it.  Options of the command line take precedence over th
 
 import hashlib
 import json
+import math
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,7 +70,8 @@ def autosave_text(
 ) -> str:
     """Encode the state of a session as the JSON text of its autosave file.
 
-    The first `_MAX_UNDONE_STEPS` undone edits are saved; the edits in effect are saved as one, their result.
+    Edits in effect are saved as a single edit, which is their result.  Of the undone edits, the first
+    `_MAX_UNDONE_STEPS` are saved.
 
     context: editing context with the settings of the session.
     document: the opened document.
@@ -110,7 +112,7 @@ def _scenario_name(context: EditContext) -> str:
 
 
 def read_autosave(file: Path, context: EditContext, document: Document, options: MissionOptions) -> Restored | None:
-    """Return the saved mission and its editing context, or None without a file or from the file of another mission.
+    """Return the saved mission and its editing context; None without a file, or if it is of another mission.
 
     options: options of the command line, which replace saved settings.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
@@ -151,7 +153,7 @@ def sibling_autosave_path(file: Path, first: Mission) -> Path:
 
 
 def _restore_settings(context: EditContext, data: Json, options: MissionOptions) -> tuple[EditContext, tuple[str, ...]]:
-    """Return the editing context with the saved settings, and the saved settings that were replaced.
+    """Return the editing context with the saved settings, and texts on saved settings that were replaced.
 
     The context is `context` itself if the settings do not differ.
 
@@ -184,7 +186,7 @@ def _restore_settings(context: EditContext, data: Json, options: MissionOptions)
 
 
 def _apply_options(saved_spec: Json, opened_spec: Json, options: MissionOptions) -> list[str]:
-    """Replace the entries of a saved scenario that options set by those of the opened scenario.
+    """Replace the entries of a saved scenario that options set, using the opened scenario's entries.
 
     Returns one text for each entry that was different, with both values.
     """
@@ -212,17 +214,17 @@ def _is_same_value(first: object, second: object) -> bool:
 
 
 def _key_text(key: str) -> str:
-    """Return the name of an entry of a scenario for a user."""
+    """Return the name of an entry of a scenario as text."""
     return {"speed_mps": "wind", "from_deg": "wind from", "airspeed_mps": "airspeed"}.get(key, key.replace("_", " "))
 
 
 def _value_text(value: object) -> str:
-    """Return a value of a scenario as text; of a path only the name."""
+    """Return a value of a scenario as text; a path is reduced to its name."""
     return "none" if value is None else Path(value).name if isinstance(value, str) else f"{value:g}"
 
 
 def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[Mission, EditContext]:
-    """Return a mission and its editing context, with the saved plan if it is the plan of this mission."""
+    """Return a mission and its editing context; add the saved plan if it is the plan of this mission."""
     if not data.get("plan"):
         return mission, context
     plan = parse_plan(data["plan"], "kept", ground=context.scenario.terrain)
@@ -237,19 +239,23 @@ def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[M
 
 
 def mission_data(mission: Mission) -> Json:
-    """Convert a mission to plain data, from which `mission_from_data` makes the same mission.
+    """Convert a mission to plain data, which `mission_from_data` converts back.
 
     NaN becomes None.
     """
 
+    def none_if_nan(number: float) -> float | None:
+        """Return None for NaN, and any other number unchanged."""
+        return None if math.isnan(number) else number
+
     def item_data(item: MissionItem) -> list[Any]:
         """Return the fields of an item, with None for NaN."""
-        numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
-        return [item.seq, item.command, item.frame, *(None if v != v else v for v in numbers), item.autocontinue]
+        numbers = map(none_if_nan, (*item.params, item.lat_deg, item.lon_deg, item.alt))
+        return [item.seq, item.command, item.frame, *numbers, item.autocontinue]
 
     home = mission.home
     return {
-        "home": None if home is None else [home.lat_deg, home.lon_deg, None if home.alt != home.alt else home.alt],
+        "home": None if home is None else [home.lat_deg, home.lon_deg, none_if_nan(home.alt)],
         "items": [item_data(item) for item in mission.items],
     }
 
@@ -263,6 +269,7 @@ def mission_from_data(data: Json, first: Mission) -> Mission:
     """
 
     def number(value: Any) -> float:
+        """Return a stored number; None stands for NaN."""
         return float("nan") if value is None else float(value)
 
     items = [

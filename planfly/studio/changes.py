@@ -105,7 +105,7 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
 
 
 def _other_cause(finding: Finding, value: float | None) -> str:
-    """Return what a failed finding was seen by, if its value does not show it; "" otherwise.
+    """Return the cause of a failed finding if its value does not show it; otherwise "".
 
     value: the value of the finding that is compared, in its unit.
     """
@@ -121,20 +121,20 @@ def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
 
 
 def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bool:
-    """Return False for a leg that was not begun, and for a waypoint to which no leg was begun."""
+    """Return True if a leg was begun, or if the leg to a waypoint was begun."""
     if place.kind not in ("leg", "waypoint") or place.index is None or (place.kind, place.index) in places_reached:
         return True
     return place.kind == "waypoint" and ("leg", place.index - 1) in places_reached
 
 
 def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
-    """Return a key that sorts results from the worst to the best; places not reached that do not fail are last."""
+    """Return a key that sorts results from the worst to the best; places that were not reached come last."""
     is_last = result.level == _NOT_REACHED and result.ok is not False
     return is_last, _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return a key for a place, by positions in the mission, and a description with item numbers.
+    """Return a key of a place that uses positions in the mission, and a description with item numbers.
 
     route_items: item number of each waypoint.
     order: position of each item number in the mission.
@@ -181,8 +181,8 @@ def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tupl
 def describe_changes(previous: FlightResults | None, current: FlightResults) -> list[str]:
     """Return lines on what changed since the previous flight.
 
-    They state the changed answers, or the changed values if no answer changed; ["nothing"] without a change, and [] for
-    the first flight.
+    The lines state the changed answers, or the changed values if no answer changed.  The result is ["nothing"] without
+    a change, and [] for the first flight.
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))
@@ -223,12 +223,13 @@ _REMOVED_POSITION = -1
 def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
     """Return the previous results, keyed by the positions of their items in the current mission.
 
-    Results at a removed item get a key that no current result has.
+    Results at a removed item get a key that matches no current result.
     """
     new_positions, renumbered = match_items(previous.items, current.items), {}
     for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
         if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
-            first, last = new_positions.get(first, _REMOVED_POSITION), new_positions.get(last, _REMOVED_POSITION)
+            first = new_positions.get(first, _REMOVED_POSITION)
+            last = new_positions.get(last, _REMOVED_POSITION)
             if _REMOVED_POSITION in (first, last):
                 kind, first, last = _REMOVED_PLACE, number, _REMOVED_POSITION
         renumbered[rule, (kind, first, last)] = result
@@ -236,7 +237,7 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return a line for each new failure, and then for each earlier failure that is gone."""
+    """Return a line for each new failure, and then for each earlier failure that no longer occurs."""
     worse, better = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
@@ -261,9 +262,9 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:
-    """Describe a change at a place: the rule, the old value if it is of the same level, the new value and state.
+    """Describe a change at a place: rule, old value (if of the same level), new value and state.
 
-    The values of a failure that they do not show are replaced by its cause.
+    If the values do not show a failure, its cause replaces them.
     """
     causes = [shown.cause for shown in (result, old_result) if shown is not None and shown.cause]
     if causes:
@@ -279,7 +280,7 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _quantity_name(rule: str) -> str:
-    """Return the name of a rule, followed by the quantity that it compares if that is another word.
+    """Return the name of a rule, followed by the quantity that it compares if it has another name.
 
     >>> _quantity_name("slope"), _quantity_name("departure")
     ('slope', 'loss of control, largest bank')
@@ -290,9 +291,9 @@ def _quantity_name(rule: str) -> str:
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Return lines for continued failures with another value, then for rules with another smallest margin.
+    """Return lines on continued failures with another value, then on rules with another smallest margin.
 
-    Of both kinds at most `_MAX_VALUE_CHANGES` are returned, the largest changes of margin first.
+    At most `_MAX_VALUE_CHANGES` lines of each kind are returned, the largest changes of margin first.
     """
     failures = [
         (rule, old_results[rule, key], result)

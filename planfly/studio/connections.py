@@ -33,7 +33,7 @@ class _UnknownConnection:
     number: int | None = None
 
     def _register(self) -> None:
-        """Register this connection as unknown; if there are too many unknown connections, close the oldest."""
+        """Register this connection as unknown; close the oldest if too many are unknown."""
         self.number = next(_numbers)
         unknown = [connection for connection in self.connections if getattr(connection, "number", None) is not None]
         if len(unknown) > MAX_UNKNOWN_CONNECTIONS:
@@ -52,7 +52,7 @@ class ShortLived(_UnknownConnection, H11Protocol):
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Register the connection, and schedule its closing, unless a websocket replaces HTTP before."""
+        """Register the connection, and schedule its closing in case no websocket replaces HTTP by then."""
         super().connection_made(transport)
         self._register()
         asyncio.get_running_loop().call_later(HTTP_LIFETIME_S, self._close_if_http, transport)

@@ -281,7 +281,7 @@ def _to_bytes(text: str | bytes) -> bytes:
 
 
 def _format_losses(context: EditContext, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
-    """Return a line for each content that a ground station's file cannot store.
+    """Return a line for each part of the mission that a ground station's file cannot store.
 
     text: the mission as text of this file.
     """
@@ -306,7 +306,7 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
 def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str, ...]:
     """Return lines on settings and parameters that a ground station's file cannot store.
 
-    They are those changed in the studio.
+    Only those changed in the studio are included.
     """
     scenario = context.scenario
     differences = {
@@ -357,7 +357,7 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
 def _check_plain_waypoints(mission: Mission) -> None:
     """Raise MissionError for the first item that a plan cannot store.
 
-    These are a take-off, a landing, and a change of speed along the path.
+    A plan cannot store a take-off, a landing, or a change of speed along the path.
     """
     first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
     for index, item in enumerate(mission.items):
@@ -410,8 +410,8 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
 
     Returns None if the opened plan has neither.
 
-    Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
-    MissionError if these legs were changed.
+    Departure and approach were certified together with the turns at their ends, so the adjacent legs must be unchanged.
+    Raises MissionError if these legs were changed.
     """
     opened_plan = context.opened_setup.plan
     if (

@@ -66,9 +66,9 @@ class EditContext(MissionContext):
         return replace(self, opened_setup=setup, planned=True)
 
     def planning_airframe(self, mission: Mission, index: int | None = None) -> Airframe:
-        """Return the airframe at the airspeed that a mission commands, at which a new path is planned.
+        """Return the airframe at the commanded airspeed of a mission, for planning a new path.
 
-        index: index of the item from which the path leads; None for the airspeed of the first leg.
+        index: index of the item at which the path starts; None for the airspeed of the first leg.
         """
         route, leg = self.route(mission), 0
         if index is not None:
@@ -84,8 +84,8 @@ class EditContext(MissionContext):
     def with_area_around_mission(self, mission: Mission) -> "EditContext":
         """Return a context whose scenario has an area that contains the mission.
 
-        If the mission comes close to the edges of a scenario that planfly made around it, a larger scenario is made.
-        A named scenario is kept.
+        If planfly made the scenario around the mission, and the mission comes close to its edges, a larger scenario is
+        made.  A named scenario is kept.
         """
         if not self.scenario.external:
             return self

@@ -20,7 +20,7 @@ _SEARCHED_BYTES = 2**20
 def folder_message(folder: Path | None) -> Json:
     """Return a message for the page with the missions, plans, logs and parameter files of a folder.
 
-    Links to files in other folders are left out, and so are texts and JSON documents without a mission.
+    Links to files in other folders are left out, as are text files and JSON documents without a mission.
 
     >>> folder_message(Path("no such folder"))["files"]
     []

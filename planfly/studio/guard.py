@@ -93,6 +93,7 @@ class Guard:
             return
 
         async def send_with_headers(message: MutableMapping[str, Any]) -> None:
+            """Add the security headers to the start of a response, and send the message."""
             if message["type"] == "http.response.start":
                 message["headers"] = [*message.get("headers", []), *HEADERS]
             await send(message)

@@ -54,7 +54,8 @@ def judge_windows(
 
     Returns the route and the judged parts (windows).
 
-    The whole route is judged as one part if it may contain surveys, or if the parts together would be as long.
+    The whole route is judged as one part if it may contain surveys, or if the parts together would be as long as the
+    route.
 
     index: index of the item in the mission's list.
     previous_setup: setup before the move, if known.
@@ -94,7 +95,7 @@ def _may_contain_survey(context: EditContext, mission: Mission, route: Route) ->
 
 
 def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before_part: bool) -> tuple[Route, int]:
-    """Extend a part of a route by the fastest legs and the windiest altitude of the whole route.
+    """Extend a part of a route by the fastest legs and the altitude with the most wind in the route.
 
     Returns the extended part, and the number of waypoints added before the part.
 
@@ -198,7 +199,7 @@ def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
     """Return a span extended on both sides by at least `MOVE_REACH_M` and `MOVE_REACH_LEGS`.
 
-    Loiters are not cut.
+    A loiter is included completely or not at all.
     """
     distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.positions))])
     start = min(

@@ -225,9 +225,9 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages to the pages that an answer of a worker causes.
+        """Return the messages to send to the pages after an answer of a worker.
 
-        For a task that another task has replaced, this is only the message that the task has stopped.
+        If another task has replaced the task, this is only the message that the task has stopped.
         """
         task = self._active.get(worker)
         if task is None or task.number != answer.number:
@@ -266,8 +266,8 @@ class Jobs:
     def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
         """Store the result of a task, and return the message that shows the result on the pages.
 
-        After a failed flight of the current mission, trials of its suggestions are started; after trials by geometry,
-        the flight.
+        If a flight of the current mission failed, trials of its suggestions are started.  After trials by geometry, the
+        flight is started.
         """
         if task.name == "fly":
             previous_results, self._last_results = self._last_results, value.pop("figures")
@@ -304,7 +304,7 @@ class Jobs:
         return message
 
     def has_new_initial_plan(self, session: Session) -> bool:
-        """Return True once: at the first call after the path planned for the opened scenario has arrived."""
+        """Return True only at the first call after the path of the opened scenario has arrived."""
         has_path = self._uses_first_path and bool(session.plans[0])
         if has_path:
             self._uses_first_path = False
@@ -312,7 +312,7 @@ class Jobs:
 
 
 def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
-    """Return page data of planned paths to choose from, each with the quantities in which it is the best."""
+    """Return page data of planned paths to choose from; each names the quantities in which it is best."""
     quantities = {
         "shortest": [plan.length for plan in plans],
         "least seen by radars": [plan.exposure for plan in plans],

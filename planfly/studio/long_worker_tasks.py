@@ -93,7 +93,8 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
         flyable += row.outcome == "flyable"
         undecided += row.outcome == "undecided"
         failure_counts.update({rule for rule, _ in row.failures})
-    lower, upper = wilson(flyable, FLIGHT_COUNT).low, wilson(flyable + undecided, FLIGHT_COUNT).high
+    lower = wilson(flyable, FLIGHT_COUNT).low
+    upper = wilson(flyable + undecided, FLIGHT_COUNT).high
     headline = f"{flyable} of {FLIGHT_COUNT} flights are flyable"
     headline += f", {undecided} not judged in full" if undecided else ""
     common = [f"{rule_word(rule)} fails in {count}" for rule, count in failure_counts.most_common(5)]
@@ -136,7 +137,7 @@ def run_ground_risk_task(payload: tuple[EditContext, Mission], advance: Advance)
 
 
 def run_window_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Find the times of take-off at which a mission is flyable in the forecast of its scenario, as page data.
+    """Find the take-off times at which a mission is flyable in its scenario's forecast, as page data.
 
     payload: editing context, and mission.
 

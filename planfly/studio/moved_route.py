@@ -32,11 +32,9 @@ _IRREGULAR_COMMANDS = frozenset(
 def update_moved_route(
     route: Route, previous_mission: Mission, mission: Mission, scenario: Scenario, airframe: Airframe
 ) -> Route | None:
-    """Return the route after a few waypoints were moved.
+    """Return the route after moves of a few waypoints; None if the whole route must be computed again.
 
-    Returns None if the whole route must be computed again.
-
-    The whole route must be computed again if a move may change more than the waypoint itself: next to loiters, merged
+    This is necessary if a move may change more than the waypoint itself.  It is the case next to loiters, merged
     waypoints and kept altitudes, and with jumps, gates, RTL, landings and courses at the ends.
 
     route: route of the previous mission.
@@ -60,11 +58,9 @@ def update_moved_route(
     points, changed_rows = route.points.copy(), set[int]()
     positions = points["position"]
     for old_item, new_item in pairs:
-        row, old_position, new_position = (
-            rows[new_item.seq],
-            _map_position(old_item, previous_mission, scenario),
-            _map_position(new_item, mission, scenario),
-        )
+        row = rows[new_item.seq]
+        old_position = _map_position(old_item, previous_mission, scenario)
+        new_position = _map_position(new_item, mission, scenario)
         neighbours = [k for k in (row - 1, row + 1) if 0 <= k <= route.legs]
         if old_position is None or new_position is None:
             return None
@@ -97,7 +93,7 @@ def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
     """Return True if each position item is one stop of the route.
 
-    The altitude of each stop must also be independent of other items.
+    The altitude of each stop must not depend on other items.
     """
     if any(value is not None for value in (route.rtl_start, route.direct_landing_start, route.landing_ground)):
         return False

@@ -96,7 +96,7 @@ def open_studio(
 def _autosave_stem(target: str) -> str:
     """Return the stem of the autosave file for a target.
 
-    Equal file names in different folders get different stems.
+    Files of the same name in different folders get different stems.
 
     >>> _autosave_stem("jacksboro")
     'jacksboro'
@@ -124,7 +124,7 @@ def _open_listener(port: int | None) -> socket.socket:
 def _open_page(address: str) -> Iterator[None]:
     """Open an address in the browser through a temporary file.
 
-    Otherwise the list of processes would show the token.
+    If the address were an argument, the list of processes would show its token.
     """
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "studio.html"
@@ -153,6 +153,7 @@ async def _run_web_server(server: "Server", listener: socket.socket, stop: Calla
 
         @contextlib.contextmanager
         def capture_signals(self) -> Iterator[None]:
+            """Leave signals to the studio instead of the web server."""
             yield
 
     app = make_app(server, listener.getsockname()[1])

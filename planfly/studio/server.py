@@ -162,7 +162,7 @@ class Server:
     # One page.
 
     async def serve(self, socket: WebSocket) -> None:
-        """Accept a websocket; if it sends the token, serve its page until the page disconnects or is too slow."""
+        """Accept a websocket; if it sends the token, serve its page until it disconnects or is too slow."""
         await socket.accept()
         page = await self._authenticate(socket)
         if page is None:
@@ -170,10 +170,8 @@ class Server:
         self._pages.add(page)
         self.first_page_served.set()
         tasks = [asyncio.create_task(self._write_frames(page)), asyncio.create_task(self._judge_drags(page))]
-        messages_task, overflow_task = (
-            asyncio.create_task(self._handle_messages(page)),
-            asyncio.create_task(page.has_overflowed.wait()),
-        )
+        messages_task = asyncio.create_task(self._handle_messages(page))
+        overflow_task = asyncio.create_task(page.has_overflowed.wait())
         try:
             await asyncio.wait((messages_task, overflow_task), return_when=asyncio.FIRST_COMPLETED)
             if overflow_task.done():
@@ -287,6 +285,7 @@ class Server:
             self._ground_frames.clear()
 
             def draw() -> tuple[bytes, ...]:
+                """Draw the terrain, and return the frames with its heights and its picture."""
                 grid = sample_ground_grid(terrain, tuple(east), tuple(north))
                 header = {"east": east, "north": north, "rows": grid.heights.shape[0], "columns": grid.heights.shape[1]}
                 picture = draw_ground(terrain, tuple(east), tuple(north), dark=page.dark)
@@ -433,9 +432,9 @@ class Server:
                 self._loop.call_soon_threadsafe(self._send_messages_of_answer, worker, answer)
 
     def _send_messages_of_answer(self, worker: str, answer: Answer) -> None:
-        """Send the messages that a worker's answer causes to the pages.
+        """Handle a worker's answer: send the resulting messages to the pages.
 
-        If it is the first planned path, the path becomes the mission.
+        If the answer is the first planned path, the path becomes the mission.
         """
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)

@@ -143,7 +143,7 @@ class Session:
         self.document_rev += 1
 
     def _add_to_history(self, mission: Mission, text: str) -> None:
-        """Record an edit, and discard undone documents.  text: description of the edit."""
+        """Record an edit, and discard documents whose opening was undone. text: description of the edit."""
         self.history.add(mission, text)
         self.undone_states = []
 
@@ -169,12 +169,12 @@ class Session:
 
     @property
     def is_edited(self) -> bool:
-        """True if the mission was edited, also if all edits were undone."""
+        """True if the mission was edited, even if all edits were undone."""
         return self.is_changed or bool(self.history.steps)
 
     @property
     def file_kind(self) -> str:
-        """Format of the file that the mission may overwrite; "" if there is none."""
+        """Format of the file that saving the mission may overwrite; "" if there is none."""
         return self.document.kind if self.document.path is not None else ""
 
     @property
@@ -310,9 +310,9 @@ class Session:
         return airborne or requested
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
-        """Return the mission with an item at another position, m, or altitude, m AMSL.
+        """Return the mission with an item moved to a position, m, or altitude, m AMSL.
 
-        A value of None keeps the old value.
+        A coordinate of None is not changed.
         """
         mission = self.mission
         edits.movable_item(mission, index)
@@ -468,7 +468,7 @@ class Session:
     def save(self, form: str) -> SavedFile:
         """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it.
 
-        The mission counts as saved if there is no file that has to be overwritten for that.
+        If the mission has no file to overwrite, it then counts as saved.
         """
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form in KINDS and form != "kml" and not self.file_kind:

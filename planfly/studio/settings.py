@@ -114,10 +114,8 @@ def apply_parameter_settings(current: ChangedParameters, scenario: Scenario, set
     if settings.parameter is not None:
         single = read_parameters(scenario, settings.parameter, "parameter")
         if single.unused:
-            name, known_names = (
-                single.unused[0],
-                [parameter.name for parameter in _load_autopilot_parameters(scenario).values],
-            )
+            name = single.unused[0]
+            known_names = [parameter.name for parameter in _load_autopilot_parameters(scenario).values]
             allowed = f"expected a parameter of the simulated autopilot{did_you_mean(name, known_names)}"
             raise PlanflyError(f"parameter: {name}: {allowed}", field="parameter", value=name, allowed=allowed)
         result = ChangedParameters(values | single.values, result.file, result.unused)

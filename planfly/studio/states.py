@@ -52,7 +52,8 @@ class PlaceStates(NamedTuple):
 def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
     """Return the states of legs, corners, threats and zones according to findings.
 
-    A violated threat or zone also fails the legs that enter it, and legs that pass a missile's sphere closely are near.
+    If a threat or zone is violated, the legs that enter it fail, too.  Legs that pass a missile's sphere closely have
+    the state "near".
     shift: number added to the numbers of legs and corners, for the findings on a part of a route.
     """
     legs: dict[int, State] = {}
@@ -144,9 +145,9 @@ def _rule_name(finding: Finding) -> str:
 
 
 def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
-    """Return the margin of a finding, relative to the margin below which it is shown as near its limit.
+    """Return the margin of a finding as a fraction of the margin below which it counts as near its limit.
 
-    That margin is a tenth of the limit, and at most the scale of the rule's margin.
+    That margin is a tenth of the limit, but at most the scale of the rule's margin.
 
     tolerance: added to the margin, in the finding's unit.
     """
@@ -158,13 +159,14 @@ def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
 def _value_text(finding: Finding) -> str:
     """Return the rule, the value and the limit of a finding, such as "slope 5.2° (≤ 6.0°)".
 
-    If only the tolerance leaves room, the limit is stated without it, followed by the tolerance and its purpose.
+    If the value is beyond the limit but within the tolerance, the limit is followed by the tolerance and its purpose.
     """
     value, limit_text = finding.compared_texts()
     closeness, tolerance = _closeness(finding), finding.tolerance or 0.0
     if finding.limit is not None and closeness < 1.0 and _closeness(finding, tolerance) >= 1.0:
         sign, joint = finding.limit_sign, "less" if finding.at_least else "plus"
-        purpose, tolerance_text = RULE_WORDS[finding.rule].tolerance_purpose, quantity_text(tolerance, finding.unit)
+        purpose = RULE_WORDS[finding.rule].tolerance_purpose
+        tolerance_text = quantity_text(tolerance, finding.unit)
         limit_text = f"{sign} {quantity_text(finding.limit, finding.unit)}, {joint}"
         limit_text += f" {tolerance_text} for {purpose}" if purpose else f" a tolerance of {tolerance_text}"
     return f"{_rule_name(finding)} {value}" + (f" ({limit_text})" if limit_text else "")

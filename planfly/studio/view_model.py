@@ -202,7 +202,7 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def commands_json(mission: Mission) -> list[Json]:
-    """Return page data of the items without a place on the map, such as speeds and jumps, which are only shown."""
+    """Return page data of items without a place on the map, such as speeds and jumps, which are not editable."""
     places = set(movable_indices(mission))
     return [
         {"k": k, "seq": item.seq, "text": _command_text(item)}
@@ -212,7 +212,7 @@ def commands_json(mission: Mission) -> list[Json]:
 
 
 def _command_text(item: MissionItem) -> str:
-    """Return what an item without a place on the map does.
+    """Describe an item without a place on the map.
 
     >>> _command_text(MissionItem(3, 178, 3, (0.0, 21.0, -1.0, 0.0), 0.0, 0.0, 0.0))
     'change speed: airspeed 21 m/s'
@@ -272,7 +272,7 @@ def _state_pair(state: State) -> list[str]:
 def verdict_page_data(verdict: Verdict) -> Json:
     """Return page data of a verdict: state, answer, headline, lines, level and count of failures.
 
-    The answer is that of the headline, as `planfly check` prints it, also for a flight that ended early.
+    The answer is the same as in the headline, even for a flight that ended early.
     """
     presentation = verdict.present()
     return {
@@ -290,7 +290,7 @@ def findings_json(verdict: Verdict, tried: Sequence[TriedSuggestions]) -> list[J
 
     These are the failed and undecided findings, then the finding closest to its limit for each rule.
 
-    tried: suggestions that passed their trials; failed findings have no others.
+    tried: suggestions that passed their trials; failed findings show no others.
     """
     verdict = replace(verdict, findings=with_passing_suggestions(verdict.findings, tried))
     return [

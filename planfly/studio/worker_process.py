@@ -82,8 +82,8 @@ class WorkerProcess:
         """Prepare a worker; nothing is started before `submit`.
 
         name: name of the process.
-        on_answer: function that gets the answers, called in a thread of the worker.
-        cancel_timeout: maximum time for a cancelled task to end, s.
+        on_answer: function that is called with each answer, in a thread of the worker.
+        cancel_timeout: time within which a cancelled task must end, s.
         pack: function that pickles a task, called in the sending thread; objects that another thread may change must be
             pickled in that other thread.
         """
@@ -104,7 +104,7 @@ class WorkerProcess:
         return None if self._process is None else self._process.pid
 
     def start(self) -> None:
-        """Start the process before the first task; a failure is reported only with the first task."""
+        """Start the process in advance; a failure is reported only with the first task."""
         with self._condition, contextlib.suppress(OSError):
             self._ensure_process()
 
@@ -194,7 +194,7 @@ class WorkerProcess:
         self._on_answer(Answer(task.number, "fault", reason))
 
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
-        """Kill a process that still works on a cancelled task; a new process then gets the newest task.
+        """Kill a process that still works on a cancelled task; a new process will get the newest task.
 
         pipe: pipe to the process.
         number: number of the cancelled task.
@@ -323,6 +323,7 @@ def _run_task(pipe: Connection, task: Task) -> Task | None:
     newer_tasks: list[Task | None] = []
 
     def advance(done: float, total: float, remark: str) -> None:
+        """Send the progress of the task; raise Cancelled if a newer task has arrived."""
         if pipe.poll():
             newer_tasks.append(pipe.recv())
             raise Cancelled

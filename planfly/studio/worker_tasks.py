@@ -9,7 +9,6 @@ import pickle
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -72,7 +71,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a mission by geometry, and return those that passed, as `try_flown_suggestions` does."""
+    """Try a mission's suggestions by geometry; return passed ones like `try_flown_suggestions`."""
     context, mission = payload
     return _try_suggestions(context, context.judge(mission), advance)
 
@@ -80,8 +79,8 @@ def try_planned_suggestions(payload: tuple[EditContext, Mission], advance: Advan
 def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
     """Try the suggestions of a failed flight in trial flights, and return those that passed.
 
-    The result has the findings with these suggestions, as page data, and each changed mission with its suggestion,
-    keyed by the numbers of finding and suggestion; a suggestion that changes no mission is not among them.
+    The result contains the findings with these suggestions as page data.  It also contains each changed mission with
+    its suggestion, keyed by the numbers of finding and suggestion; suggestions that change no mission are left out.
 
     payload: the editing context, and the pickled flight.
     """
@@ -90,9 +89,10 @@ def try_flown_suggestions(payload: tuple[EditContext, bytes], advance: Advance) 
 
 
 def _try_suggestions(context: EditContext, judged_mission: JudgedMission, advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a verdict, and return those that passed, as `try_flown_suggestions` does."""
+    """Try a verdict's suggestions; return passed ones like `try_flown_suggestions`."""
 
     def report_and_continue() -> bool:
+        """Report that suggestions are tried; return False, so that the trials are not aborted."""
         advance(0.0, MAX_TRIAL_FLIGHTS, "trying suggestions")
         return False
 
@@ -153,13 +153,18 @@ class PlanRequest:
 
 
 def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
-    """Plan one or several paths, and return them with the shortest first.
+    """Plan one or several paths, and return them, the shortest first.
 
     If no path is safe, the best path is returned.
     """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
-    airframe, seed, stop = request.airframe, request.seed, partial(_stop_reason, time.monotonic() + seconds)
+    airframe, seed, deadline = request.airframe, request.seed, time.monotonic() + seconds
+
+    def stop() -> str:
+        """Return the reason to end the search after the deadline, and "" before it."""
+        return "budget" if time.monotonic() > deadline else ""
+
     # Between two items of a mission, the path must join the leg after the second.
     joins_next_leg = request.ends is not None
     if request.ways > 1:
@@ -170,11 +175,6 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     length = float(np.linalg.norm(np.diff(new_plan.waypoints, axis=0), axis=1).sum())
     clearance = least_height(make_problem(scenario, airframe.limits).certified, new_plan.waypoints)
     return [FrontPlan(new_plan, length, math.nan, clearance, math.nan, math.nan)]
-
-
-def _stop_reason(deadline: float) -> str:
-    """Return the reason to end a search after the deadline, or "" before it.  deadline: monotonic time, s."""
-    return "budget" if time.monotonic() > deadline else ""
 
 
 def with_ends(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:

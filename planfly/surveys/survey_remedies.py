@@ -106,9 +106,9 @@ def find_survey_remedies(
 ) -> TriedRemedies:
     """Find changes with which all photo lines of a survey can be used, by trial flights.
 
-    Of each kind of change, the smallest change that passes is returned.
+    For each kind of change, the smallest change that passes is returned.
 
-    If neither longer turn-around distances nor gates are enough, both are combined; if nothing else is enough, longer
+    If neither longer turn-around distances nor gates are enough, both are combined.  If nothing else is enough, longer
     turn-around distances are combined with another parameter value or a lower airspeed.  There are at most four flights
     for each of about six changes.
 
@@ -222,7 +222,7 @@ class _Trials:
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
     def _fly_trial(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
-        """Fly a changed mission, and remember the flight if it came closest to passing.
+        """Fly a changed mission, and store the flight if it came closest to passing.
 
         description: description of the change.
         Returns verdict, mission and path length (m), or None for a mission without a valid route.
@@ -262,7 +262,7 @@ class _Trials:
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
         """Return True if all lines are usable in a flight, and no other rule fails more than before.
 
-        A rule may fail by up to one noticeable difference (`scale`) more than before.
+        A failure may become larger by at most one noticeable difference (`scale`) of the rule.
         """
         return (
             flight is not None
@@ -370,6 +370,7 @@ class _Trials:
         flights: dict[float, _TrialFlight | None] = {}
 
         def is_long_enough(length: float) -> bool:
+            """Return True if all lines are usable with a turn-around distance, or if it exhausts the energy."""
             layout = SurveyLayout(length, stride, lead_in=lead_in)
             flight = flights[length] = self._fly_layout(layout, f"{order_text}turn-arounds of {length:.0f} m")
             if flight is None:
@@ -407,10 +408,11 @@ class _Trials:
         return min(remedies, key=lambda remedy: remedy.length, default=None)
 
     def find_parameter(self) -> SurveyRemedy | None:
-        """Find an autopilot parameter of which another value makes the flight pass; return None without one."""
+        """Find an autopilot parameter that makes the flight pass at another value; return None without one."""
         passed_flights: list[_TrialFlight] = []
 
         def passes_with(autopilot: Autopilot) -> bool:
+            """Return True if the flight passes with an autopilot; store the flight in this case."""
             airframe = replace(self._airframe, autopilot=autopilot)
             flight = self._fly_trial(self._setup.mission, airframe, "another parameter of the autopilot")
             if self._is_remedy(flight):
@@ -487,7 +489,7 @@ class _Trials:
     def _find_turn_around_for_parameter(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes with the farthest value of a parameter.
 
-        Then the value nearest to the current value that passes with this distance is searched.
+        After that, the search finds the passing value nearest to the current value, with this distance.
         """
         remedies = list[SurveyRemedy]()
         # Do not suggest values below the documented range.
@@ -495,6 +497,7 @@ class _Trials:
         step = math.copysign(candidate.step, candidate.far - start)
 
         def passes_with(value: float, turn_arounds: Sequence[float]) -> bool:
+            """Return True if a turn-around distance passes with a parameter value; store the remedy."""
             autopilot = self._airframe.autopilot.with_parameters(**{candidate.name: value})
             airframe = replace(self._airframe, autopilot=autopilot)
             remedy = self._find_turn_around_with(f"{candidate.name} {value:g}", airframe, turn_arounds)
@@ -526,7 +529,7 @@ class _Trials:
     def try_default_airspeed(self) -> SurveyRemedy | None:
         """Try longer turn-around distances with the default airspeed, if the mission sets a too low airspeed.
 
-        Too low is an airspeed below the minimum airspeed of the aircraft.
+        An airspeed is too low if it is below the minimum airspeed of the aircraft.
         """
         mission, default_airspeed = self._setup.mission, self._airframe.airspeed
         slow_items = [

@@ -49,10 +49,12 @@ def lines_headline(measures: list[LineMeasure | None]) -> str:
         summary += f"; {unknown_count} {verb} outside the terrain data and cannot be judged"
     if usable_count + unknown_count == len(measures):
         return summary
-    fractions = [
-        -1.0 if measure is None else math.inf if is_line_unknown(measure) else measure.usable for measure in measures
-    ]
-    worst_index = min(range(len(fractions)), key=lambda k: fractions[k])
+    judged_fractions = {
+        k: -1.0 if measure is None else measure.usable
+        for k, measure in enumerate(measures)
+        if not is_line_unknown(measure)
+    }
+    worst_index = min(judged_fractions, key=lambda k: judged_fractions[k])
     measure = measures[worst_index]
     return (
         f"{summary}; line {worst_index + 1} is the worst:"
@@ -106,7 +108,7 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     )
     for number, (check, (text, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
         if check in faults and spacing:
-            texts[number] += f": that needs {text.format(spacing)} there"
+            texts[number] += f": this requires {text.format(spacing)} there"
     if measure.unusable_fraction > MIN_STATED_FRACTION:
         unusable_text = f"{100.0 * measure.unusable_fraction:.0f} % of the lines' length, where no photo can be used"
         texts.append(f"overlap not judged on {unusable_text}")
@@ -153,7 +155,7 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
     """Describe the loss at the ends of the lines.
 
-    The loss shows the turn-around distance that would be needed.
+    This loss indicates the turn-around distance that would be needed.
     """
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
@@ -161,10 +163,8 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
             f"no part of the {count_text(len(lines), 'line')}, {survey.spacing:.0f} m apart, can be used, "
             "because there is no room to turn"
         )
-    start, end = (
-        max(measure.lost_at_start for measure in usable_lines),
-        max(measure.lost_at_end for measure in usable_lines),
-    )
+    start = max(measure.lost_at_start for measure in usable_lines)
+    end = max(measure.lost_at_end for measure in usable_lines)
     text = (
         f"lines lose at most {start:.0f} m at their start and {end:.0f} m at their end;"
         f" the longest line is {max(measure.length for measure in usable_lines):.0f} m long"
@@ -179,8 +179,8 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
 def near_miss_text(near_miss: NearMiss) -> str:
     """Describe the trial that came closest to passing, and the reason of its failure."""
     return (
-        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used, the worst to"
-        f" {near_miss.worst:.0f} %; {near_miss.verdict.headline}"
+        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used, the worst one to"
+        f" {near_miss.worst:.0f} % of its length; {near_miss.verdict.headline}"
     )
 
 
@@ -213,4 +213,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
-    return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"
+    return (
+        f"{change}: flown, and all lines can be used; the path is {remedy.length / 1000.0:.1f} km long instead"
+        f" of {length / 1000.0:.1f} km"
+    )

@@ -23,6 +23,7 @@ def number_parser(keyword: str) -> Callable[[str], Any]:
     allowed_range = RANGES[keyword]
 
     def parse(text: str) -> float:
+        """Return the number in a text; raise ArgumentTypeError if it is not in the allowed range."""
         value: float = math.nan
         if not allowed_range.integer:
             with contextlib.suppress(ValueError):
@@ -103,7 +104,7 @@ def parse_autopilots(text: str) -> list[str]:
 def parse_time_or_stations(text: str) -> float | str:
     """Parse a time of the flight (s), or return the addresses of ground stations unchanged.
 
-    A text with a colon is taken for addresses.
+    A text with a colon is read as addresses.
     """
     if ":" in text:
         return text
@@ -146,7 +147,7 @@ def parse_problems(text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected numbers of threats out of 7,15,30,60")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected one or more of 7,15,30,60 threats")
     return tuple(numbers)
 
 
@@ -175,9 +176,10 @@ def with_completer(action: argparse.Action, completer: Completer) -> argparse.Ac
 
 
 def file_completer(*suffixes: str) -> Completer:
-    """Return a completer for files with these suffixes, and for folders."""
+    """Return a completer for folders and for files with the given suffixes."""
 
     def propose(prefix: str, **_context: object) -> Iterable[str]:
+        """Return the files with the suffixes, and the folders, that start with a prefix."""
         from argcomplete.completers import FilesCompleter
 
         return FilesCompleter(suffixes)(prefix)
@@ -211,7 +213,7 @@ def complete_mission_or_scenario(prefix: str, **context: object) -> list[str]:
 
 
 def complete_for_shell(parser: argparse.ArgumentParser) -> None:
-    """If a shell has requested completions, print them and end the process."""
+    """Print completions and end the process if a shell has requested them."""
     import argcomplete
 
     argcomplete.autocomplete(parser, always_complete_options="long")

@@ -12,7 +12,7 @@ _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return a table of verdicts, and then the main lines of each verdict.
+    """Return the lines of a table of verdicts, followed by the main lines of each verdict.
 
     The table has a row for each rule and a column for each autopilot.
 
@@ -59,7 +59,7 @@ def _verdict_result_text(verdict: Verdict) -> str:
 
 
 def _rule_summary(rule: RuleFindings | None) -> str:
-    """Return how many findings of a rule failed or passed, as text for a cell.
+    """Return a text for a cell: how many findings of a rule failed or passed.
 
     Returns "" if the rule has no findings.
     """

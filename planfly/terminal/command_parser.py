@@ -61,7 +61,7 @@ _OPTION_IN_TEXT = re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
 
 def colour_help(text: str) -> str:
-    r"""Return a help text with colours for a terminal; the text itself is not changed.
+    r"""Add colours to a help text for a terminal; the words are not changed.
 
     >>> colour_help("usage: planfly fly [--at TIME]").split("\x1b")
     ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
@@ -100,7 +100,7 @@ class CommandParser(argparse.ArgumentParser):
         self.extra_help: Callable[[], str] = str
 
     def error(self, message: str) -> NoReturn:
-        """Print the message in one line, like for all other bad input, and exit."""
+        """Print a message in one line, as for all other bad input, and exit."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
         print(colour_text(line, "bad", sys.stderr), file=sys.stderr)
         raise UsageExit(line)
@@ -119,18 +119,17 @@ class CommandParser(argparse.ArgumentParser):
         return self.add_argument_group(title, description)
 
     def alias_keyword(self, keyword: str, option: str) -> None:
-        """Name the option that error messages show in place of an API keyword.
+        """Set the option that error messages show in place of an API keyword.
 
-        This is needed for a keyword that differs from the option's dest.
+        Call this for a keyword that differs from the option's dest.
         """
         self._aliases[keyword] = option
 
     def take_late_arguments(self, parsed: argparse.Namespace, unknown_arguments: list[str]) -> bool:
-        """Store positional arguments that argparse left over.
+        """Store positional arguments that argparse left over; return True if a parameter takes them.
 
-        Returns True if a positional parameter takes them.
-
-        argparse itself accepts optional positional arguments only directly after the others, not after an option.
+        argparse itself accepts an optional positional argument only directly after the other positional arguments, not
+        after an option.
         """
         for action in self._actions:
             if action.option_strings or any(argument.startswith("-") for argument in unknown_arguments):
@@ -179,7 +178,7 @@ class LineParser(CommandParser):
         self._positionals._group_actions.clear()
 
     def start_section(self, title: str) -> None:
-        """Start a section of the help with a title; the commands added next are listed in this section."""
+        """Start a titled section of the help; it lists the commands that are added next."""
         self._section = title
 
     def add_command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
@@ -279,7 +278,7 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
 
 
 def _similar_option_hint(option: str, options: Iterable[str]) -> str:
-    """Return the end of a message about an unknown option, which suggests the most similar option.
+    """Return a hint at the option most similar to an unknown option, for the end of a message.
 
     Returns "" if no option is similar.
 

@@ -27,7 +27,7 @@ def escape_controls(text: str, *, colours: bool = False) -> str:
 def _escape(match: re.Match[str]) -> str:
     """Return the escape for a matched control character.
 
-    Longer matches and other characters are returned unchanged.
+    A match that is longer, or is another character, is returned unchanged.
     """
     text = match[0]
     is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 def check_flights_option(args: argparse.Namespace, excluded: str) -> None:
     """Raise an error, before anything is planned, if ``--flights`` cannot be flown.
 
-    excluded: name of the option with which no dispersed flights are flown.
+    excluded: name of the option that cannot be combined with dispersed flights.
     """
     if args.flights is None:
         return
     if getattr(args, excluded) is not None:
-        raise ScenarioError.of_argument("flights", args.flights, f"not with `{excluded}`")
+        raise ScenarioError.of_argument("flights", args.flights, f"cannot be combined with `{excluded}`")
     require_extra("campaigns", "--flights needs")
 
 
@@ -37,9 +37,9 @@ def fly_dispersed(args: argparse.Namespace, plan: "Plan") -> "DispersedFlights |
 
 
 def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -> "DispersedFlights":
-    """Return the answer for --json.
+    """Return the answer of dispersed flights for --json.
 
-    remedy_texts: what would raise the probability.
+    remedy_texts: texts on changes that would raise the probability.
     """
     from planfly.campaigns.failure_counts import failures_document
     from planfly.planning.expected_failures import HOLDING_PROBABILITY
@@ -63,19 +63,19 @@ def _dispersed_answer(result: "CampaignResult", remedy_texts: tuple[str, ...]) -
 
 
 def _dispersed_lines(result: "CampaignResult", answer: "DispersedFlights") -> list[str]:
-    """Return the lines for a terminal."""
+    """Return the answer of dispersed flights as lines for a terminal."""
     from planfly.campaigns.failure_counts import failure_lines
     from planfly.campaigns.summary import deciding_lines, undecided_lines
 
     low, high = answer.interval
-    state = "" if answer.holds else ": less than 0.95"
+    state = "" if answer.holds else "; 0.95 is required"
     lines = [
-        f"flights   holds in {answer.flyable} of {answer.flights} flights with the default dispersions"
+        f"flights   the plan succeeds in {answer.flyable} of {answer.flights} flights with the default dispersions"
         f" (P between {low:.2f} and {high:.2f} at 95 %){state}",
         *undecided_lines(result.summary),
         *failure_lines(result.summary.by_rule, result.summary.mission_fault),
         *deciding_lines(result.summary),
     ]
     if answer.remedies:
-        lines.append(f"  raises  {'; '.join(answer.remedies)}")
+        lines.append(f"  raises P  {'; '.join(answer.remedies)}")
     return lines

@@ -49,7 +49,7 @@ def call_api(function: Callable[..., Result], args: argparse.Namespace, **overri
 def add_result_options(
     parser: CommandParser, out: str = "", placeholder: str = "DIR", *, json: bool = True, junit: bool = False
 ) -> None:
-    """Add the options for output files and for the amount of printed text.
+    """Add the options for output files and for how much text is printed.
 
     out: help text of --out, or "" for a command without this option.
     placeholder: placeholder for the value of --out.
@@ -73,7 +73,7 @@ def add_json_and_quiet_options(group: OptionGroup, command: str) -> None:
     group.add_argument(
         "--json",
         metavar="FILE",
-        help="also write the answer as JSON to FILE; with -, to standard output, and all other output to standard "
+        help="also write the answer as JSON to FILE; - writes it to standard output, and all other output to standard "
         f"error; 'planfly help {command} --schema' prints its schema",
     )
     group.add_argument(
@@ -117,9 +117,8 @@ def add_fence_option(group: OptionGroup) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="also respect this fence (.fence, .waypoints, .txt, .plan) or these airspace zones (.geojson, .json "
-        "including ED-269 and ED-318, .kml, .openair, .gpkg), or use these rally points (.rally, or a .waypoints "
-        "that contains only rally points); repeatable",
+        help="also respect a fence (.fence, .waypoints, .txt, .plan) or airspace zones (.geojson, .json including "
+        "ED-269 and ED-318, .kml, .openair, .gpkg), or use rally points (.rally, .waypoints); repeatable",
     )
     with_completer(option, file_completer("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 
@@ -130,8 +129,8 @@ def add_time_option(group: OptionGroup) -> None:
         "--at",
         metavar="TIME",
         help=(
-            "time of the flight, START or START/END in ISO 8601 format, as in 2026-05-01T10:00+02:00: zones that are "
-            "inactive at that time are ignored, and a forecast is read from START on (default: all zones are active)"
+            "time of the flight in ISO 8601 format, START or START/END, as in 2026-05-01T10:00+02:00; inactive zones "
+            "are then ignored, and a forecast is read from START on (default: all zones are active)"
         ),
     )
 
@@ -151,13 +150,13 @@ def add_aircraft_and_wind_options(parser: CommandParser) -> None:
         "--airspeed",
         metavar="M/S",
         type=number_parser("airspeed"),
-        help="true airspeed until the mission sets one, m/s (default: the aircraft's cruise speed)",
+        help="true airspeed until the mission sets another, m/s (default: the aircraft's cruise speed)",
     )
     group.add_argument(
         "--wind",
         metavar="SPEED,FROM",
         type=parse_wind,
-        help="steady wind: m/s, and the direction it blows from in degrees: 8,270 is 8 m/s from the west "
+        help="steady wind: its speed in m/s, and the direction it blows from in degrees; 8,270 is 8 m/s from the west "
         "(default: the scenario's, or none)",
     )
     add_turbulence_option(group)
@@ -191,7 +190,7 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         metavar="FILE",
         help=(
             "parameter file of the simulated autopilot, as saved by a ground station; it also "
-            "selects the autopilot if none is named"
+            "selects the autopilot if --autopilot is not given"
         ),
     )
     with_completer(option, file_completer("param", "parm", "params"))
@@ -199,16 +198,16 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         "--autopilot",
         choices=CHOICES["autopilot"],
         help=(
-            "simulated autopilot: ardupilot (the default) is ArduPlane, px4 is PX4 for fixed wing, planfly is "
-            "planfly's own guidance; a name without a number takes the release that saved the parameter file, "
-            "otherwise the newest"
+            "simulated autopilot: ardupilot (ArduPlane, the default), px4 (PX4 for fixed wing) or planfly (planfly's "
+            "own guidance); a name without a number stands for the release that saved the parameter file, or else for "
+            "the newest"
         ),
     )
     group.add_argument(
         "--guidance",
         choices=CHOICES["guidance"],
-        help="fly planfly's own guidance instead: along the path (path), L1 along the legs (l1), or Beard and McLain's "
-        "vector field",
+        help="fly with planfly's own guidance instead of an autopilot: path follows the path with its arcs, l1 follows "
+        "the legs by L1, and vector-field follows the path by Beard and McLain's vector field",
     )
     return group
 
@@ -219,8 +218,8 @@ def add_steering_options(parser: CommandParser) -> OptionGroup:
     group.add_argument(
         "--nav",
         choices=CHOICES["nav"],
-        help="position errors of the navigation: 0, 0.05 or 1.5 m on each axis (default: gnss for autopilots, perfect "
-        "for planfly's guidance)",
+        help="position error of the navigation on each axis: 0 (perfect), 0.05 m (rtk) or 1.5 m (gnss) (default: gnss "
+        "for autopilots, perfect for planfly's guidance)",
     )
     return group
 
@@ -236,23 +235,23 @@ def add_flight_options(parser: CommandParser) -> None:
     group = add_steering_options(parser)
     add_sitl_option(
         group,
-        "fly ArduPlane or PX4 itself in planfly's flight dynamics: the path of its program, built for software in the "
-        "loop (extra planfly[live])",
+        "fly with ArduPlane or PX4 itself instead of the simulated autopilot: PATH is its program, built for software "
+        "in the loop (requires planfly[live])",
     )
     group.add_argument(
         "--engine",
         choices=CHOICES["engine"],
         default="auto",
         help=(
-            "flight model: auto (default) uses the compiled model if it is bit-identical to JSBSim, "
+            "flight model: auto (default) uses the compiled model if its results are bit-identical to JSBSim's, "
             "jsbsim always uses JSBSim"
         ),
     )
     group.add_argument(
         "--levels",
         action="store_true",
-        help="if the flight passes, also fly the mission by planfly's guidance, and say whether the two flights agree "
-        "(default: only if the flight fails, to find out why)",
+        help="fly the mission with planfly's own guidance, too, even if the flight passes, and compare the two flights "
+        "(default: only if the flight fails, to find the cause)",
     )
     limits = parser.add_group("limits of the flight")
     limits.add_argument(
@@ -272,14 +271,14 @@ def add_flight_options(parser: CommandParser) -> None:
 
 
 def add_flights_option(group: OptionGroup) -> None:
-    """Add the option for dispersed flights of the finished plan."""
+    """Add the option --flights, for dispersed flights of the finished plan."""
     group.add_argument(
         "--flights",
         metavar="N",
         type=number_parser("flights"),
-        help="then fly the plan N times with the default dispersions of 'planfly campaign', and say in how many "
-        "flights it holds, what decides, and what would help; the exit code is 4 if the whole interval is below 0.95; "
-        "40 flights take some 20 s",
+        help="then fly the plan N times with the default dispersions of 'planfly campaign', and report the share of "
+        "flyable flights and what would help; the exit code is 4 if the share's whole confidence interval is below "
+        "0.95; 40 flights take some 20 s",
     )
 
 
@@ -291,14 +290,14 @@ def add_log_rate_option(group: OptionGroup) -> None:
         type=int,
         choices=CHOICES["log_hz"],
         default=60,
-        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict uses these rows",
+        help="rows per second in the log: 60 (default), 30, 20 or 10; the verdict is computed from these rows",
     )
 
 
 def add_imported_log_options(parser: CommandParser) -> None:
-    """Add the options for information that another program's log may lack.
+    """Add the options for data that another program's log may lack.
 
-    They state its mission, flight number and altitude datum.
+    The options state the log's mission, flight number and altitude datum.
     """
     group = parser.add_group("an autopilot's log")
     option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
@@ -343,7 +342,10 @@ def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
         "--allow", metavar="IP,IP", help="addresses of stations on other machines that may talk to the vehicle"
     )
     group.add_argument(
-        "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
+        "--sign-key",
+        metavar="FILE",
+        help="file with the MAVLink signing key, 64 hexadecimal digits or a passphrase; only its owner may"
+        " read it (mode 600)",
     )
 
 
@@ -351,11 +353,12 @@ def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
 def watch_stop_signals() -> Iterator[Callable[[], bool]]:
     """Catch SIGINT and SIGTERM while the block runs.
 
-    Yields a function that returns True after either signal.
+    Yields a function that returns True once one of the two signals has arrived.
     """
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:
+        """Note that a signal to stop has arrived."""
         nonlocal should_stop
         should_stop = True
 

@@ -97,7 +97,7 @@ class _TolerantStream(_SafeStream):
     def _drop_output(self) -> None:
         """Discard all further text.
 
-        The descriptor is redirected to the null device for the text that is still buffered.
+        The descriptor is redirected to the null device, which receives the text that is still buffered.
         """
         self._is_reader_gone = True
         # When the interpreter ends, it flushes the buffered text, which then goes to the null device.
@@ -111,9 +111,10 @@ def _with_stream_name(error: OSError) -> OSError:
 
 
 def open_standard_streams() -> None:
-    """Open closed standard streams, and let all three accept any text.
+    """Open those standard streams that are closed, and let all three accept any text.
 
-    If a stream stayed closed, the next file would get its descriptor, and text printed by a library would go there.
+    If a stream stayed closed, the next opened file would get its descriptor, and text printed by a library would go
+    into that file.
     """
     for descriptor in range(3):
         try:
@@ -141,9 +142,9 @@ def printable(text: str) -> str:
 
 
 def plain_stream(stream: TextIO) -> TextIO:
-    """Return the stream under a `_SafeStream`, for text that moves the cursor.
+    """Return the stream below a `_SafeStream`, for text that moves the cursor.
 
-    Returns other streams unchanged.
+    Other streams are returned unchanged.
     """
     plain: TextIO = getattr(stream, "plain", stream)
     return plain
@@ -244,7 +245,7 @@ class _TimeLeft:
     def estimate(self, done: float, total: float) -> str:
         """Record the work done, and return the time left as text.
 
-        The text is "" at the end, without a total, or without progress since the first report.
+        The text is "" if the work is done, if the total is unknown, or if there was no progress since the first report.
         """
         if self._first_report is None:
             self._first_report = time.monotonic(), done
@@ -254,7 +255,7 @@ class _TimeLeft:
         return f"{_duration_text(self._measured_time() * (total - done) / units_done)} left"
 
     def initial_estimate(self, remaining_units: float) -> str:
-        """Return an estimate as text before any progress is measured, from the last stage of this kind.
+        """Return the estimate before any progress is measured, from the last stage of this kind, as text.
 
         remaining_units: units of work still to be done, 0 if unknown.
         """
@@ -306,11 +307,11 @@ def _duration_text(seconds: float) -> str:
 
 @contextmanager
 def progress(title: str, kind: str = "") -> Iterator[Advance]:
-    """Show the progress of a stage; the work reports the units done, the total and a remark.
+    """Show the progress of a stage, which reports units done, total and a remark to the yielded function.
 
-    kind: see `planfly.runtime.stages.stage`.
-    The time left follows the remark, unless the remark states it. At first, the duration of the previous stage of its
-    kind on this machine is shown, or "no estimate". A total of 0 means that the total is unknown.
+    kind: see `planfly.runtime.stages.stage`.  The time left is shown after the remark, unless the remark already states
+    it.  Before progress is measured, the display shows how long the last stage of this kind took on this machine, or
+    "no estimate".  A total of 0 means that the total is unknown.
     """
     time_left = _TimeLeft(kind or title)
     display = _Bar(title, time_left) if sys.stderr.isatty() else _Lines(title, time_left)
@@ -328,6 +329,7 @@ def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
     stage_ended = threading.Event()
 
     def refresh() -> None:
+        """Refresh the display at intervals until the stage ends."""
         # The reader of the stream may have gone; the work itself handles this error.
         with contextlib.suppress(OSError, ValueError):
             while not stage_ended.wait(_REFRESH_INTERVAL_S):
@@ -343,12 +345,12 @@ def _refresh_regularly(display: "_Bar | _Lines") -> Iterator[None]:
 
 
 def _join_nonempty(*parts: str) -> str:
-    """Join the parts that are not empty by commas."""
+    """Join the non-empty parts by commas."""
     return ", ".join(filter(None, parts))
 
 
 def _states_time_left(remark: str) -> bool:
-    """Return True if a remark states the time left itself: for resumed work, or work that may still grow."""
+    """Return True if a remark already states the time left, as for resumed or growing work."""
     return " left" in remark
 
 
@@ -394,7 +396,7 @@ class _Bar:
             self._bar.set_postfix_str(printable(text))
 
     def refresh(self) -> None:
-        """Show the elapsed time until progress is measured."""
+        """Show the elapsed time as long as no progress is measured."""
         with self._lock:
             if not self._is_measured and not self._bar.disable:
                 text = _join_nonempty(self._remark, self._initial_estimate, f"{self._time_left.elapsed():.0f} s so far")
@@ -428,31 +430,22 @@ class _Lines:
             self._remark = remark
             estimate = self._time_left.estimate(done, total)
             knew_total, self._knows_total = self._knows_total, self._knows_total or total > 0.0
-            estimate_at_start = (
-                ""
-                if knew_total
-                else remark
-                if _states_time_left(remark)
-                else self._time_left.initial_estimate(max(0.0, total - done))
-            )
+            initial_remark = remark
+            if not knew_total and not _states_time_left(remark):
+                initial_estimate = self._time_left.initial_estimate(max(0.0, total - done))
+                initial_remark = _join_nonempty(remark if total > 0.0 else "", initial_estimate)
             if not self._has_started:
-                self._print_first_line(
-                    estimate_at_start
-                    if _states_time_left(remark)
-                    else _join_nonempty(remark if total > 0.0 else "", estimate_at_start)
-                )
+                self._print_first_line(initial_remark)
             elif total > 0.0 and not knew_total:
                 # The first line was printed before the total was known.
-                self._print_and_note_time(
-                    f"{self._title}: {_join_nonempty('' if _states_time_left(remark) else remark, estimate_at_start)}"
-                )
+                self._print_and_note_time(f"{self._title}: {initial_remark}")
             elif estimate and self._time_left.is_due():
                 self._print_and_note_time(
                     f"{self._title}: {_join_nonempty(remark, '' if _states_time_left(remark) else estimate)}"
                 )
 
     def refresh(self) -> None:
-        """Print the first line of a stage that reports nothing, and then its elapsed time at intervals."""
+        """For a stage that reports nothing, print its first line, and later its elapsed time at intervals."""
         with self._lock:
             if self._is_over:
                 return
@@ -464,7 +457,7 @@ class _Lines:
                 )
 
     def _print_first_line(self, estimate: str) -> None:
-        """Print the line that a stage begins, with an estimate of its duration."""
+        """Print a line which states that a stage begins, with an estimate of its duration."""
         self._has_started = True
         self._print_and_note_time(f"{self._title} ... ({estimate})")
 
@@ -508,9 +501,9 @@ def redirect_output(args: argparse.Namespace) -> Iterator[None]:
 
     With ``--json -`` the lines are printed on standard error.
 
-    Progress is not shown with --quiet.  Raises PlanflyError if another argument, too, names the file of the JSON answer
-    or of the JUnit report, or if it exists and is not to be overwritten.  A resumed command replaces the files that it
-    wrote when it was interrupted.
+    Progress is not shown with --quiet.  Raises PlanflyError if the file of the JSON answer or of the JUnit report
+    exists and must not be overwritten, or if another argument names the same file.  A resumed command replaces the
+    files that it wrote before it was interrupted.
     """
     may_replace = getattr(args, "overwrite", False) or getattr(args, "resume", False)
     answer_target, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
@@ -573,7 +566,7 @@ ERROR_SCHEMA = "planfly.error/1"
 
 
 def write_error_if_requested(args: argparse.Namespace, code: int, message: str) -> None:
-    """Write an error to the files of --json and --junit, in place of those of an earlier run.
+    """Write an error to the files of --json and --junit, replacing those of an earlier run.
 
     message: line that the command prints at its end.
     """
@@ -586,12 +579,12 @@ def write_error_if_requested(args: argparse.Namespace, code: int, message: str) 
 def write_usage_error_if_requested(
     arguments: Sequence[str], message: str, commands: Mapping[str, CommandParser]
 ) -> None:
-    """Write an error in the command line to the files of its --json and --junit, as `write_error_if_requested` does.
+    """Write an error in the command line itself to the files of its --json and --junit.
 
     arguments: the command line, which could not be parsed.
     commands: parsers of the commands by name.
 
-    A file is not written if it exists without --overwrite, or if another argument may be this file.
+    A file is not written if it exists and --overwrite is missing, or if another argument may name this file.
     """
     command = next((argument for argument in arguments if argument in commands), None)
     if command is None:
@@ -627,7 +620,7 @@ def _write_error(json_target: str | None, junit_target: str | None, source: str,
 
 
 def _replace_or_remove(file: Path, text: str) -> None:
-    """Write a file, or remove the old one if it cannot be written."""
+    """Write a file; if that fails, remove the existing file."""
     try:
         write_atomically(file, text)
     except (OSError, PlanflyError):
@@ -637,9 +630,9 @@ def _replace_or_remove(file: Path, text: str) -> None:
 
 
 def _check_named_once(name: str, target: Path, args: argparse.Namespace) -> None:
-    """Raise PlanflyError if another argument of the command line names the target file.
+    """Raise PlanflyError if another argument of the command line also names the target file.
 
-    name: name of the target's own argument.
+    name: name of the argument that sets the target.
     """
     for key, value in vars(args).items():
         if key in (name, "command"):

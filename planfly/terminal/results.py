@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def print_verdict(verdict: "Verdict", notes: Iterable[str], setup: "FlightSetup | None" = None) -> None:
     """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule.
 
-    setup: setup of the judged flight, to find out whether its planned route has suggestions; None if there is none.
+    setup: setup of the judged flight, used to look for suggestions on its planned route; None without a flight.
     """
     # Imported here because --help does not need them.
     from planfly.terminal.verdict_lines import verdict_lines
@@ -27,11 +27,11 @@ def print_verdict(verdict: "Verdict", notes: Iterable[str], setup: "FlightSetup 
 def print_returns_line(line: str) -> None:
     """Print the line on returns to launch, unless the line is empty."""
     if line:
-        print(f"returns   {line} (more: planfly returns)")
+        print(f"returns   {line}; more: planfly returns")
 
 
 def print_engine(engine: str) -> None:
-    """Print the flight model that flew and the reason, unless nothing was flown."""
+    """Print which flight model flew and why, unless nothing was flown."""
     if engine:
         print(f"model     {engine}")
 

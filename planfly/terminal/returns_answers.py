@@ -214,7 +214,7 @@ class ReturnsAnswer:
 def suggestion_entry(result: ReturnsResult, trial: RemedyTrial) -> ReturnSuggestion:
     """Return the JSON entry of a suggested remedy.
 
-    It has the numbers of safe and unsafe returns with this remedy.
+    The entry has the numbers of safe and unsafe returns with this remedy.
     """
     rally = None
     if trial.remedy.rally is not None:
@@ -276,7 +276,7 @@ def _round_to_tenths(value: float) -> float | None:
 def glides_entry(result: ReturnsResult) -> GlidesEntry:
     """Return the JSON entry of all glides after an engine failure.
 
-    It names the place that can be reached from each second of the flight.
+    It names the place in reach at each second of the flight.
     """
     glides = result.glides
     entries = []

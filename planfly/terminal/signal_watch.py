@@ -35,10 +35,10 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
 
     The process is ended by force ``grace`` seconds after a signal.
 
-    Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long. A thread
-    therefore kills this process's children, removes its unfinished files and ends it with exit code 128 plus the number
-    of the signal. The thread keeps watching after this block until the process has ended, so use this block as the
-    outermost block of a program.
+    Python's signal handlers may run late: compiled code and compilers delay them, and waits for other processes can be
+    long.  Therefore a thread kills the children of this process, removes its unfinished files, and ends it with exit
+    code 128 plus the number of the signal.  The thread keeps watching after this block until the process has ended.
+    Use this block as the outermost block of a program.
 
     Yields a list to which the number of a signal is added when it arrives.
     """
@@ -47,6 +47,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
     is_ending = False
 
     def handle_signal(number: int, frame: FrameType | None = None) -> None:
+        """Raise `Interrupted` for the first signal, later if compiled code is running."""
         # The first signal interrupts the work; the code that then ends the work must not be interrupted.
         nonlocal is_ending
         if is_ending:
@@ -59,7 +60,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
         interrupt(number)
 
     def raise_signal_again(unraisable: "sys.UnraisableHookArgs") -> None:
-        # The exception was raised in a callback of a library, which dropped it.  Raise the signal again a little later.
+        """Raise a signal again, a little later, if a callback of a library dropped its exception."""
         nonlocal is_ending
         if isinstance(unraisable.exc_value, Interrupted):
             is_ending = False
@@ -86,10 +87,9 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
     """Return True if Numba is in the call stack.
 
-    Numba may be compiling, reading a cached kernel or boxing a kernel's results.
-
-    If an exception interrupts Numba, compiled code continues with a null pointer, and the process crashes. A result
-    that is a named tuple is made by a module named after its class.
+    Numba may be compiling, reading a cached kernel, or converting the results of a kernel.  If an exception interrupts
+    it there, compiled code continues with a null pointer, and the process crashes.  A result that is a named tuple is
+    made by a module named after its class.
     """
     while frame is not None:
         module = str(frame.f_globals.get("__name__"))
@@ -102,7 +102,7 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
     """Return a function that reads signal numbers, and the handle to which Python writes them.
 
-    The handle does not block.
+    Writing to the handle does not block.
     """
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
@@ -126,9 +126,10 @@ def _end_process_after_signal(read_number: Callable[[int], bytes], received: lis
     # Append the number here, too, because a command may have its own signal handlers.
     received.append(number)
     start_time, start_wait_time = time.monotonic(), _processor_wait_time()
-    while (
-        elapsed := time.monotonic() - start_time
-    ) < _MAX_GRACE_S and elapsed - _processor_wait_time() + start_wait_time < grace:
+    while (elapsed := time.monotonic() - start_time) < _MAX_GRACE_S:
+        wait_time = _processor_wait_time() - start_wait_time
+        if elapsed - wait_time >= grace:
+            break
         time.sleep(_RETRY_INTERVAL_S)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")
@@ -136,7 +137,7 @@ def _end_process_after_signal(read_number: Callable[[int], bytes], received: lis
 
 
 def _processor_wait_time() -> float:
-    """Return the total time for which the main thread has waited for a processor, s, or 0 if not on Linux."""
+    """Return the total time that the main thread has waited for a processor, s; 0 if not on Linux."""
     try:
         return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
     except (OSError, IndexError, ValueError):
@@ -152,7 +153,7 @@ def end_process(code: int) -> NoReturn:
 
 
 def _kill_children_and_exit(code: int) -> NoReturn:
-    """Kill the children of this process, remove unfinished files of all of them, and exit at once."""
+    """Kill the children of this process, remove their unfinished files and its own, and exit at once."""
     # Do not import multiprocessing: if it is not yet imported, there are no children, and an import could block.
     multiprocessing = sys.modules.get("multiprocessing")
     deadline = time.monotonic() + _REMOVAL_TIMEOUT_S

@@ -115,22 +115,34 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
     """
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
-    def round_to_1e4(value: float | None) -> float | None:
-        return None if value is None else round(value, 4)
-
+    if measure is None:
+        return PhotoLineEntry(
+            first_item=first,
+            last_item=last,
+            length_m=None,
+            usable=None,
+            away=None,
+            banked=None,
+            high=None,
+            dark=None,
+            unknown=None,
+            lost_m=[],
+            photos=None,
+            missed=None,
+        )
     return PhotoLineEntry(
         first_item=first,
         last_item=last,
-        length_m=None if measure is None else round(measure.length, 1),
-        usable=round_to_1e4(None if measure is None else measure.usable),
-        away=round_to_1e4(None if measure is None else measure.off_line),
-        banked=round_to_1e4(None if measure is None else measure.banked),
-        high=round_to_1e4(None if measure is None else measure.off_height),
-        dark=round_to_1e4(None if measure is None else measure.camera_off),
-        unknown=round_to_1e4(None if measure is None else measure.unknown),
-        lost_m=[] if measure is None else [(round(start, 1), round(end, 1)) for start, end in measure.lost_spans],
-        photos=None if measure is None else measure.photos,
-        missed=None if measure is None else measure.missed_photos,
+        length_m=round(measure.length, 1),
+        usable=round(measure.usable, 4),
+        away=round(measure.off_line, 4),
+        banked=round(measure.banked, 4),
+        high=round(measure.off_height, 4),
+        dark=round(measure.camera_off, 4),
+        unknown=round(measure.unknown, 4),
+        lost_m=[(round(start, 1), round(end, 1)) for start, end in measure.lost_spans],
+        photos=measure.photos,
+        missed=measure.missed_photos,
     )
 
 
@@ -157,7 +169,7 @@ def near_miss_entry(near_miss: NearMiss) -> NearMissEntry:
 
 
 def survey_remedy_entry(remedy: SurveyRemedy) -> SurveyRemedyEntry:
-    """Return the JSON entry of a remedy, a change that makes all lines of a survey usable."""
+    """Return the JSON entry of a remedy: a change that makes all photo lines of a survey usable."""
     return SurveyRemedyEntry(
         kind=remedy.kind,
         name=remedy.name,

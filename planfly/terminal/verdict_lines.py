@@ -6,7 +6,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import shorten_statement
+from logs.verdict.wording import noun_with_place, shorten_statement
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
@@ -18,7 +18,7 @@ _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def never_suggests() -> bool:
-    """Return False: no change is suggested for the planned route."""
+    """Return False, for a verdict without a planned route that could have suggestions."""
     return False
 
 
@@ -29,8 +29,8 @@ def verdict_lines(
 
     They are the summary, the failures, the finding closest to its limit for each rule, and the notes.
 
-    suggests_by_geometry: returns True if changes of the planned route are suggested without a flight; called only if
-    the flight has no suggestion.
+    suggests_by_geometry: function that returns True if changes of the planned route are suggested without a flight.  It
+        is called only if the flight has no suggestion.
     """
     presentation = verdict.present()
     lines = [colour_text(presentation.headline, STATE_STYLES[presentation.state]), *presentation.details]
@@ -39,7 +39,7 @@ def verdict_lines(
     no_change_text = _no_change_text(verdict, suggests_by_geometry)
     lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
     lines += [
-        f"  open    {rule_word(finding.rule)} at {finding.where}: {finding.reason}"
+        f"  open    {noun_with_place(rule_word(finding.rule), finding.place)}: {finding.reason}"
         for finding in presentation.undecided[: 2 * _MAX_LISTED]
     ]
     # One flight would decide all findings with the same suggestion.
@@ -54,9 +54,9 @@ def verdict_lines(
 
 
 def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) -> str:
-    """State that no change passed its trial, if no failed finding has a suggestion; return "" otherwise.
+    """State that no change passed its trial if no failed finding has a suggestion; otherwise return "".
 
-    A failed flight has this text only if the planned route fails, too.
+    After a failed flight, the text is returned only if the planned route fails, too.
     """
     # Findings on returns state their own remedy.
     is_judged = verdict.level in ("geometric", "flown") and not verdict.imported
@@ -74,17 +74,17 @@ def _no_change_text(verdict: Verdict, suggests_by_geometry: Callable[[], bool]) 
 
 
 def _failed_lines(rule: RuleFindings) -> list[str]:
-    """Return the lines for a failed rule.
+    """Return the lines for a failed rule: its worst finding, a suggestion, and the other failed places.
 
-    They name the worst finding, its suggestion, or that of another if it has none, and the other places that failed.
+    The suggestion is that of the worst finding, or else of another finding.
     """
     worst_finding, *other_findings = rule.failed
     # A fence item names its rule.
-    place_text = f"{rule.words.word} at {worst_finding.where}"
+    place_text = noun_with_place(rule.words.word, worst_finding.place)
     if worst_finding.where.startswith(f"{rule.words.word} "):
         place_text = worst_finding.where
     if other_findings:
-        place_text = f"{rule.words.word}, {len(rule.failed)} of {rule.judged}; the worst at {worst_finding.where}"
+        place_text = f"{rule.words.word}: {len(rule.failed)} of {rule.judged} fail; the worst at {worst_finding.where}"
     lines = [colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}"]
     if worst_finding.suggestions:
         lines.append(colour_text("          would pass: ", "hint") + worst_finding.suggestion)
@@ -103,7 +103,7 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
 def _place_and_value(finding: Finding) -> str:
     """Return the place of a failed finding, with its value if it has one, such as "leg 4 (12.3 m)".
 
-    If the value is within its limit, the finding fails for another reason, which replaces the value.
+    If the value is within its limit, the finding fails for another reason: this reason then replaces the value.
     """
     value = finding.compared_texts()[0] if finding.margin is not None else shorten_statement(finding.brief)
     return finding.where + (f" ({value})" if value else "")
@@ -112,14 +112,16 @@ def _place_and_value(finding: Finding) -> str:
 def _rule_summary(rule: RuleFindings) -> str:
     """Return the counts of a rule's findings and the finding closest to its limit.
 
-    For a rule without a judged finding the text gives the reason.
+    If no finding of the rule was judged, the text states the reason.
     """
     if not rule.judged:
         return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
         # Of several such findings the first stands for all.
-        return "; ".join([rule.count_text, *(f"{one.where}: {one.reason}" for one in rule.passed_otherwise[:1])])
+        return "; ".join(
+            [rule.count_text, *(f"{finding.where}: {finding.reason}" for finding in rule.passed_otherwise[:1])]
+        )
     value, limit = closest.compared_texts()
     if not value or not limit:
         return rule.count_text

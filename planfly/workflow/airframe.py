@@ -79,7 +79,7 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 
 
 def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
-    """Load the aircraft of a scenario, its autopilot, and the limits that scenario and aircraft set.
+    """Load a scenario's aircraft and autopilot, and the limits from scenario and aircraft.
 
     parameters: autopilot parameters that replace the file's parameters, by name and in the units of the autopilot.
     Raises ScenarioError for an unknown aircraft or autopilot, or an airspeed outside the range of the aircraft, and
@@ -116,13 +116,13 @@ def airframe_for_setup(setup: FlightSetup) -> Airframe:
 
 
 def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
-    """Return the bank limit in turns, rad: the lower limit of scenario and autopilot; inf if neither states a limit."""
+    """Return the bank limit in turns, rad: the lower of scenario and autopilot; inf if neither has a limit."""
     stated_bank = scenario.flight.max_bank_deg
     return min(math.inf if stated_bank is None else math.radians(stated_bank), autopilot.turns.max_bank)
 
 
 def with_tracking_error(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
-    """Return limits with the tracking error of an autopilot in the wind and navigation of a scenario."""
+    """Add the tracking error of an autopilot, in the wind and navigation of a scenario, to limits."""
     table = scenario.flight
     tracking = autopilot.deviations.tracking_error(
         limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
@@ -170,7 +170,7 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 def with_tightened_limits(airframe: Airframe, scenario: Scenario) -> Airframe:
     """Return the airframe with the limits of a tightened scenario.
 
-    Envelope, airspeed and tracking error stay.
+    Envelope, airspeed and tracking error are kept.
     """
     old_limits = airframe.limits
     limits = make_limits(
@@ -182,6 +182,6 @@ def with_tightened_limits(airframe: Airframe, scenario: Scenario) -> Airframe:
 def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:
     """Raise FlightError if the aircraft cannot fly level at any airspeed and altitude of its envelope."""
     if not np.isfinite(envelope.level_speed_max - envelope.level_speed_min).any():
-        amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m above sea level"
-        message = f"{aircraft.name} cannot hold level flight at any airspeed, from {amsl}"
+        amsl = f"{envelope.amsl[0]:.0f} to {envelope.amsl[-1]:.0f} m AMSL"
+        message = f"{aircraft.name} cannot fly level: no airspeed is possible at any altitude from {amsl}"
         raise FlightError(message, file=aircraft.name, field="airspeed")

@@ -14,12 +14,12 @@ import numpy as np
 
 from flight.mission.altitude_frames import misread_altitudes
 from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude, set_loiter_radius
-from flight.mission.items import LANDINGS, Command, Frame, Mission
+from flight.mission.items import LANDINGS, OVER_TERRAIN, Command, Frame, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.measures.violated_legs import violated_legs
 from logs.verdict.places import Change, ItemMove, Suggestion
-from logs.verdict.tolerances import MIN_LEG_LENGTH_M
+from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M, MIN_LEG_LENGTH_M
 from logs.verdict.trials import first_that_passes
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from world.arrays import Floats
@@ -37,7 +37,7 @@ _MIN_MOVE_SHARE = 0.2
 
 
 def can_apply(suggestion: Suggestion) -> bool:
-    """Return True if every change of a suggestion can be made by moving items of a mission.
+    """Return True if every change of a suggestion can be made by editing the items of a mission.
 
     >>> from logs.verdict.places import FLIGHT, Place
     >>> can_apply((Change("length", Place("leg", 1), 300.0, 400.0, "m"),))
@@ -97,7 +97,8 @@ def item_moves(context: MissionContext, before: Mission, after: Mission) -> tupl
 
     The result is empty if items were inserted, as for a change of airspeed.
 
-    A change of altitude is 0 if the altitude is unknown.
+    A change of altitude is 0 if the altitude is unknown.  An item that only gets a height above terrain, which its
+    suggestion states, does not move.
     """
     if len(before.items) != len(after.items):
         return ()
@@ -108,7 +109,9 @@ def item_moves(context: MissionContext, before: Mission, after: Mission) -> tupl
         if new.frame == old.frame and math.isfinite(old.alt):
             # The altitude of a stop above terrain changes with the ground, although its item states the same height.
             up = new.alt - old.alt
-        if (old.lat_deg, old.lon_deg, old.alt) != (new.lat_deg, new.lon_deg, new.alt):
+        is_height_over_terrain = new.frame in OVER_TERRAIN and old.frame not in OVER_TERRAIN
+        altitudes = (0.0, 0.0) if is_height_over_terrain else (old.alt, new.alt)
+        if (old.lat_deg, old.lon_deg, altitudes[0]) != (new.lat_deg, new.lon_deg, altitudes[1]):
             moves.append(ItemMove(old.seq, east, north, up if math.isfinite(up) else 0.0))
     return tuple(moves)
 
@@ -174,11 +177,11 @@ class _EditedMission:
         return index is not None and self.mission.items[index].command in LANDINGS
 
     def move_items(self, waypoints: Sequence[int], offset: Floats, *, along_approach: bool = False) -> None:
-        """Move the items of waypoints, except landings, each item once.
+        """Move the items of waypoints, except landings; an item with several waypoints is moved once.
 
         offset: east, north and up, m.
-        along_approach: True for a move along the final approach, which a landing sequence allows.
-        Raises MissionError for a move to a side of an item of a landing sequence.
+        along_approach: True for a move along the final approach, the only direction in which items of a landing
+            sequence may move.  Raises MissionError for any other horizontal move of such an item.
         """
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
@@ -222,7 +225,7 @@ def _changed_leg(change: Change, route: Route) -> int:
 
 
 def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Lengthen a leg by moving only its end along the leg's course, or the start of a leg that ends with a landing."""
+    """Lengthen a leg by moving its end along its course, or its start if the leg ends with a landing."""
     leg = _changed_leg(change, edited.route)
     start, end = edited.current_position(leg), edited.current_position(leg + 1)
     step = end[:2] - start[:2]
@@ -276,6 +279,7 @@ def _make_turn_gentler(edited: _EditedMission, change: Change, _finding: Finding
     straight_point = previous[:2] + fraction * chord
 
     def is_gentle(step: int) -> bool:
+        """Return True if the turn is gentle enough after a step towards the straight line."""
         bent_points = np.array(
             [previous, [*(corner[:2] + step / _TURN_STEPS * (straight_point - corner[:2])), corner[2]], next_waypoint]
         )
@@ -305,14 +309,14 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Set the altitude of home, above which the altitudes of items are stated."""
+    """Set the altitude of home, relative to which the altitudes of items are stated."""
     if edited.mission.home is not None and edited.mission.home.alt != change.wanted:
         edited.mission = replace(edited.mission, home=replace(edited.mission.home, alt=change.wanted))
         edited.is_changed = True
 
 
 def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
-    """State the altitudes of items below ground relative to home, with the same numbers."""
+    """Change the altitude frame of items below ground to "above home", keeping their numbers."""
     scenario, mission = edited.requirements.setup.scenario, edited.mission
     below_ground, _ = misread_altitudes(mission, scenario.origin, scenario.terrain)
     items = list(mission.items)
@@ -322,8 +326,30 @@ def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Findi
         edited.mission, edited.is_changed = replace(mission, items=tuple(items)), True
 
 
+def _follow_ground(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+    """State the altitude of a leg's end as a height above terrain.
+
+    A start of the leg that is lower than the required height is raised in its own frame, because another leg leads to
+    it.
+    """
+    leg = _changed_leg(change, edited.route)
+    terrain, index = edited.context.scenario.terrain, edited.item_index(leg + 1)
+    if terrain is None or index is None:
+        return
+    start, end = edited.current_position(leg), edited.current_position(leg + 1)
+    start_height, end_height = (float(place[2] - terrain.height(place[0], place[1])) for place in (start, end))
+    missing_height = edited.context.scenario.limits.min_clearance_m + HEIGHT_ERROR_LIMIT_M - start_height
+    if missing_height > 0.0:
+        edited.move_items([leg], np.array([0.0, 0.0, float(math.ceil(missing_height))]))
+    items = list(edited.mission.items)
+    items[index] = replace(items[index], frame=Frame.GLOBAL_TERRAIN_ALT, alt=change.wanted)
+    edited.mission, edited.is_changed = replace(edited.mission, items=tuple(items)), True
+    offset = np.array([0.0, 0.0, change.wanted - end_height])
+    edited.offsets[index] = edited.offsets.get(index, np.zeros(3)) + offset
+
+
 def _end_with_loiter(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Turn the last waypoint into a loiter without end, which keeps the autopilot from returning by itself."""
+    """Turn the last waypoint into a loiter without end, so that the autopilot does not return by itself."""
     index = None if change.place.index is None else edited.item_index(change.place.index)
     if index is not None:
         items = list(edited.mission.items)
@@ -411,6 +437,7 @@ _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] 
     "descent": _change_altitude,
     "home altitude": _set_home_altitude,
     "altitude frame": _set_altitude_frame,
+    "terrain height": _follow_ground,
     "end loiter": _end_with_loiter,
     "radius": _change_loiter_radius,
     "inset": _move_inside_area,

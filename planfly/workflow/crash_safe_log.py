@@ -149,8 +149,8 @@ class CrashSafeLog:
     def _close_unfinished(self, error_type: type[BaseException] | None) -> None:
         """Close a log whose flight has not been judged.
 
-        After an interruption, a log with rows is finished and an empty log is deleted.  After any other error the log
-        is closed without its end, so that `planfly recover` can read the rows.
+        After an interruption, a log with rows is finished and an empty log is deleted.  After any other error, the log
+        is closed without its end; `planfly recover` can then read the rows.
         """
         with delay_signals():
             if error_type is None or not issubclass(error_type, KeyboardInterrupt):

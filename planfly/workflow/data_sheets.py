@@ -104,7 +104,7 @@ class StatedParameters:
 
 
 def stated_parameters(file: Path) -> StatedParameters:
-    """Return the parameters of a file for ArduPlane or PX4 that describe the aircraft and differ from their defaults.
+    """Return the non-default parameters of an ArduPlane or PX4 file that describe the aircraft.
 
     Raises ParameterError for a file that cannot be read, a file for another vehicle, and a file whose names neither
     autopilot knows.
@@ -122,8 +122,8 @@ def stated_parameters(file: Path) -> StatedParameters:
 
 
 def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return a parameter's value, its default, and its text in a file for ArduPlane; None if the file lacks it."""
-    definition = next((one for one in DEFINITIONS.values() if one.name == name), None)
+    """Return a parameter's value, default and text from an ArduPlane file; None if the file lacks it."""
+    definition = next((candidate for candidate in DEFINITIONS.values() if candidate.name == name), None)
     if definition is None or name not in _USED_PARAMETERS:
         return None
     if name in entries:
@@ -135,7 +135,7 @@ def _arduplane_value(entries: Mapping[str, Entry], name: str) -> tuple[float, fl
 
 
 def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, str] | None:
-    """Return a parameter's value and default in ArduPlane's unit, and its text in a file for PX4; None without it."""
+    """Return a parameter's value, default and text from a PX4 file, in ArduPlane's unit; None if it lacks it."""
     px4_name, factor = (_PX4_STALL[0], 1.0) if name == "AIRSPEED_STALL" else FROM_ARDUPILOT[name]
     if px4_name not in entries:
         return None
@@ -147,7 +147,7 @@ def _px4_value(entries: Mapping[str, Entry], name: str) -> tuple[float, float, s
 def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedParameters) -> list[str]:
     """Return texts on the parameters that the numbers of a data sheet override.
 
-    numbers: by keyword, in the units of the options; None or 0 if not stated.
+    numbers: numbers of the data sheet by keyword, in the units of the options; None or 0 if not stated.
 
     >>> overridden_texts({"cruise": 18.0}, StatedParameters({"AIRSPEED_CRUISE": 19.0}, {"AIRSPEED_CRUISE": "A 19"}))
     ['A 19 (cruise 18 m/s)']
@@ -160,7 +160,7 @@ def overridden_texts(numbers: Mapping[str, float | None], parameters: StatedPara
 
 
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
-    """Return a data sheet whose missing values are taken from parameters, by ArduPlane's names.
+    """Fill missing values of a data sheet from parameters, which are keyed by ArduPlane's names.
 
     TECS_CLMB_MAX is the climb rate with the throttle at THR_MAX (libraries/AP_TECS/AP_TECS.cpp).
 
@@ -246,7 +246,8 @@ def _parse_battery(text: str) -> tuple[float, float]:
         _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
     ):
         allowed = (
-            f"expected volts and capacity, such as 14.8V,5Ah: {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
+            "expected volts and capacity, such as 14.8V,5Ah; allowed"
+            f" {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
             f" {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
         )
         raise FlightError.of_argument("battery", text, allowed)
@@ -262,7 +263,7 @@ def _parse_propeller(text: str) -> tuple[float, float]:
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
-            "expected diameter and pitch in inches, such as 12x6: a diameter of"
+            "expected diameter and pitch in inches, such as 12x6; allowed: a diameter of"
             f" {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g}, and a pitch of 0.25 to 1.5 times the diameter"
         )
         raise FlightError.of_argument("prop", text, allowed)
@@ -311,8 +312,8 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     """Return the uncertainty of a data sheet's model, and aircraft drawn from it.
 
     The uncertainty has standard deviations of factors on model properties, and of the resulting climb, descent, top
-    speed and power at cruise.  All factors are independent except the factor on thrust: it compensates the effect of
-    the other factors on the climb, because an aircraft with more drag has a stronger motor, and then varies by the
+    speed and power at cruise.  All factors are independent except the factor on thrust.  An aircraft with more drag has
+    a stronger motor, so this factor compensates the effect of the other factors on the climb.  It also varies by the
     uncertainty of the climb itself.
     """
     estimated = _performance_vector(aircraft)
@@ -361,7 +362,7 @@ def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, f
     The factor on thrust compensates the effect of the other factors on the climb.
 
     balance: change of the logarithm of the thrust per logarithm of each other factor.
-    thrust_sd: standard deviation of the logarithm of the thrust that varies the climb.
+    thrust_sd: standard deviation of the logarithm of the thrust that represents the uncertainty of the climb.
     """
     draws = draw_quantities(uncertainty.quantities)
     logarithms = np.log(draws.values)
@@ -376,7 +377,7 @@ def _draw_with_balanced_thrust(uncertainty: Uncertainty, balance: Mapping[str, f
 
 
 def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
-    """Return the standard deviation of the log of the cruise power, calibrated on real aircraft.
+    """Return the standard deviation of the logarithm of the cruise power, calibrated on real aircraft.
 
     power: estimated power at cruise, W.
     min_drag_sd: standard deviation of the logarithm of the minimum drag.
@@ -424,10 +425,10 @@ def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: floa
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the signed effect (n,) of a factor on path angles and speeds: half of increased - decreased.
+    """Return the signed effect (n,) of a factor on path angles and speeds: (increased - decreased) / 2.
 
-    A value is NaN if the aircraft cannot be trimmed.  If either `increased` or `decreased` is NaN, the effect is the
-    difference between the other value and the estimated value; if both are NaN, the magnitude of the estimated value.
+    A value is NaN if the aircraft cannot be trimmed.  If one of `increased` and `decreased` is NaN, the effect is the
+    difference between the other one and `estimated`.  If both are NaN, it is the magnitude of `estimated`.
 
     increased, decreased: values (n,) with the factor increased and decreased.
     estimated: values (n,) with the estimated factor.
@@ -475,12 +476,12 @@ def make_data_sheet_folder(
     *,
     overwrite: bool = False,
 ) -> Aircraft:
-    """Write the folder of an aircraft made from its data sheet, completely or not at all.
+    """Write the folder of an aircraft made from its data sheet, and return the aircraft.
 
-    Returns the aircraft.
+    The folder is written completely or not at all.
 
-    parameters: file of ArduPlane's or PX4's parameters, which fill the gaps of the sheet.
-    sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
+    parameters: file of ArduPlane's or PX4's parameters, which replace missing values of the sheet.
+    sized: aircraft sized from the sheet as another class of aircraft; None for the default class of the layout.
     overwrite: True replaces the folder of an aircraft.
     Raises FlightError, in one line with the allowed range, for a sheet outside the range of small aircraft, a folder
     that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
@@ -507,7 +508,7 @@ def _check_required_numbers(sheet: DataSheet) -> None:
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
             min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
-            allowed = f"required for a data sheet: {min_value:g}..{max_value:g} {unit}"
+            allowed = f"missing; a data sheet needs it ({min_value:g}..{max_value:g} {unit})"
             raise FlightError.of_argument(name, None, allowed, shown="")
 
 
@@ -516,8 +517,15 @@ def _parameter_lines(stated: StatedParameters, overridden: Sequence[str]) -> lis
 
     overridden: texts on the parameters that the data sheet overrides.
     """
-    used = [text for text in stated.texts.values() if not any(other.startswith(f"{text} (") for other in overridden)]
-    lines = [f"From the parameter file: {', '.join(used)}.", *_climb_lines(stated)] if used else []
+
+    def is_used(text: str) -> bool:
+        """Return True if the data sheet does not override a parameter."""
+        return not any(overridden_text.startswith(f"{text} (") for overridden_text in overridden)
+
+    used_texts = list(filter(is_used, stated.texts.values()))
+    lines = []
+    if used_texts:
+        lines = [f"From the parameter file: {', '.join(used_texts)}.", *_climb_lines(stated)]
     if overridden:
         lines.append(f"Not used of the parameter file, because the data sheet states it: {', '.join(overridden)}.")
     return ["", *lines] if lines else []
@@ -573,9 +581,9 @@ def _file_texts(
 
 
 def _check_endurance(aircraft: Aircraft, power: float) -> None:
-    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.
+    """Raise FlightError if level flight empties the battery within `_MIN_ENDURANCE_S`.
 
-    power: W.
+    power: power of level flight, W.
     """
     if not aircraft.battery_voltage or aircraft.battery_energy >= _MIN_ENDURANCE_S * power:
         return
@@ -667,7 +675,8 @@ def arduplane_parameters_text(
     roll_rate = abs(b[p, aileron] / a[p, p]) * aircraft.max_aileron
     pitch_rate = abs(b[q, elevator] / a[q, q]) * aircraft.max_elevator
     roll_gain, pitch_gain = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
-    climb, sink = cruise * math.sin(performance.climb.climb), -cruise * math.sin(performance.idle.climb)
+    climb = cruise * math.sin(performance.climb.climb)
+    sink = -cruise * math.sin(performance.idle.climb)
     radius = turn_radius(cruise, bank)
     values = {
         "AIRSPEED_CRUISE": round(cruise, 1),
@@ -764,7 +773,8 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
     The throttle is that of level flight.
     """
-    throttle, stated = 100.0 * performance.level.throttle, file_parameters.get("TRIM_THROTTLE")
+    throttle = 100.0 * performance.level.throttle
+    stated = file_parameters.get("TRIM_THROTTLE")
     if stated is None or round(throttle) == round(stated):
         return []
     return [
@@ -774,7 +784,7 @@ def _trim_throttle_lines(file_parameters: Mapping[str, float], performance: Perf
 
 
 def _climb_lines(stated: StatedParameters) -> list[str]:
-    """Return a line of ``README.md`` on the throttle of the file's climb rate; [] if it is full throttle."""
+    """Return a line of ``README.md`` on the throttle at the file's climb rate; [] if it is full throttle."""
     if not {"TECS_CLMB_MAX", "THR_MAX"} <= stated.values.keys():
         return []
     climb_name, throttle_name = (stated.texts[name].split()[0] for name in ("TECS_CLMB_MAX", "THR_MAX"))
@@ -784,7 +794,8 @@ def _climb_lines(stated: StatedParameters) -> list[str]:
 
 def _performance_lines(aircraft: Aircraft, performance: Performance) -> list[str]:
     """Return lines of ``README.md`` on the performance of the model and the speeds of its guidance."""
-    climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
+    climb = math.degrees(performance.climb.climb)
+    sink = -math.degrees(performance.idle.climb)
     return [
         f"The model weighs {aircraft.mass * GRAVITY:.1f} N, flies level at {aircraft.airspeed:g} m/s with"
         f" {100.0 * performance.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",

@@ -13,7 +13,7 @@ from world.scenario_tables import OWN_GUIDANCE
 def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> Scenario:
     """Return the scenario with the autopilot for which its parameter file or its mission was written.
 
-    An autopilot named by the user stays, and so does planfly's own guidance.  If no file names an autopilot, the
+    An autopilot named by the user is kept, and so is planfly's own guidance.  If no file names an autopilot, the
     scenario is not changed.  Raises ParameterError or MissionError if a file was not written for the named autopilot,
     if two files were written for different autopilots, and if a parameter file has parameters of both autopilots.
 
@@ -72,7 +72,7 @@ def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Sce
 
 
 def _with_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
-    """Return the scenario with `autopilot`, and with `file` as the file that names this autopilot.
+    """Return the scenario with `autopilot`, and record `file` as the file that names this autopilot.
 
     The autopilot is set even if it is the default autopilot.
     """

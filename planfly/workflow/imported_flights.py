@@ -138,7 +138,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     setup = replace(setup, source=source)
     track = make_track(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
-        raise MissionError(f"{path}: not a flight of {plan}; {mismatch.text}", file=path)
+        raise MissionError(f"{path}: not a flight of {plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
     end_reason = "completed" if verdict.complete else _completion_text(verdict)
     return ImportedFlight(setup, track, _vehicle_events(flight), verdict, end_reason)
@@ -180,7 +180,7 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
     time_text = f", at {logged.time:.1f} s" if logged.time > 0.0 else ""
     return (
         logged.mission,
-        f"{logged.origin} of the log{time_text}, {count_text(len(logged.mission.items), 'item')}",
+        f"{count_text(len(logged.mission.items), 'item')} from {logged.origin} of the log{time_text}",
         None,
     )
 
@@ -208,7 +208,7 @@ def _choose_scenario_and_place_mission(
 def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOptions) -> tuple[Scenario, str]:
     """Return the scenario with the log's mean wind, and a description of the source of the wind.
 
-    The wind of the scenario stays if the options state a wind or the log contains none.
+    The wind of the scenario is kept if the options state a wind or the log contains none.
     """
     if options.get("wind") is not None:
         return scenario, "as given"
@@ -217,7 +217,8 @@ def _with_wind_of_log(scenario: Scenario, flight: LoggedFlight, options: LogOpti
         source_text = "from the scenario, because the log contains no wind" if options.get("scenario") else ""
         return scenario, source_text
     windy_scenario = with_wind(scenario, wind.speed, wind.from_course, None)
-    return windy_scenario, f"from {round(math.degrees(wind.from_course)) % 360:03d}°, by {wind.source} of the log"
+    course_text = f"{round(math.degrees(wind.from_course)) % 360:03d}°"
+    return windy_scenario, f"from {course_text}, according to {wind.source} of the log"
 
 
 def _flight_setup(
@@ -278,7 +279,7 @@ def _sha256(path: Path) -> str:
 
 
 def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note a log that begins or ends in flight, or has too few positions; empty for a complete log."""
+    """Describe what an incomplete log lacks: its start, its end, or positions; empty for a complete log."""
     notes = []
     if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
@@ -291,7 +292,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note a throttle that has the same value in all rows, as in the log of a glider; empty otherwise."""
+    """Note that the throttle is the same in all rows, as in the log of a glider; empty if it varies."""
     throttle = flight.raw.series.get("throttle")
     if throttle is None or len(throttle.values) < 2 or np.ptp(throttle.values) > 0.0:
         return ()
@@ -299,7 +300,7 @@ def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:
-    """Note the other flights in the log; empty if there are no other flights."""
+    """Note the other flights in the log; empty if there are none."""
     if flight.count == 1:
         return ()
     other_flights = ", ".join(
@@ -418,8 +419,8 @@ def fly_draws(
 
     Returns the comparisons with the log.
 
-    A draw is a sampled variant of the aircraft in a sampled wind.  A draw with which the aircraft cannot start, or
-    flies none of the legs, is left out.
+    A draw is a sampled variant of the aircraft in a sampled wind.  A draw is left out if the aircraft cannot start with
+    it, or flies none of the legs.
 
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
@@ -443,8 +444,8 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
 
     It begins where the first segment of the flight reached this altitude.
 
-    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  A mission without
-    a take-off, and a segment that never reached this altitude, are returned unchanged.
+    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  The setup is
+    returned unchanged if the mission has no take-off, or if the segment never reached this altitude.
     """
     source, route, mission, scenario = setup.source, setup.route, setup.mission, setup.scenario
     first = next((item for item in mission.items if item.seq == route.items[0]), None)
@@ -490,10 +491,8 @@ def _refly_followed_legs(
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
     if draw is not None:
         wind = scenario.wind
-        north, east = (
-            -wind.speed * math.cos(wind.from_course) + draw.wind[0],
-            -wind.speed * math.sin(wind.from_course) + draw.wind[1],
-        )
+        north = -wind.speed * math.cos(wind.from_course) + draw.wind[0]
+        east = -wind.speed * math.sin(wind.from_course) + draw.wind[1]
         scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
     model, battery = find_aircraft_and_energy(scenario)
     limits = setup.limits
@@ -530,7 +529,7 @@ def _refly_followed_legs(
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
-    """Return the sequence of legs followed in each segment of a flight, most legs first.
+    """Return the legs followed in each segment of a flight; the segment with the most legs comes first.
 
     Raises LogError if the flight followed no leg of its mission.
     """

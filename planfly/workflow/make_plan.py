@@ -40,16 +40,13 @@ def make_plan(
     flown_plan_and_leg: tuple[Plan, int] | None = None,
     continues: bool = False,
 ) -> Plan:
-    """Plan a path within the limits of scenario and aircraft, less the uncertainty of the limits.
+    """Plan a path within the limits of scenario and aircraft, reduced by the uncertainty of the limits.
 
-    All commands use this function, so that they agree on which plan is safe.  If gusts make the autopilot orbit at
-    waypoints, the plan has as few such waypoints as possible (`planfly.planning.gust_orbits`).  If gusts change the
-    altitude of the aircraft, the plan has a margin for the change (`planfly.planning.gust_altitude_margin`).  In a
-    forecast, slopes and turns also hold in the local wind (`planfly.planning.local_wind`).  The departure and the
-    approach are added.  If the autopilot loiters at the end of the mission, the certificate names the
-    hazards that may be too close to the loiter.
-
-    A plan may take several searches, which share the scenario's budget of evaluations.
+    All commands use this function, so that they agree on which plan is safe.  A plan may take several searches, which
+    share the scenario's budget of evaluations.  In gusts, the plan has few waypoints at which the autopilot may orbit
+    (`planfly.planning.gust_orbits`), and a margin in altitude (`planfly.planning.gust_altitude_margin`).  Slopes and
+    turns also hold in the local wind of a forecast (`planfly.planning.local_wind`).  Departure and approach are added.
+    If the autopilot loiters at the end of the mission, the certificate names hazards that may be close to the loiter.
 
     stop: stop condition of `planner.search.plan_path.plan_path`.
     flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.
@@ -60,7 +57,10 @@ def make_plan(
     limits = airframe.limits.with_margin()
 
     def complete_plan(plan: Plan, search: Search) -> Plan:
+        """Make a plan safe in gusts and in local wind, by other searches if necessary."""
+
         def search_for(other_airframe: Airframe) -> Plan:
+            """Search for a plan with another airframe, and make it safe in gusts."""
             other_plan = search(plan.scenario, other_airframe.limits.with_margin())
             return _complete_in_gusts(other_plan, other_airframe, search)
 
@@ -82,6 +82,7 @@ def make_plan(
         return _add_ground_phases(new_plan, airframe, old_plan, continues=continues)
 
     def search(world: Scenario, search_limits: Limits) -> Plan:
+        """Plan a path within limits by the chosen algorithm."""
         return plan_path(world, search_limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
     searches = SharedBudget(search)
@@ -90,12 +91,14 @@ def make_plan(
 
 
 def _complete_in_gusts(plan: Plan, airframe: Airframe, search: Search) -> Plan:
-    """Return a plan that gusts do not make unsafe, or the given plan as not safe."""
+    """Return a plan that is safe in gusts, or the given plan marked as not safe."""
 
     def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
+        """Return a plan whose waypoints are few enough to avoid orbits in gusts."""
         return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, search_limits), search_limits)
 
     def search_within(search_limits: Limits) -> Plan:
+        """Plan a path within limits, with few enough waypoints to avoid orbits in gusts."""
         return limit_orbits(search(plan.scenario, search_limits), search_limits)
 
     return ensure_altitude_margin(limit_orbits(plan, airframe.limits.with_margin()), airframe, search_within)
@@ -112,7 +115,7 @@ def make_given_plan(scenario: Scenario, airframe: Airframe, seed: int, waypoints
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
-    """Apply to a plan the steps that `make_plan` takes after its search, without another search.
+    """Complete a plan without another search, by the steps that `make_plan` takes after its search.
 
     keeps_waypoints: see `limit_waypoint_orbits`.
     """

@@ -73,8 +73,8 @@ class MissionContext:
 
         Movable items are those of `flight.mission.edits.movable_indices`.
 
-        The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
-        that it states, NaN if unknown.
+        The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has its stated
+        altitude, or NaN if this is unknown.
         """
         placed = self.place_mission(mission) if placed is None else placed
         reached_altitudes = {stop.item: stop.map_position[2] for stop in reversed(placed.stops)}
@@ -115,9 +115,9 @@ class MissionContext:
         return float(lat), float(lon)
 
     def with_updated_radii(self, mission: Mission, index: int) -> Mission:
-        """Return the mission with the acceptance radii near a moved item adapted to its turns.
+        """Adapt the acceptance radii near a moved item to the new turns, and return the mission.
 
-        A mission that planfly did not plan keeps its radii.  index: index of the moved item.
+        A mission that planfly did not plan keeps its radii. index: index of the moved item.
         """
         if not self.planned:
             return mission

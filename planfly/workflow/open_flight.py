@@ -38,7 +38,7 @@ _MAH_PER_AH = 1000.0
 
 
 def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
-    """Return the setup with the chosen flight model, the same object if the setup already has this model."""
+    """Return the setup with the chosen flight model; the same object if it already has this model."""
     return setup if setup.engine == engine else replace(setup, engine=engine)
 
 
@@ -59,11 +59,9 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     """
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
         return _open_plan(source, options, program)
-    fences, named_world, terrain = (
-        read_named_fences(options.get("fence") or ()),
-        options.get("scenario"),
-        _terrain_option(options),
-    )
+    fences = read_named_fences(options.get("fence") or ())
+    named_world = options.get("scenario")
+    terrain = _terrain_option(options)
     mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
         scenario = load_scenario_with_options(named_world, options, program)
@@ -79,9 +77,9 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
 
 
 def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
-    """Return a scenario whose terrain reaches to the mission's home if the ground station of its link stands there.
+    """Extend a scenario's terrain to the mission's home, if the link's ground station stands there.
 
-    The terrain is unchanged if its elevation file cannot be read, or has no data there.
+    The terrain is unchanged if its elevation file cannot be read, or has no data at home.
     """
     home = home_point(mission, scenario.origin, scenario.terrain)
     if home is None or scenario.link is None or scenario.link.station is not None:
@@ -95,21 +93,18 @@ def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
 
 def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
     """Make the setup of a plan in its own scenario, or of its mission in a named scenario."""
-    fences, named_world, terrain = (
-        read_named_fences(options.get("fence") or ()),
-        options.get("scenario"),
-        _terrain_option(options),
-    )
+    fences = read_named_fences(options.get("fence") or ())
+    named_world = options.get("scenario")
+    terrain = _terrain_option(options)
     if not isinstance(source, Plan):
-        plan, file = read_plan(check_mission_exists(Path(source)), terrain=terrain), str(source)
+        plan = read_plan(check_mission_exists(Path(source)), terrain=terrain)
+        file = str(source)
     else:
         plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
     scenario = fences.add_to_scenario(apply_options(plan.scenario, options, program))
     airframe, seed = load_airframe(scenario), options.get("seed")
-    mission, chosen_seed = (
-        fences.add_to_mission(mission_of_plan(plan, airframe, file)),
-        plan.seed if seed is None else seed,
-    )
+    mission = fences.add_to_mission(mission_of_plan(plan, airframe, file))
+    chosen_seed = plan.seed if seed is None else seed
     if named_world is None:
         return make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
     # The plan's waypoints are in the map coordinates of its own scenario.  Therefore its mission items are flown in
@@ -125,9 +120,9 @@ def _terrain_option(options: MissionOptions) -> str | None:
 
 
 def check_mission_exists(path: Path) -> Path:
-    """Return the path.
+    """Check that a mission file exists, and return its path.
 
-    Raises MissionError if it does not exist, with the most similar name as a suggestion.
+    Raises MissionError with the most similar name as a suggestion.
     """
     if not path.is_file():
         hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent), path.parent)
@@ -152,12 +147,12 @@ def check_fixed_wing(mission: Mission) -> Mission:
     >>> check_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
     Traceback (most recent call last):
         ...
-    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: for a multicopter: planfly flies fixed-wing ...
+    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: a command for a multicopter; planfly flies ...
     """
     for item in mission.items:
         if item.command in OTHER_VEHICLES:
             name = command_name(item.command)
-            allowed = f"for {OTHER_VEHICLES[Command(item.command)]}: planfly flies fixed-wing aircraft"
+            allowed = f"a command for {OTHER_VEHICLES[Command(item.command)]}; planfly flies only fixed-wing aircraft"
             raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
     return mission
 
@@ -176,7 +171,7 @@ _STORED_ITEMS = {"ardupilot": (724, "a Pixhawk with ArduPlane"), "px4": (500, "a
 
 
 def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, ...]:
-    """Note a mission with more items than a common flight controller of the autopilot stores.
+    """Note that a mission has more items than a common flight controller of the autopilot stores.
 
     The result is empty otherwise.
     """
@@ -257,7 +252,7 @@ def planned_duration(route: Route, mission: Mission) -> float:
 
 
 def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
-    """Raise ForecastError if a route leaves the box, the levels or the times of the forecast that states the wind."""
+    """Raise ForecastError if a route leaves the area, altitude levels or times of the wind's forecast."""
     facts = scenario.wind.forecast
     if facts is None:
         return
@@ -278,9 +273,8 @@ def _check_forecast(scenario: Scenario, route: Route, mission: Mission) -> None:
 def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
     """Return the autopilot with an RTL that uses the mission's landing sequence.
 
-    Without a landing sequence the autopilot is unchanged.
-
-    The parameters for this are assumed: values from a parameter file or the scenario stay.
+    Without a landing sequence the autopilot is unchanged.  Parameters that a parameter file or the scenario states are
+    kept; the others are assumed.
     """
     if all(item.command != Command.DO_LAND_START for item in mission.items):
         return autopilot
@@ -289,9 +283,10 @@ def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot
 
 
 def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts: float) -> tuple[str, ...]:
-    """Return a note on each failsafe that counts from a capacity unlike that of the aircraft's battery.
+    """Return a note on each failsafe whose battery capacity differs from that of the aircraft's battery.
 
-    Such a failsafe acts too early or too late.  A monitor that shares the load with others has its own battery.
+    Such a failsafe acts too early or too late.  If several monitors share the load, each has its own battery, so
+    nothing is noted.
 
     battery: energy of the battery, Wh.  volts: its voltage, V.
 
@@ -313,10 +308,10 @@ def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts:
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
     """Return a note on each commanded airspeed beyond the autopilot's limits.
 
-    The autopilot ignores this airspeed, or flies the nearest limit.
+    The autopilot ignores such an airspeed, or flies the nearest limit.
 
-    ArduPlane takes DO_CHANGE_SPEED as an airspeed only if its speed type is 0, and ignores values beyond its limits.
-    PX4 takes it as an airspeed whatever the type, and flies the nearest limit.
+    ArduPlane interprets DO_CHANGE_SPEED as an airspeed only if the speed type is 0, and ignores values beyond its
+    limits.  PX4 interprets it as an airspeed for any type, and flies the nearest limit.
 
     >>> from flight.mission.items import MissionItem
     >>> faster = MissionItem(2, 178, 2, (0.0, 60.0, -1.0, 0.0), 0.0, 0.0, 0.0)

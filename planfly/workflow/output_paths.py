@@ -81,8 +81,7 @@ PREDICT_FILES = ("predict.html", "predict.png")
 def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -> None:
     """Raise PlanflyError if an output file cannot or must not be written.
 
-    This is the case if the path is the input file, is a folder, lies in a missing folder, or exists without
-    `overwrite`.
+    These are the input file, a folder, a file in a missing folder, and an existing file without `overwrite`.
 
     source: the input file, or None.
     """
@@ -99,7 +98,7 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
 def check_output_folder(folder: Path, overwrite: bool) -> None:
     """Raise PlanflyError if an output folder cannot or must not be written.
 
-    This is the case if it is or lies in a file, cannot be made, or is not empty without `overwrite`.
+    These are a file, a path below a file, a folder that cannot be made, and a non-empty folder without `overwrite`.
     """
     existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
     if not existing.is_dir():
@@ -138,7 +137,7 @@ def clean_folder(out: str | Path, files: tuple[str, ...], *, overwrite: bool) ->
 
 
 def replace_files(folder: Path, contents: Mapping[str, str | bytes], *, overwrite: bool) -> tuple[Path, ...]:
-    """Write files into a folder in place of those of an earlier result, and return their paths.
+    """Write files into a folder, replacing those of an earlier result, and return their paths.
 
     contents: content of each file by its name.
     """
@@ -158,9 +157,10 @@ def has_placeholder(target: str | Path) -> bool:
 
 
 def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
-    """Replace {name} and {seed} in a path, with the name made a safe folder name.
+    """Replace {name} and {seed} in a path; characters that are unsafe in a folder's name are replaced.
 
-    If this changes the name, the first digits of the name's SHA-256 are appended to keep it distinct.
+    If this changes the name, the first digits of the name's SHA-256 are appended, so that different names stay
+    different.
 
     >>> str(expand_path_pattern(RUN_FOLDER, "a/b", 3)), str(expand_path_pattern(RUN_FOLDER, "a b", 3))
     ('runs/a-b-c14cdd-seed3', 'runs/a-b-c8687a-seed3')

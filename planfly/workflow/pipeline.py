@@ -250,7 +250,7 @@ def _simulate_and_record(task: _FlightTask, flight: Airborne, recorder: CrashSaf
 def _judge_unflown(
     requirements: RouteRequirements, log: Path | None, end_reason: str, reference: FlyReference
 ) -> JudgedFlight:
-    """Judge a flight that did not start, and remove the log of an earlier flight from `log`."""
+    """Judge a flight that did not start, and remove an earlier flight's log at the path `log`."""
     if log is not None:
         log.unlink(missing_ok=True)
     setup, track = requirements.setup, join_tracks([])

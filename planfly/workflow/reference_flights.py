@@ -8,6 +8,7 @@ from typing import Literal
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parts import Candidate
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -38,16 +39,16 @@ PassesWithAutopilot = Callable[[Autopilot], bool]
 def find_passing_parameter(
     autopilot: Autopilot, findings: tuple[Finding, ...], passes: PassesWithAutopilot
 ) -> DecidingParameter | None:
-    """Find the first parameter of which another value makes the flight pass.
+    """Find the first parameter that makes the flight pass at another value, and its nearest passing value.
 
-    Returns it with its nearest passing value, or None.
+    Returns None if no parameter does.
 
     findings: findings of the flight that failed.
-    passes: flies with the given autopilot and returns True if that flight passes; called about ten times.
+    passes: function that flies with the given autopilot and returns True if the flight passes; called about ten times.
 
-    Candidates for the kind of the failure, vertical or lateral, are tried first; limits of the pitch are tried before
-    the other vertical ones, and only if the flight reached them.  The farthest value of each candidate
-    is flown first; if it passes, bisection finds the nearest passing value.  The returned value was flown and passed.
+    Candidates for the kind of the failure, vertical or lateral, are tried first.  Pitch limits are tried before the
+    other vertical candidates, and only if the flight reached them.  The farthest value of each candidate is flown
+    first; if it passes, bisection finds the nearest passing value.  The returned value was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -68,22 +69,30 @@ def find_passing_parameter(
     vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
     if any(fact.what == PITCH_LIMIT_TIME for finding in findings for fact in finding.facts):
         vertical_candidates = (*deviations.pitch_candidates, *vertical_candidates)
-    for name, step, farthest, unit, min_value in (
+    for candidate in (
         (*vertical_candidates, *lateral_candidates)
         if failed_finding.rule in _VERTICAL_RULES
         else (*lateral_candidates, *vertical_candidates)
     ):
-        current = values[name]
+        current = values[candidate.name]
 
-        def with_value(value: float, name: str = name) -> bool:
-            return passes(autopilot.with_parameters(**{name: value}))
+        def with_value(value: float, candidate: Candidate = candidate) -> bool:
+            """Return True if the flight passes with this value of the candidate's parameters."""
+            return passes(autopilot.with_parameters(**dict.fromkeys((candidate.name, *candidate.others), value)))
 
         # Do not suggest values below the documented range.
-        passing_value = _nearest_passing_value(max(current, min_value - step), step, farthest, with_value)
+        start = max(current, candidate.least - candidate.step)
+        passing_value = _nearest_passing_value(start, candidate.step, candidate.far, with_value)
         if passing_value is not None:
             deviation = _deviation_at_failure(failed_finding, findings)
             return DecidingParameter(
-                name, current, passing_value, unit, failed_finding.rule, failed_finding.place, deviation
+                candidate.title,
+                current,
+                passing_value,
+                candidate.unit,
+                failed_finding.rule,
+                failed_finding.place,
+                deviation,
             )
     return None
 
@@ -123,7 +132,7 @@ def judge_airframe_flight(
 ) -> AirframeAnswer:
     """Fly a setup with planfly's guidance and no navigation error, and judge the flight.
 
-    It shows whether the airframe, without its autopilot, can fly the mission.
+    The flight shows whether the airframe, without its autopilot, can fly the mission.
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
@@ -146,12 +155,11 @@ def judge_airframe_flight(
 def find_deciding_parameter(
     setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, should_abort: AbortCheck = never_abort
 ) -> DecidingParameter | None:
-    """Find an autopilot parameter of which another value makes a failed flight pass, or return None.
+    """Find an autopilot parameter that makes a failed flight pass at another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
-    should_abort: see `judge_with_reference_flights`.
-    About ten flights with the simulated autopilot are needed.  They explain the flight of an autopilot program only if
-    the simulated autopilot fails, too; otherwise the result is None.
+    should_abort: see `judge_with_reference_flights`.  This takes about ten flights with the simulated autopilot.  For
+    the flight of an autopilot program, the result is None unless the simulated autopilot fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
         return None
@@ -170,6 +178,7 @@ def find_deciding_parameter(
     same_setup = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(autopilot: Autopilot) -> bool:
+        """Return True if the flight passes, with margin, with the parameters of an autopilot."""
         trial_verdict = Trial(replace(same_setup, autopilot=autopilot), aircraft, should_abort).flight_verdict
         return trial_verdict.flies and passes_with_margin(trial_verdict.findings, findings)
 
@@ -185,7 +194,7 @@ ALTITUDE_ERROR_M = 1.2
 
 
 def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Sequence[Finding]) -> bool:
-    """Return True if each failed finding now passes with the margin that the simulation error requires.
+    """Return True if each failed finding passes in a trial, with the margin that simulation errors need.
 
     trial_findings: findings of a flight with another parameter value.
     failed_findings: findings of the flight that failed.
@@ -218,9 +227,9 @@ def judge_with_reference_flights(
     fly: FlyReference = "failed",
     should_abort: AbortCheck = never_abort,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight, with reference flights that explain the verdict, and tried suggestions.
+    """Judge a flight; explain the verdict by reference flights, and try its suggestions.
 
-    The reference flights do not decide the verdict.
+    The reference flights do not change the verdict's answer.
 
     requirements: the route requirements of the flown setup.
     track, end_reason: the flight, and the reason for its end.

@@ -73,10 +73,10 @@ def _is_undecided(finding: Finding) -> bool:
 
 
 def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tuple[Finding | None, Finding]]:
-    """Return the findings that fail or leave the verdict undecided only after a change, each with the finding before.
+    """Return the findings that fail or are undecided only after a change, each with the finding before.
 
-    A finding that passed before is among them if it is not judged after the change.  The finding before is None if
-    there was none.
+    A finding that passed before is included if it is not judged after the change.  The finding before is None if there
+    was none.
     """
     old_findings = _worst_findings(old_verdict)
     pairs = []
@@ -87,22 +87,24 @@ def _newly_open_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[tup
         elif _is_undecided(finding):
             is_new = old is None or not _is_undecided(old)
         else:
-            is_new = finding.ok is None and old is not None and old.ok is True
+            # That PX4 would reject a mission decides nothing for another autopilot.
+            is_judged_rule = finding.rule != "mission"
+            is_new = is_judged_rule and finding.ok is None and old is not None and old.ok is True
         if is_new:
             pairs.append((old, finding))
     return pairs
 
 
 def _was_unreached(old_verdict: Verdict, old_finding: Finding | None) -> bool:
-    """Return True if a finding was not judged, or only for a part of the flight, because the flight ended early."""
+    """Return True if a finding was not, or only partly, judged because the flight ended early."""
     has_ended_early = old_verdict.level == "flown" and not old_verdict.complete
     return has_ended_early and (old_finding is None or old_finding.ok is None or old_finding.place == FLIGHT)
 
 
-def added_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
-    """Return the findings that a change makes fail, or leaves undecided or not judged although they passed before.
+def worsened_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
+    """Return the findings that a change makes worse: they fail, or are no longer decided or judged.
 
-    A finding that was not judged because the flight ended early is not among them.
+    A finding that was not judged before, because the flight ended early, is left out.
     """
     return [
         finding
@@ -112,12 +114,12 @@ def added_findings(old_verdict: Verdict, new_verdict: Verdict) -> list[Finding]:
 
 
 def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[RemainingFinding, ...]:
-    """Return the findings of a changed mission that its verdict before does not name.
+    """Return the findings of a changed mission that the verdict before the change does not name.
 
-    They fail or are undecided after the change, and either were not judged before, because the flight ended early, or
-    failed before and are only undecided now.
+    They fail or are undecided after the change.  Before, they either were not judged because the flight ended early, or
+    failed and are only undecided after the change.
     """
-    added_keys = set(map(finding_key, added_findings(old_verdict, new_verdict)))
+    added_keys = set(map(finding_key, worsened_findings(old_verdict, new_verdict)))
     return tuple(
         RemainingFinding(finding.rule, finding.place, finding.ok is False)
         for _, finding in _newly_open_findings(old_verdict, new_verdict)
@@ -127,19 +129,19 @@ def remaining_findings(old_verdict: Verdict, new_verdict: Verdict) -> tuple[Rema
 
 def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
     """Return True if a finding does not fail after a change, and the change makes no other finding fail."""
-    has_new_failures = any(added.ok is False for added in added_findings(old_verdict, new_verdict))
+    has_new_failures = any(added.ok is False for added in worsened_findings(old_verdict, new_verdict))
     return not has_new_failures and finding_key(finding) not in map(finding_key, new_verdict.failed)
 
 
 def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
-    """Return True if a finding passes after a change, or is gone, and no finding that passed before is open.
+    """Return True if a finding passes or disappears by a change, and no passed finding becomes open.
 
     A slope passes only if the flown altitude is nearer to the leg than before.
     """
     new_finding = _worst_findings(new_verdict).get(finding_key(finding))
     if new_finding is not None and (new_finding.ok is not True or _keeps_height_error(finding, new_finding)):
         return False
-    return not added_findings(old_verdict, new_verdict)
+    return not worsened_findings(old_verdict, new_verdict)
 
 
 def _keeps_height_error(old_finding: Finding, new_finding: Finding) -> bool:
@@ -171,7 +173,7 @@ class PassedTrial:
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
     """Return the suggestions that passed, grouped by finding, the smallest moves of items first.
 
-    A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller one passed.
+    A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller move passed.
     """
     trials_by_finding: dict[int, list[PassedTrial]] = {}
     for trial in passed_trials:
@@ -183,24 +185,24 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
 
 
 def _smallest_moves(trials: Sequence[PassedTrial]) -> tuple[Suggestion, ...]:
-    """Return the suggestions of the trials, the smallest moves first; of far moves only one, if all are far."""
+    """Return the trials' suggestions, the smallest moves first; if all are far moves, only one."""
     suggestions = sorted((trial.suggestion for trial in trials), key=_move_distance)
     near = [
         suggestion
         for suggestion in suggestions
-        if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _moves_of(suggestion))
+        if all(math.hypot(move.east, move.north) < FAR_MOVE_DISTANCE_M for move in _item_moves(suggestion))
     ]
     return tuple(near or suggestions[:1])
 
 
-def _moves_of(suggestion: Suggestion) -> list[ItemMove]:
+def _item_moves(suggestion: Suggestion) -> list[ItemMove]:
     """Return the moves of items of a suggestion that passed its trial."""
     return [move for change in suggestion for move in change.moves]
 
 
 def _move_distance(suggestion: Suggestion) -> float:
-    """Return the largest move of an item, m; 0 for a suggestion that moves none, such as another airspeed."""
-    return max((math.hypot(move.east, move.north, move.up) for move in _moves_of(suggestion)), default=0.0)
+    """Return the largest move of an item, m; 0 if the suggestion moves no item."""
+    return max((math.hypot(move.east, move.north, move.up) for move in _item_moves(suggestion)), default=0.0)
 
 
 def judge_mission_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
@@ -298,7 +300,7 @@ class SuggestionTrials:
     def _passes_trial(self, finding: Finding, trial: Trial) -> bool:
         """Return True if a trial passes by geometry, and by a flight if the judged flight reached the finding's place.
 
-        A trial beyond the allowed number of flights fails.
+        A trial fails if the allowed number of flights is used up.
         """
         if self._is_tried_by_flight(finding):
             if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
@@ -330,7 +332,7 @@ class SuggestionTrials:
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield a suggestion and then larger suggestions, each with its trial.
 
-        Each suggestion is applied to the unchanged mission in one step, as a reader of the verdict applies it.
+        Each suggestion is applied to the unchanged mission in one step, as a user would apply it.
         """
         while True:
             if self.should_abort():
@@ -352,7 +354,7 @@ class SuggestionTrials:
             suggestion = larger_suggestion
 
     def _with_present_lengths(self, suggestion: Suggestion) -> Suggestion:
-        """Return a suggestion whose lengths of legs are compared with the lengths in the unchanged mission."""
+        """Return a suggestion that states present leg lengths as they are in the unchanged mission."""
         runs = self.judged.requirements.runs
         return tuple(
             replace(change, current=float(runs[change.place.index]))
@@ -362,7 +364,7 @@ class SuggestionTrials:
         )
 
     def _changed_flight(self, finding: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
-        """Return mission and setup with a suggestion applied; a shorter duration is tried as a larger battery."""
+        """Apply a suggestion to mission and setup; a shorter duration is tried as a larger battery."""
         setup = replace(self.judged.setup, autopilot=self.judged.setup.autopilot.model)
         match suggestion:
             case (Change(what="battery" | "tank") as change,):
@@ -383,8 +385,8 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
     Returns None without such a change.
 
-    verdict: verdict on the mission with the suggestion applied.
-    If the finding itself is now ok, the changes that other legs need for the same rule are added.
+    verdict: verdict on the mission with the suggestion applied.  If the finding itself passes now, the changes that
+    other legs need for the same rule are added.
     """
     same_finding = [
         open_finding
@@ -403,7 +405,7 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
 
 
 def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggestion | None:
-    """Return a suggestion enlarged by the change of the same kind that an open finding needs; None without one."""
+    """Add to a suggestion the change of the same kind that an open finding needs; None without such a change."""
     kinds = {change.what for change in suggestion}
     for needed_suggestion in open_finding.suggestions:
         if {change.what for change in needed_suggestion} == kinds:
@@ -420,9 +422,9 @@ def _add_needed_change(suggestion: Suggestion, open_finding: Finding) -> Suggest
 
 
 def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
-    """Return the steps of a suggestion with the steps still needed.
+    """Merge the steps still needed into the steps of a suggestion.
 
-    A step at a place that already has one of the same kind is enlarged and added to it.
+    If a place already has a step of the same kind, the needed step is enlarged and added to it.
     """
     steps = {(change.what, change.place.kind, change.place.index): change for change in suggestion}
     for change in needed_steps:

@@ -140,7 +140,7 @@ def _tighten_slopes(spec: Spec, failed_findings: list[Finding]) -> list[Tighteni
 def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding]) -> list[Tightening]:
     """Tighten the turns in `spec` if turns or corners failed.
 
-    They are limited to the limit of the aircraft; if they already are, the bank is lowered.
+    They get the limit of the aircraft; if they already have it, the bank limit is lowered.
     """
     if not any(finding.rule in ("turn", "waypoint", "corridor") for finding in failed_findings):
         return []
@@ -201,7 +201,7 @@ def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Fin
 
 
 def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
-    """Enlarge the kill radii in `spec` of missiles whose sphere the flight entered, but not the plan."""
+    """Enlarge the kill radii in `spec` of missiles whose spheres only the flight, not the plan, entered."""
     changes = []
     for finding in failed_findings:
         if finding.planned:
@@ -233,8 +233,8 @@ def refine(
     Each round is tightened by the failures of the round before.
 
     max_rounds: maximum number of rounds after the first.
-    fly_round: plans in a scenario and flies; returns the verdict, and True if the plan was flown.
-    keep_results: called with the number of a round before another round replaces its results.
+    fly_round: function that plans in a scenario and flies; it returns the verdict, and True if the plan was flown.
+    keep_results: function called with a round's number before the next round replaces its results.
 
     Returns the last verdict, and the changes and results of each round in the format of ``rounds.json``.
     """

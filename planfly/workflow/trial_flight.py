@@ -83,7 +83,7 @@ class Trial:
 
 
 def max_explaining_flights(setup: FlightSetup) -> int:
-    """Return the number of flights like a setup's own that may be flown to explain its verdict.
+    """Return how many flights of a setup's length may be flown to explain its verdict.
 
     >>> from logs.recording.example_log import example_log
     >>> max_explaining_flights(example_log().setup) > 100

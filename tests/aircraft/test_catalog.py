@@ -52,7 +52,7 @@ def test_limits_of_the_metadata_are_those_of_the_model() -> None:
 
 @pytest.mark.parametrize("name", ["", "zeppelin", "../aircraft/aerosonde", "aerosonde.xml"])
 def test_unknown_name_lists_the_known_ones(name: str) -> None:
-    with pytest.raises(FlightError, match=r"no aircraft called .*known names: aerosonde, c172x, "):
+    with pytest.raises(FlightError, match=r"no aircraft called .*built-in aircraft: aerosonde, c172x, "):
         load_aircraft(name)
 
 

@@ -52,8 +52,9 @@ def test_angles_are_degrees_and_nothing_else_is() -> None:
     ] == ["0.1°", "1", "0.03"]
     assert shown["GUST_OFFSET_M"].value == "none 0, light 0.5, moderate 1"
     assert not shown["BANK_TOLERANCE_RAD"].text.startswith("rad")
-    # One that stands below another without words of its own has the other's.
-    assert shown["CORNER_CUT_TOLERANCE_M"].text == shown["CORNER_CUT_FRACTION"].text
+    assert (shown["GUST_OFFSET_M"].unit, shown["OVERSHOOT_TOLERANCE_M"].unit) == ("m, by turbulence", "m")
+    assert shown["OVERSHOOT_TOLERANCE_M"].text == "Tolerance for a turn flown outside its arc."
+    assert [one.name for one in tolerance_list() if not one.text] == []
 
 
 def test_every_command_with_an_answer_has_a_row() -> None:

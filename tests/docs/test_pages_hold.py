@@ -138,9 +138,13 @@ def test_every_elevation_format_stands_on_its_page() -> None:
 def test_every_command_stands_in_the_reference_with_its_options_and_what_they_do() -> None:
     page = text_of("commands.md")
     rows = section_of_table("commands.md", "command")
+    common = section(page, "Common options")
     for name, parser in build_parser().commands.items():
         assert re.search(rf"^\| `planfly {name}\b", rows, re.MULTILINE), name
         part = section(page, name)
+        usage = part.split("```")[1]
+        assert [option for option in parser.long_options() if option not in usage] in ([], ["--help"]), name
+        part += common
         defined = " ".join(re.findall(r"^`(.*)`$", part, re.MULTILINE))
         assert [option for option in parser.long_options() if option not in defined] == [], name
         # Every word of the help but the usage, which breaks its lines elsewhere, and the exit codes.

@@ -237,7 +237,7 @@ def test_a_corner_flown_over_needs_the_next_leg_to_come_back_to_it() -> None:
 
 def test_the_note_on_a_home_at_zero_says_where_it_comes_from() -> None:
     case = CASES["home at 0 over ground at 513 m"]
-    note = "home is at 0.0 m AMSL, and the ground there at 513.0 m"
+    note = "home is at 0.0 m AMSL, but the ground there is at 513.0 m"
     assert any(line.startswith(note) and line.endswith("no home was set") for line in setup_of(case).route.notes)
     assert not any("no home was set" in line for line in setup_of(Case(SQUARE, True, ground=250.0)).route.notes)
 

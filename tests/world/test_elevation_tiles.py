@@ -272,7 +272,7 @@ def test_of_listed_tiles_the_first_counts(tmp_path: Path) -> None:
         ("5", "terrain.path: 5: expected a file's name, or a list of 1 to 100"),
         ('["dem/00.tif", 5]', "expected a file's name, or a list of 1 to 100 names"),
         ('["dem/00.tif", ""]', "terrain.path"),
-        ('["dem/00.tif", "none.tif"]', "none.tif: terrain path: no such file"),
+        ('["dem/00.tif", "none.tif"]', "none.tif: no such elevation file"),
         ('["dem/00.tif", "http://x/y.tif"]', "only local files are read"),
         (str(["a.tif"] * 101), "expected a file's name, or a list of 1 to 100 names"),
     ],

@@ -270,7 +270,7 @@ class ArduPlane(Autopilot):
             climb_limit=RateLimit.of_parameters(TECS_CLMB_MAX=parameters.tecs_climb_max),
             sink_limit=RateLimit.of_parameters(TECS_SINK_MAX=parameters.tecs_sink_max),
             max_pitch=self._max_pitch + parameters.pitch_trim,
-            max_pitch_name=f"{self._max_pitch_parameter} {math.degrees(self._max_pitch):g}°",
+            max_pitch_name=f"{' and '.join(self._max_pitch_parameters)} {math.degrees(self._max_pitch):g}°",
         )
 
     @property
@@ -463,25 +463,30 @@ class ArduPlane(Autopilot):
     @property
     def _max_pitch(self) -> float:
         """Largest pitch that TECS demands, rad; PTCH_TRIM_DEG is not included."""
-        parameters = self.parameters
-        return min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf)
+        return min(self._pitch_limits.values())
 
     @property
-    def _max_pitch_parameter(self) -> str:
-        """Name of the parameter that sets the largest pitch."""
-        return "PTCH_LIM_MAX_DEG" if self._max_pitch == self.parameters.pitch_limit_max else "TECS_PITCH_MAX"
+    def _max_pitch_parameters(self) -> tuple[str, ...]:
+        """Names of the parameters of the largest pitch, which are both if they are equal."""
+        return tuple(name for name, limit in self._pitch_limits.items() if limit == self._max_pitch)
+
+    @property
+    def _pitch_limits(self) -> dict[str, float]:
+        """Limits of the pitch by their parameters, rad; TECS_PITCH_MAX 0 is none."""
+        parameters = self.parameters
+        return {
+            "TECS_PITCH_MAX": parameters.tecs_pitch_max or math.inf,
+            "PTCH_LIM_MAX_DEG": parameters.pitch_limit_max,
+        }
 
     @property
     def _pitch_candidates(self) -> tuple[Candidate, ...]:
-        """Range of values to try for the parameter that limits the pitch.
-
-        The range ends where the other pitch parameter becomes the limit.
-        """
-        parameters, name = self.parameters, self._max_pitch_parameter
-        other_limit = parameters.pitch_limit_max if name == "TECS_PITCH_MAX" else parameters.tecs_pitch_max or math.inf
-        max_tried = min(MAX_TRIED_PITCH_DEG, math.degrees(other_limit))
+        """The parameters of the largest pitch, up to the value at which another parameter becomes the limit."""
+        name, *others = self._max_pitch_parameters
+        higher_limits = (limit for limit in self._pitch_limits.values() if limit > self._max_pitch)
+        max_tried = min(MAX_TRIED_PITCH_DEG, *map(math.degrees, higher_limits), math.inf)
         is_raised = max_tried > math.degrees(self._max_pitch)
-        return (Candidate(name, 1.0, max_tried, "deg"),) if is_raised else ()
+        return (Candidate(name, 1.0, max_tried, "deg", others=tuple(others)),) if is_raised else ()
 
     def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
         """Return a copy with the given parameters changed; also for an autopilot that runs the ArduPlane program."""
@@ -706,6 +711,4 @@ def _bank_limit_note(bank: float) -> str:
     """
     if bank <= 0.0:
         return ""
-    return (
-        f"NAVL1_LIM_BANK {bank:g} is not simulated: circles are as wide as without it, but ArduPlane's may be narrower"
-    )
+    return f"NAVL1_LIM_BANK {bank:g} is not simulated: ArduPlane may fly smaller loiter circles than planfly"

@@ -120,6 +120,11 @@ _MOTOR_OFF_THROTTLE = 0.01
 _BY_RETURN_PATH = 4.0
 # Number of airspeed sensors that ArduPlane 4.7 reads.
 _AIRSPEED_SENSORS = 6
+# How a flight without an airspeed sensor can be judged: by a program, whose simulated sensor has no other number.
+_WITHOUT_SENSOR_TEXT = (
+    "ARSPD_USE 0 ArduPlane's own program (--sitl) flies without the sensor, with ARSPD_USE 1 the flight is simulated"
+    " with it"
+)
 # Values of AHRS_EKF_TYPE.
 _EKF2 = 2.0
 _EKF3 = 3.0
@@ -237,7 +242,7 @@ def _describe_dependent_settings(
 
 
 def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe settings with which ArduPlane measures no airspeed, or does not use it.
+    """Describe settings without which no airspeed is measured or used, and how such a flight can be judged.
 
     `AP_Airspeed::update` takes the first sensor if the primary one is missing.
     """
@@ -246,11 +251,11 @@ def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
     present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
     if values["ARSPD_ENABLE"] == 0.0 or not present:
         name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
-        yield f"{name} 0 leaves no airspeed sensor, which is not simulated"
+        yield f"{name} 0 leaves no airspeed sensor, which is not simulated; with {name} 1 and {_WITHOUT_SENSOR_TEXT}"
         return
     use = f"{prefixes[primary if primary in present else present[0]]}_USE"
     if values[use] != 1.0:
-        yield f"{use} {values[use]:g} affects the flight, but is not simulated"
+        yield f"{use} {values[use]:g} affects the flight, but is not simulated; with {_WITHOUT_SENSOR_TEXT}"
 
 
 def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:

@@ -42,12 +42,12 @@ def release_note(program: str) -> str:
     The result is "" if the releases are the same, or if the program states no release.
 
     >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
-    ('ArduPlane 4.5 flew it, and 4.6 is simulated', '')
+    ('flown by ArduPlane 4.5, but simulated with 4.6', '')
     """
     found = _PROGRAM_RELEASE.search(program)
     if found is None or f"{int(found[1])}.{int(found[2])}" == simulated_release(program):
         return ""
-    return f"ArduPlane {int(found[1])}.{int(found[2])} flew it, and {simulated_release(program)} is simulated"
+    return f"flown by ArduPlane {int(found[1])}.{int(found[2])}, but simulated with {simulated_release(program)}"
 
 
 def file_release(text: str, names: Iterable[str]) -> FileRelease | None:

@@ -512,9 +512,9 @@ class Px4(Autopilot):
         return_type = parameters["RTL_TYPE"]
         first_height, last_height = f"{parameters['RTL_RETURN_ALT']:g} m", f"{parameters['RTL_DESCEND_ALT']:g} m"
         return (
-            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}; below RTL_RETURN_ALT"
-            f" ({first_height} above its destination) it first climbs in a loiter to that height; it then flies level,"
-            f" and over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
+            f"RTL_TYPE {return_type:g}: a return goes to {_DESTINATION_TEXTS[int(return_type)]}. Below RTL_RETURN_ALT"
+            f" ({first_height} above its destination) it first climbs to that height in a loiter. Then it flies level;"
+            f" over home or a rally point it descends in a loiter to RTL_DESCEND_ALT ({last_height})"
         )
 
     @property

@@ -176,7 +176,7 @@ def _rate_of_change(series: Series, grid: Floats, *, wraps: bool = False, step: 
 
 
 def _pairs_to_check(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
-    """Yield the pairs of measurements of a log that must agree or vary together, to check them."""
+    """Yield the pairs of measurements to check, which must agree or vary together."""
     if log.has("velocity_down", "altitude"):
         sink = -_rate_of_change(log.series("altitude"), grid)
         yield _Pair("velocity_down", "the change of altitude", log.series("velocity_down"), sink)
@@ -270,10 +270,10 @@ class _Triangle(NamedTuple):
 
 
 def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
-    """Return the triangle that fits ground velocity, heading and airspeed best, or None if it is unknown.
+    """Return the wind triangle that fits ground velocity, heading and airspeed best, or None.
 
-    It is unknown without these quantities, and in a flight without turns, because only turns distinguish the wind from
-    an error of the airspeed.
+    The triangle is unknown without these quantities, and in a flight without turns, because only turns distinguish the
+    wind from an error of the airspeed.
     """
     velocity = _ground_velocity(log, grid)
     if velocity is None or not log.has("airspeed", "yaw"):
@@ -322,7 +322,8 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
     durations = time[lasts] - time[firsts]
     limit = max(_FROZEN_S, _FROZEN_RUNS * float(np.quantile(durations, 0.95))) if len(durations) > 1 else _FROZEN_S
     for k in np.flatnonzero(durations > limit).tolist():
-        start, end = float(time[firsts[k]]), float(time[min(lasts[k] + 1, len(time) - 1)])
+        start = float(time[firsts[k]])
+        end = float(time[min(lasts[k] + 1, len(time) - 1)])
         flight_time = np.count_nonzero((grid > start) & (grid < end)) * _STEP_S
         if flight_time > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
             hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"
@@ -357,7 +358,7 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     """Raise LogError if a measurement leads or lags its partner by `_LATE_S` or more.
 
     The delay is the shift with the best correlation.  A shift is ignored if the amplitudes of both measurements differ
-    at it, because it then does not compare the same motion.
+    after it, because it then does not compare the same motion.
     """
     is_inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
     if not pair.at_once or np.count_nonzero(is_inner) < _MIN_ROWS:
@@ -390,9 +391,9 @@ def _check_force(log: ColumnLog, force: float) -> None:
 
 
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError for an airspeed near zero in flight, or that contradicts ground velocity and heading.
+    """Raise LogError for an airspeed near zero in flight, or one that contradicts velocity and heading.
 
-    Raises LogError, too, for a logged wind that contradicts the wind of the velocity triangle, if the flight has turns.
+    If the flight has turns, a logged wind that contradicts the wind of the velocity triangle also raises LogError.
     """
     airspeed, column = _mean_on_grid(log.series("airspeed"), grid), log.column("airspeed")
     if np.median(airspeed) < _MIN_AIRSPEED_MPS:

@@ -100,7 +100,7 @@ class ColumnLog:
         It identifies the log from which an aircraft was identified, even if the table is edited.
         """
         digest = hashlib.sha256()
-        for path in sorted({self._file_of(clock) for clock in self.table.clocks.values()}):
+        for path in sorted({self._data_path(clock) for clock in self.table.clocks.values()}):
             digest.update(path.read_bytes())
         return digest.hexdigest()
 
@@ -194,7 +194,7 @@ class ColumnLog:
         if len(names) != len(values):
             raise self._error("parameter_columns", f"{len(names)} names", f"{len(values)} values: expected as many")
         numbers = _numbers(values, self._location(data, self.table.parameter_columns[1]))
-        stored = {text_of(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
+        stored = {cell_text(name): value for name, value in zip(names, numbers.tolist(), strict=True)}
         return {name: value for name, value in stored.items() if math.isfinite(value)} | self.table.parameters
 
     # ------------------------------------------------------------------
@@ -204,8 +204,8 @@ class ColumnLog:
         """Return the error for a field of the table."""
         return LogError.at(self.table_path, field, value, allowed)
 
-    def _file_of(self, clock: ClockTable) -> Path:
-        """Return the data file of a clock: its own, or else the opened data file, or else the table's file."""
+    def _data_path(self, clock: ClockTable) -> Path:
+        """Return the data file of a clock: the clock's file, else the opened data file, else the table's file."""
         if clock.file is not None:
             return self.table_path.parent / clock.file
         if self.path != self.table_path:
@@ -218,7 +218,7 @@ class ColumnLog:
 
     def _data_file(self, clock: ClockTable) -> DataFile:
         """Return the contents of a clock's data file, which is read at the first call."""
-        path = self._file_of(clock)
+        path = self._data_path(clock)
         if path not in self._files:
             self._files[path] = read_data_file(path)
         return self._files[path]
@@ -236,7 +236,7 @@ class ColumnLog:
         """
         data, field = self._data_file(clock), f"clocks.{name}"
         if clock.column is None:
-            lengths = [len(self._column_by_name(data, column)) for column in self._columns_of(name)]
+            lengths = [len(self._column_by_name(data, column)) for column in self._clock_columns(name)]
             rate = clock.rate or 1.0
             return _Clock(data, np.arange(max(lengths, default=0)) / rate + clock.offset_s, rate)
         values = self._column_by_name(data, clock.column, f"{field}.column")
@@ -278,7 +278,7 @@ class ColumnLog:
 
     @property
     def _main_clock(self) -> str:
-        """Name of the main clock: "main", or the first clock if none has this name."""
+        """Name of the main clock: "main", or else the name of the first clock."""
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
     def _times(self, name: str) -> Floats:
@@ -346,7 +346,7 @@ class ColumnLog:
     # ------------------------------------------------------------------
     # Columns.
 
-    def _columns_of(self, clock: str) -> list[str]:
+    def _clock_columns(self, clock: str) -> list[str]:
         """Return the names of the columns that use a clock."""
         return [
             entry.column
@@ -376,7 +376,10 @@ class ColumnLog:
         return data.columns[name]
 
     def _column_on_clock(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
-        """Return a column with a clock.  Raises LogError if it has another number of rows than the clock."""
+        """Return a column that uses a clock.
+
+        Raises LogError if the column and the clock have different numbers of rows.
+        """
         values = self._column_by_name(clock.data, name, field)
         if len(values) != len(clock.time):
             allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
@@ -390,7 +393,7 @@ class ColumnLog:
     def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
         """Return the series of one entry in SI units, radians and the default frame.
 
-        Only the span that the table names is read.  Rows that do not meet the entry's condition are NaN.
+        Only the time span that the table names is read.  Rows that do not meet the entry's condition are NaN.
         """
         if entry.value is not None:
             time = self._times(self._main_clock)
@@ -454,7 +457,8 @@ class ColumnLog:
         value changes more often than the stated rate.
         """
         changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
-        rate, stated_rate = changes.sum() / max(1e-9, float(np.ptp(time))), entry.rate or 0.0
+        rate = changes.sum() / max(1e-9, float(np.ptp(time)))
+        stated_rate = entry.rate or 0.0
         if rate > _MAX_RATE_RATIO * stated_rate:
             allowed = f"it changes {rate:.3g} times a second"
             raise self._error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
@@ -464,11 +468,11 @@ class ColumnLog:
 def _mask_equal(values: Column, wanted: float | str) -> Flags:
     """Return a mask (n,): True where a value equals a number or a text."""
     if isinstance(wanted, str):
-        return np.asarray([text_of(value) == wanted for value in values], np.bool_)
+        return np.asarray([cell_text(value) == wanted for value in values], np.bool_)
     return np.asarray(values == wanted, np.bool_)
 
 
-def text_of(value: Any) -> str:
+def cell_text(value: Any) -> str:
     """Return a cell of a text column, which may be bytes, as a str."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
@@ -484,7 +488,7 @@ def _numbers(values: Column, place: str) -> Floats:
         return values.astype(np.float64)
     numbers = np.full(len(values), np.nan)
     for k, value in enumerate(values):
-        text = text_of(value).strip() if value is not None else ""
+        text = cell_text(value).strip() if value is not None else ""
         if text:
             try:
                 numbers[k] = float(text)
@@ -500,7 +504,7 @@ def _seconds_of_dates(values: Column, place: str) -> Floats:
     """
     import pandas as pd
 
-    texts = values if values.dtype.kind == "M" else [text_of(value) for value in values]
+    texts = values if values.dtype.kind == "M" else [cell_text(value) for value in values]
     try:
         stamps = pd.to_datetime(texts, utc=True, format=None if values.dtype.kind == "M" else "ISO8601")
     except (ValueError, TypeError) as error:

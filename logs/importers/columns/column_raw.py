@@ -9,7 +9,7 @@ import numpy as np
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import VerticalDatum
 from logs.importers.columns.column_checks import check_signs_and_units
-from logs.importers.columns.column_log import ColumnLog, text_of
+from logs.importers.columns.column_log import ColumnLog, cell_text
 from logs.importers.columns.column_motion import join_series, read_air, read_velocity
 from logs.importers.raw_log import LoggedMission, LogSeries, ModeChange, RawLog
 from world.arrays import Floats
@@ -114,6 +114,6 @@ def _modes(log: ColumnLog) -> Iterator[ModeChange]:
     previous = None
     for start, value in zip(time.tolist(), values.tolist(), strict=True):
         if value != previous:
-            key = f"{value:g}" if isinstance(value, float) else text_of(value)
+            key = f"{value:g}" if isinstance(value, float) else cell_text(value)
             yield ModeChange(start, names.get(key, key), value in automatic or key in automatic)
             previous = value

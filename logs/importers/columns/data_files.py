@@ -72,7 +72,7 @@ def read_data_file(path: Path) -> DataFile:
 
 
 def _read_csv(path: Path) -> DataFile:
-    """Read a CSV file with a header line, which may follow remarks and precede a line with units."""
+    """Read a CSV file with a header line; remarks may come before it, and a line with units after it."""
     import pandas as pd
 
     text = path.read_bytes().decode("utf-8-sig", errors="replace")

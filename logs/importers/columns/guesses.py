@@ -202,7 +202,8 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
 
     Raises LogError for a file that cannot be read, and if no column was recognized.
     """
-    files = {_relative_path(path, target): read_data_file(path) for path in paths}
+    file_names = [Path(os.path.relpath(path, target.parent)).as_posix() for path in paths]
+    files = {name: read_data_file(path) for name, path in zip(file_names, paths, strict=True)}
     times = [clock for file, data in files.items() for clock in _time_clocks(data, file)]
     clocks: list[_Clock] = []
     for clock in sorted(times, key=lambda clock: -clock.length):
@@ -228,18 +229,13 @@ def guess_column_table(paths: Sequence[Path], target: Path) -> str:
     return _table_text(guesses, alternatives, files)
 
 
-def _relative_path(path: Path, target: Path) -> str:
-    """Return a path relative to the folder of the table, with forward slashes."""
-    return Path(os.path.relpath(path, target.parent)).as_posix()
-
-
 def _plain_name(name: str) -> str:
     """Return only the letters and digits of a name, in lower case."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
-    """Split a column's name into its prefix, its own name without a unit, and the unit.
+    """Split a column's name into a prefix, a name and a unit.
 
     The unit is the one that the file or the name states; "" if neither states one.
     """
@@ -253,7 +249,7 @@ def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
 
 
 def _time_clocks(data: DataFile, file: str) -> Iterator[_Clock]:
-    """Yield a clock for each column that has the name of a time and increasing values."""
+    """Yield a clock for each column with increasing values and a name that stands for time."""
     for column, values in data.columns.items():
         prefix, own, unit = _name_parts(data, column)
         if {_plain_name(own), _plain_name(column.rpartition(".")[2])} & set(_TIMES) and (

@@ -44,9 +44,9 @@ class FlownLegs:
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
     """Find the legs flown in a stretch of the log that follows the mission; return None if there are none.
 
-    A stretch has no legs if it reached at most one waypoint, or has fewer than two rows.  Its legs begin at the first
-    waypoint that was passed, because the path to that waypoint is not a leg.  They end at the last waypoint that was
-    passed, or with the next leg, which was then flown in part.
+    A stretch has no legs if it passed fewer than two waypoints, or has fewer than two rows.  The first leg starts at
+    the first waypoint that was passed.  The last leg ends at the last waypoint that was passed; if the log continues
+    beyond it, the next leg is added as a partly flown leg.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -101,10 +101,10 @@ def stretch_end_text(stretch: MissionStretch) -> str:
 def _earliest_lap(
     setup: FlightSetup, rows: Track, aligned: AlignedTrack, waypoint_indices: NDArray[np.intp]
 ) -> tuple[AlignedTrack, NDArray[np.intp]]:
-    """Align a track with the earliest laps that explain the flight, on a route that repeats its items.
+    """Align a track with the earliest laps of a repeated route that explain the flight.
 
-    A flight that ended within a lap was equally near to the waypoints of any later lap.  Return `aligned` and
-    `waypoint_indices` unchanged if no shorter route explains the flight.
+    Without this step, a flight that ended within a lap could be matched to any later lap, because all laps have the
+    same waypoints.  Return `aligned` and `waypoint_indices` unchanged if no shorter route explains the flight.
     """
     items, last = setup.route.items, int(waypoint_indices[-1])
     if len(waypoint_indices) == last - waypoint_indices[0] + 1:
@@ -128,7 +128,7 @@ def rows_between(track: Track, start: float, end: float) -> Track:
 
 
 def identified_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
-    """Return the indices of the waypoints that the track passes closely enough to identify them, in order.
+    """Return the indices, in order, of the waypoints that the track passes closely enough to identify.
 
     At the start and the end of the track, a waypoint must be within its fly-by offset plus a tolerance, or within the
     corridor.
@@ -164,12 +164,12 @@ class PlanMismatch:
         """Text of the reason."""
         if self.kind == "place":
             distance_text = f"{self.distance / 1000.0:.1f} km" if self.distance >= 1000.0 else f"{self.distance:.0f} m"
-            return f"the mission lies elsewhere: the flight never comes within {distance_text} of its waypoints"
-        return f"the order differs: the flight passed the items as {', '.join(map(str, self.order))}, ..."
+            return f"the flight is elsewhere, at least {distance_text} from every waypoint"
+        return f"the flight passed its items in another order: {', '.join(map(str, self.order))}, ..."
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Find the reason why a flight did not follow the setup's mission; return None if it followed the mission.
+    """Explain why a flight did not follow the setup's mission; return None if it did.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch
@@ -212,7 +212,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
 
 
 def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's minimum horizontal distance (m) from the flight, and its time (s), (w,) each."""
+    """Return each waypoint's smallest horizontal distance from the flight, m, and its time, s, (w,) each."""
     min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in tracks:
         for k, point in enumerate(points):

@@ -92,8 +92,9 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
     by_start = {legs.stretch.start: legs for legs in flown_stretches}
     lines = []
     for stretch in source.stretches:
-        name = stretch.mode or "the flight (the log contains no modes)"
+        name = stretch.mode or "the flight"
         time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+        time_text += "" if stretch.mode else " (the log contains no modes)"
         legs = by_start.get(stretch.start)
         if legs is None:
             lines.append(f"Judged: nothing of {time_text}: it did not pass two waypoints in order")
@@ -101,12 +102,12 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
         first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
         partial_text = f", leg {last} in part" if legs.partial else ""
         start_time = float(legs.aligned.track.time[0])
-        lines.append(f"Judged: {time_text}, legs {first} to {last}{partial_text}, from {start_time:.1f} s on")
+        lines.append(f"Judged: {time_text}, legs {first} to {last}{partial_text}, which begin at {start_time:.1f} s")
     return lines
 
 
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return a line for each rule with unjudged findings: their number and the first reason.
+    """Return one line for each rule that has unjudged findings: their number and the first reason.
 
     The number is left out if none of the rule's findings was judged.
     """
@@ -126,11 +127,11 @@ def heights_text(source: ImportedLog) -> str:
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
-    'POS, above mean sea level, according to the log; at the start GPS.Alt -0.1 m relative to it'
+    'from POS, above mean sea level, according to the log; difference at the start: GPS.Alt -0.1 m'
     """
     offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in source.heights.offsets)
-    offset_text = f"; at the start {offsets} relative to it" if offsets else ""
-    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
+    offset_text = f"; difference at the start: {offsets}" if offsets else ""
+    return f"from {source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
 
 def row_faults_text(faults: RowFaults, gaps: int) -> str:
@@ -161,7 +162,7 @@ _MAX_LISTED_RANGES = 6
 
 
 def missing_text(missing: MissingItems) -> str:
-    """Describe the unjudged part of a mission, and the items that the log lacks.
+    """Describe which part of a mission is not judged, and which items the log lacks.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
     'not judged beyond item 6: items 7 to 13 of 14 are not in the log or ignored'
@@ -218,7 +219,7 @@ def _start_time_text(source: ImportedLog) -> str:
     """Describe the date and time at which the log's time is 0; return "" if the log states no plausible date."""
     if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
         return ""
-    return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    return f", time 0 s is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 # Name of each quantity in a message about a log without it.
@@ -236,9 +237,9 @@ _TRACK_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "atti
 _DATUM_REASONS = {
     "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
     "pressure": "the log's heights are pressure altitudes, above the 1013.25 hPa level",
-    "unstated": "the log does not state the datum of its heights (--datum names it)",
+    "unstated": "the log does not state the datum of its heights: --datum names it",
 }
-_UNNAMED_TEXT = "the aircraft is not named (--aircraft)"
+_UNNAMED_TEXT = "no aircraft was named: --aircraft names it"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
@@ -295,7 +296,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
 
 
 def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Describe the mission items, or the part of the flight, that are missing in the log; return "" if none is."""
+    """Describe missing mission items or a missing part of the flight; return "" if the log is complete."""
     if missing is not None:
         return missing_text(missing)
     parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
@@ -328,7 +329,7 @@ def _undecided_part_text(findings: Sequence[Finding]) -> str:
 
 
 def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
-    """Judge one stretch, and number its legs and waypoints as in the whole route."""
+    """Judge one stretch; number the legs and waypoints in its findings as in the whole route."""
     findings = []
     for finding in track_findings(legs.requirements, legs.aligned):
         checked_finding = _unjudge_with_gaps(_unjudge_without_data(setup, legs, finding), legs)
@@ -339,9 +340,9 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
 
 
 def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
-    """Return a finding for each rule that judged nothing because the log lacks its data.
+    """Return an unjudged finding for each rule for which the log lacks the data.
 
-    Only rules with `LogNeeds.reports_missing` are reported.
+    Rules without `LogNeeds.reports_missing` are left out.
     """
     findings = []
     for rule in RULES.values():
@@ -422,9 +423,10 @@ def _unjudge_with_gaps(finding: Finding, legs: FlownLegs) -> Finding:
 
 
 def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Return a finding, marked as not judged if it concerns the last waypoint, which was not reached, or its leg.
+    """Mark a finding as not judged if it concerns a last waypoint that was not reached, or its leg.
 
-    On the leg to that waypoint, only rules that need the whole leg are marked, and a finding that fails still fails.
+    On the leg to that waypoint, only findings of rules that need the whole leg are marked.  A failed finding stays
+    failed.
     """
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
@@ -453,7 +455,7 @@ def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding
 
 
 def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches: keep one for each rule, place and check, a failure before a pass."""
+    """Merge the findings of all stretches; for each rule, place and check keep a failure rather than a pass."""
     merged: dict[tuple[str, Place, str], Finding] = {}
     for findings in findings_by_stretch:
         for finding in findings:

@@ -185,7 +185,7 @@ def compare_with_model(
 def _flight_profile(
     requirements: RouteRequirements, aligned: AlignedTrack, distances_on_legs: Sequence[Floats]
 ) -> Profile:
-    """Measure a flight at points along its legs; all values are NaN on a leg that was not flown.
+    """Measure a flight at points along its legs; a leg that was not flown has only NaN values.
 
     distances_on_legs: for each leg, the distances of its points from the leg's start, m.
     """
@@ -299,7 +299,10 @@ def _turn_pair(
 
 
 def _make_spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
-    """Summarize the differences of both flights in each quantity; leave out quantities that are never known in both."""
+    """Summarize the differences between both flights by quantity.
+
+    Quantities that are never known in both flights at the same point are left out.
+    """
     spreads = []
     for name, unit, factor in (
         ("cross_track", "m", 1.0),

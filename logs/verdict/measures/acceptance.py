@@ -51,9 +51,9 @@ class AcceptanceCondition:
 def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceCondition:
     """Return the distance within which waypoint i is reached, and its source.
 
-    The mission's own radius applies, or else the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS for
-    a right angle or a sharper corner, and at a fraction of WP_RADIUS for a gentler corner.  At the mission's end, and
-    where a return to launch begins, up to the full WP_RADIUS is allowed.
+    The radius of the mission item applies, or else the autopilot's radius.  ArduPlane turns to the next leg at
+    WP_RADIUS if the corner is a right angle or sharper, and at a fraction of WP_RADIUS if the corner is gentler.  The
+    full WP_RADIUS is allowed at the mission's end and where a return to launch begins.
     """
     setup, path_radius = requirements.setup, float(requirements.fly_by_offset[i]) + WAYPOINT_PASS_MARGIN_M
     mission_radius = float(setup.route.points["acceptance_radius"][i])
@@ -70,12 +70,12 @@ def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceC
 
 
 def position_error(setup: FlightSetup) -> float:
-    """Return the largest assumed navigation error, m, which is three sigmas of one axis."""
+    """Return the assumed maximum navigation error: three standard deviations on one axis, m."""
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
 def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
-    """Return the distances by which the turns at both ends of a leg leave the legs, m, (2,).
+    """Return how far the turns at a leg's start and end deviate from the legs, m, (2,).
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
@@ -107,7 +107,8 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
     if requirements.setup.autopilot.loiters.steers_to_center:
-        arcs, tightest = requirements.setup.route.arc_radii[ends], requirements.min_radius[ends]
+        arcs = requirements.setup.route.arc_radii[ends]
+        tightest = requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
         loiter_radius = float(arcs.max())
@@ -150,10 +151,10 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink_distance(requirements: RouteRequirements, i: int) -> float | None:
-    """Return the distance at which a flyable shortcut passes waypoint i and its omitted neighbours, m.
+    """Return the distance of a flyable shortcut from the farthest waypoint that it omits, m.
 
-    The shortcut omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours; the distance is measured
-    from the farthest of them.  Return None if there is no such shortcut.
+    The shortcut omits waypoint i and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.  Return None if there is no
+    such shortcut.
     """
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
@@ -248,7 +249,7 @@ def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, 
 def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
     """Return the route reduced to some waypoints.
 
-    Each leg has the speed of the old leg that begins at the same waypoint.
+    Each leg keeps the speed of the original leg that begins at the same waypoint.
     """
     points = route.points[waypoints]
     points["airspeed"][1:] = route.leg_airspeeds[waypoints[:-1]]
@@ -258,8 +259,8 @@ def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:
 def step_height(requirements: RouteRequirements, leg: int) -> float | None:
     """Return the height of a leg's step, m, positive, or None if it exceeds `NEGLIGIBLE_STEP_M`.
 
-    This applies to a leg that exceeds its slope limit.  A sequence of legs that is too steep overall and includes this
-    leg is one step: the height of a staircase is the total height of its stairs.
+    Call this for a leg that exceeds its slope limit.  If the leg is part of a sequence of legs that is too steep
+    overall, the sequence counts as one step, with the height of the whole sequence.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
@@ -267,10 +268,8 @@ def step_height(requirements: RouteRequirements, leg: int) -> float | None:
     max_step = float(height_changes[leg])
     for first in range(leg, max(-1, leg - KINK_WAYPOINT_COUNT), -1):
         for last in range(leg, min(requirements.legs, leg + KINK_WAYPOINT_COUNT)):
-            height_change, distance = (
-                float(height_changes[first : last + 1].sum()),
-                float(requirements.runs[first : last + 1].sum()),
-            )
+            height_change = float(height_changes[first : last + 1].sum())
+            distance = float(requirements.runs[first : last + 1].sum())
             if math.atan2(height_change, distance) > limit + PLAN_TOLERANCE_RAD:
                 max_step = max(max_step, height_change)
     return max_step if max_step <= NEGLIGIBLE_STEP_M else None

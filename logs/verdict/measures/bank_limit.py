@@ -11,8 +11,8 @@ _SAME_BANK_RAD = 1e-6
 def bank_limit_text(setup: FlightSetup) -> str:
     """Return a text on a setup's bank limit and its source, such as "the aircraft's bank limit of 29°".
 
-    The source is the aircraft, the autopilot or the scenario, if it states a limit.  The text begins with "a" if
-    none of their limits equals the setup's limit.
+    The source is the aircraft, the autopilot or the scenario, whichever has this limit.  If none has it, the text names
+    no source: "a bank limit of 29°".
 
     >>> from logs.recording.example_log import example_log
     >>> bank_limit_text(example_log().setup)

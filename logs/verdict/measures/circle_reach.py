@@ -35,7 +35,7 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the hazards to a flight that may lead anywhere within a distance of a center.
+    """Describe the hazards within a distance of a center.
 
     center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
@@ -58,7 +58,8 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
     setup, rules = requirements.setup, requirements.setup.autopilot.loiters
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
         return None
-    altitude, speed = float(requirements.points[-1, 2]), float(requirements.route.leg_airspeeds[-1])
+    altitude = float(requirements.points[-1, 2])
+    speed = float(requirements.route.leg_airspeeds[-1])
     min_radius = max(
         requirements.limits.turn_radius(course, course + math.pi, altitude, speed) for course in (0.0, math.pi)
     )
@@ -71,7 +72,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _ground_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe ground within reach that is unknown, too close below the aircraft, or (with a height limit) too far."""
+    """Describe ground within reach that is unknown, too close below, or too far below for a height limit."""
     terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if terrain is None:
         return []

@@ -12,8 +12,8 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
     """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN if the power is not known.
 
-    Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.
-    Turns and gusts take a few per cent more.
+    Each leg is flown at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude.  The
+    prediction leaves out turns and gusts, which take a few per cent more.
     """
     volts = requirements.setup.envelope.volts
     energies, peak_power = leg_energies(requirements)
@@ -32,10 +32,8 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
         requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
     )
     for leg, duration in enumerate(leg_durations):
-        speed, altitude = (
-            float(route.leg_airspeeds[leg]),
-            float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
-        )
+        speed = float(route.leg_airspeeds[leg])
+        altitude = float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2]))
         power = power_at(speed, altitude, air_climb_angle(requirements, leg, speed, altitude))
         energies.append(power * float(duration) / 3600.0)
         peak_power = max(peak_power, power) if math.isfinite(power) else math.nan

@@ -20,8 +20,9 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return the requirements of a flight's airborne part, and the aligned track of this part (None if unusable).
+    """Return the requirements and the aligned track of a flight's airborne part.
 
+    The track is None if it is unusable.
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
     """
     procedures = whole_requirements.setup.ground_phases
@@ -44,7 +45,7 @@ def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[R
 
 
 def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
-    """Return the row at which the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
+    """Return the row at which the take-off ended; 0 without a take-off, the last row if it never ended."""
     if procedures.take_off is None:
         return 0
     is_above = track.position[:, 2] > procedures.take_off.end_altitude

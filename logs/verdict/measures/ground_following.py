@@ -32,7 +32,7 @@ def follows_ground(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Floats) -> Floats:
-    """Return the altitude that a leg which follows the ground demands at positions, m AMSL, (n,).
+    """Return the altitudes demanded at positions on a leg that follows the ground, m AMSL, (n,).
 
     The height above ground changes linearly along the leg, as in `flight.guidance.path.fly_by_path`.  The altitude is
     NaN where the ground is unknown.
@@ -42,7 +42,8 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
     terrain = requirements.setup.scenario.terrain
     if terrain is None:
         return np.full(len(positions), math.nan)
-    start, end_height = requirements.points[leg], float(requirements.setup.route.points["above_ground"][leg + 1])
+    start = requirements.points[leg]
+    end_height = float(requirements.setup.route.points["above_ground"][leg + 1])
     start_height = float(start[2]) - float(terrain.height(start[0], start[1]))
     start_height = start_height if math.isfinite(start_height) else end_height
     distance, _ = project_onto_leg(requirements, leg, positions)
@@ -52,12 +53,14 @@ def demanded_altitudes(requirements: RouteRequirements, leg: int, positions: Flo
 
 
 def steepest_ground(requirements: RouteRequirements, leg: int, limit: float) -> GroundSlope | None:
-    """Return the part of a leg on whose demand an aircraft falls furthest below that climbs at most at a slope, rad.
+    """Find where an aircraft limited to a climb slope (rad) falls furthest below a ground-following leg.
 
     The ground is sampled at steps of `GROUND_STEP_M`, as ArduPlane's terrain data.  Return None if every part of the
     leg is within the limit.
     """
-    start, unit, run = requirements.points[leg, :2], requirements.leg_unit(leg), float(requirements.runs[leg])
+    start = requirements.points[leg, :2]
+    unit = requirements.leg_unit(leg)
+    run = float(requirements.runs[leg])
     distance = np.append(np.arange(0.0, run, GROUND_STEP_M), run)
     altitude = demanded_altitudes(requirements, leg, start + distance[:, None] * unit)
     is_known = np.isfinite(altitude)

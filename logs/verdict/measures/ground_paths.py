@@ -52,7 +52,8 @@ def track_path(track: Track) -> GroundPath:
 def straight_path(start: Sequence[float] | Floats, course: float, profile: Profile) -> GroundPath:
     """Return a path on one course (rad) from a start (east and north, m), with the altitudes of a profile."""
     distance, up = np.array(profile, dtype=np.float64).T
-    east, north = start[0] + distance * math.sin(course), start[1] + distance * math.cos(course)
+    east = start[0] + distance * math.sin(course)
+    north = start[1] + distance * math.cos(course)
     return GroundPath(np.stack([east, north, up], axis=1), distance)
 
 
@@ -112,7 +113,7 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
 
 
 def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """Return the first waypoint of a mission item, and this item if it is a take-off, otherwise None."""
+    """Return the first waypoint with a mission item, and this item if it is a take-off, otherwise None."""
     route = requirements.setup.route
     first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
     items = [item for item in requirements.setup.mission.items if item.seq == int(route.items[first])]
@@ -120,7 +121,7 @@ def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | No
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """Return the waypoint and the item of a mission's last NAV_LAND landing, or None if there is none."""
+    """Return the waypoint and the item of the mission's last NAV_LAND, or None if it has none."""
     landings = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     landing_waypoints = [
         (k, landings[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in landings

@@ -66,7 +66,7 @@ class LinkAlongPath:
 
 
 def station_antenna(setup: FlightSetup, link: RadioLink, terrain: Terrain) -> Floats | None:
-    """Return the position of the station's antenna, m, (3,); without a stated position it stands at the mission's home.
+    """Return the position of the ground station's antenna, m, (3,), by default at the mission's home.
 
     Return None if the station has neither a position nor a home, or if the ground at this position is unknown.
     """
@@ -101,13 +101,15 @@ def link_along_path(
 
 
 def _find_outages(time: Floats, margin: Floats) -> tuple[Outage, ...]:
-    """Find the periods with a negative margin, with linear interpolation between two known margins."""
+    """Find the periods with a negative margin; margins are interpolated linearly between known values."""
     outages: list[Outage] = []
     for k in range(len(time) - 1):
         first, last = float(margin[k]), float(margin[k + 1])
         if math.isnan(first) or math.isnan(last) or (first >= 0.0 and last >= 0.0):
             continue
-        duration, start, end = float(time[k + 1] - time[k]), float(time[k]), float(time[k + 1])
+        duration = float(time[k + 1] - time[k])
+        start = float(time[k])
+        end = float(time[k + 1])
         if first >= 0.0:
             start += duration * first / (first - last)
         elif last >= 0.0:

@@ -9,9 +9,9 @@ from logs.verdict.tolerances import FINAL_WAYPOINT_TOLERANCE_M
 
 
 def judges_return_after_last_item(setup: FlightSetup) -> bool:
-    """Return True if a mission is judged beyond its last item, where ArduPlane returns to launch by itself.
+    """Return True if the return to launch that ArduPlane begins after the last item is judged.
 
-    A mission that ends at its scenario's destination is judged only up to the destination.
+    It is not judged for a mission that ends at its scenario's destination.
     """
     return _returns_after_last_item(setup) and not _ends_at_destination(setup)
 
@@ -63,7 +63,7 @@ def unjudged_return_text(setup: FlightSetup) -> str:
 
 
 def missing_home_text(setup: FlightSetup) -> str:
-    """Explain why a missing home leaves the return after the last item unjudged; return "" if it does not."""
+    """Explain that a missing home leaves the return after the last item unjudged; "" if it does not."""
     if setup.mission.home is not None or not judges_return_after_last_item(setup):
         return ""
     return f"the mission has no home, to which {setup.autopilot.title} returns by itself after the last item"
@@ -85,7 +85,7 @@ _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "b
 
 
 def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
-    """Describe PX4's objection to a missing takeoff or landing; return "" if nothing is missing.
+    """Describe why PX4 refuses a mission without a take-off or a landing; return "" if it has both.
 
     >>> missing_ends_text(Mission(None, ()), FeasibilityLimits(requires=2))
     "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
@@ -104,6 +104,6 @@ def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
 
 
 def _present_ends(has_takeoff: bool, has_landing: bool) -> str:
-    """Return a text such as "a takeoff and a landing" on the ends that a mission has."""
+    """Name which of take-off and landing a mission has, such as "a takeoff and a landing"."""
     present = [name for name, is_present in (("a takeoff", has_takeoff), ("a landing", has_landing)) if is_present]
     return " and ".join(present) or "neither a takeoff nor a landing"

@@ -43,10 +43,8 @@ def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
     forward_offset, lateral_offset = distance, 0.0
     if move.curvature != 0.0:
         course_change = move.curvature * distance
-        forward_offset, lateral_offset = (
-            math.sin(course_change) / move.curvature,
-            (1.0 - math.cos(course_change)) / move.curvature,
-        )
+        forward_offset = math.sin(course_change) / move.curvature
+        lateral_offset = (1.0 - math.cos(course_change)) / move.curvature
     return (
         move.east + forward_offset * move.course_east + lateral_offset * move.course_north,
         move.north + forward_offset * move.course_north - lateral_offset * move.course_east,
@@ -57,7 +55,7 @@ def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
 def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
     """Return the moves of a route's fly-by path, flown at each leg's ground speed.
 
-    On a leg without a ground speed, the airspeed is used.
+    If a leg has no ground speed, its airspeed is used.
 
     first, last: first and last leg to return; by default all legs.
     """
@@ -92,7 +90,8 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
             up = altitude - slope * half_length + 0.5 * bend * half_length * half_length
             leg = int(piece.leg) + int(middle > piece.leg_change)
             length, duration = last - first, (last - first) / speeds[leg]
-            climb, move_bend = (slope - bend * half_length) * length, 0.5 * bend * length * length
+            climb = (slope - bend * half_length) * length
+            move_bend = 0.5 * bend * length * length
             rows.append(
                 (
                     east,

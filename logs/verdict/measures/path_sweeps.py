@@ -70,7 +70,7 @@ class _Boxes(NamedTuple):
 
 
 def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Measure the visits of a path to m spheres; a radius of 0 means that there is no sphere.
+    """Measure the visits of a path to m spheres; a radius of 0 stands for no sphere.
 
     points, time: points of the path, m, (n, 3), and their times, s, (n,).
     centres: centers of the spheres, m, (m, 3).
@@ -135,10 +135,8 @@ def _block_boxes(points: Floats) -> _Boxes:
         for axis in range(3):
             min_coordinate, max_coordinate = math.inf, -math.inf
             for row in range(first, last + 1):
-                min_coordinate, max_coordinate = (
-                    min(min_coordinate, points[row, axis]),
-                    max(max_coordinate, points[row, axis]),
-                )
+                min_coordinate = min(min_coordinate, points[row, axis])
+                max_coordinate = max(max_coordinate, points[row, axis])
             boxes.low[block, axis], boxes.high[block, axis] = min_coordinate, max_coordinate
             diagonal_square += (max_coordinate - min_coordinate) ** 2
         boxes.diagonal[block] = math.sqrt(diagonal_square)
@@ -151,7 +149,8 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
     min_square = 0.0
     max_square = 0.0
     for axis in range(3):
-        lower_offset, upper_offset = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
+        lower_offset = boxes.low[block, axis] - centre[axis]
+        upper_offset = centre[axis] - boxes.high[block, axis]
         outside_distance = max(0.0, lower_offset, upper_offset)
         min_square += outside_distance * outside_distance
         max_offset = max(abs(lower_offset), abs(upper_offset))
@@ -240,14 +239,15 @@ def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floa
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
-    """Return the stays of a track inside a sphere, in order of time; a point on the surface is inside.
+    """Return the periods that a track spends inside a sphere or on its surface, in order of time.
 
     time, position: times, s, (t,), and positions, m, (t, 3), of the track.
     centre: center of the sphere, m, (3,).
     """
     if not radius > 0.0 or len(position) < 2:
         return []
-    track, center = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
+    track = read_only(np.ascontiguousarray(position))
+    center = read_only(np.ascontiguousarray(centre))
     closest, entry_fraction, exit_fraction = _sphere_windows(track, center, float(radius))
     rows = np.flatnonzero(exit_fraction > entry_fraction)
     if not rows.size:
@@ -257,7 +257,8 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     first_indices = np.flatnonzero(np.append(True, start[1:] - end[:-1] > SPHERE_STAY_TOLERANCE_S))
     stays: list[Passage] = []
     for indices in np.split(np.arange(rows.size), first_indices[1:]):
-        closest_row, last = rows[indices[np.argmin(closest[rows[indices]])]], rows[indices[-1]]
+        closest_row = rows[indices[np.argmin(closest[rows[indices]])]]
+        last = rows[indices[-1]]
         is_whole = not (last == len(step) - 1 and exit_fraction[last] >= 1.0)
         values = (
             float(start[indices[0]]),
@@ -280,7 +281,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return clearances as `_path_clearances` does, but NaN for segments with an implausible end."""
+    """Return each segment's clearance like `_path_clearances`, but NaN if an end is implausible."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)

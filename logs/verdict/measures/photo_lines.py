@@ -71,7 +71,7 @@ class LineMeasure:
 
 
 def is_covered(usable: float, unknown: float) -> bool | None:
-    """Return True if enough of a photo line is usable, False if too much is lost, None if unknown parts decide.
+    """Return True if enough of a photo line is usable, False if not, None if that depends on unknown parts.
 
     usable, unknown: fractions of the length of the line.
 
@@ -216,8 +216,9 @@ def _camera_on_rows(
 
     is_ahead: True for each row that flies along the line.
 
-    The camera is on from the row that reaches the waypoint where it is switched on, to the row that reaches the
-    waypoint where it is switched off.  Both waypoints may be beyond the line's ends, and each is optional.
+    The camera is on between two rows: the row that reaches the waypoint where the mission switches it on, and the row
+    that reaches the waypoint where it is switched off.  Both waypoints may lie beyond the line's ends, and either may
+    be missing.
     """
     rows, along = np.arange(len(position)), axis.project(position)[0]
 
@@ -239,7 +240,7 @@ def _camera_on_rows(
 def _switch_radius(requirements: RouteRequirements, waypoint: int) -> float:
     """Return the distance before a waypoint at which the items after it switch the camera, m.
 
-    An autopilot that follows a path is at a waypoint where the path passes it, and a gate is passed at its plane.
+    The distance is 0 at a gate, which is passed at its plane, and for an autopilot that follows a path.
     """
     is_exact = requirements.setup.autopilot.turns.follows_path or _is_gate(requirements, waypoint)
     return 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
@@ -252,7 +253,7 @@ def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
 
 
 def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
-    """Return a mask of a line's steps: True for each step that the track between two set rows touches.
+    """Return a mask of a photo line's steps: True for steps that the track touches between two set rows.
 
     along: distance of each row along the line, m.
     is_set: mask of the rows; only consecutive set rows count.
@@ -260,7 +261,8 @@ def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     in_both = is_set[:-1] & is_set[1:] & (np.diff(along) > 0.0)
     edges = np.clip(along / length * count, 0.0, count)
-    first_steps, end_steps = np.floor(edges[:-1]).astype(int)[in_both], np.ceil(edges[1:]).astype(int)[in_both]
+    first_steps = np.floor(edges[:-1]).astype(int)[in_both]
+    end_steps = np.ceil(edges[1:]).astype(int)[in_both]
     marks = np.zeros(count + 1, dtype=np.int64)
     np.add.at(marks, first_steps, 1)
     np.add.at(marks, end_steps, -1)
@@ -283,7 +285,7 @@ def _count_photos(line: PhotoLine, is_taken: Flags, length: float, spacing: Floa
 
 
 def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Floats:
-    """Return the distances between photos that the camera can take at some ground speeds, m, (n,).
+    """Return the distance between photos that the camera achieves at each ground speed, m, (n,).
 
     photo_spacing: distance between photos that the items state, m.
     speeds: m/s, (n,).
@@ -294,7 +296,10 @@ def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Fl
 
 
 def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> int:
-    """Return the row at which the items after a waypoint switch the camera; the last row before it if not passed."""
+    """Return the row at which the items after a waypoint switch the camera.
+
+    It is the row of the waypoint's passage if no earlier row is within the switching distance.
+    """
     first, last = int(aligned.rows[max(0, waypoint - 1)]), int(aligned.rows[waypoint]) + 1
     offsets = aligned.track.position[first:last, :2] - requirements.points[waypoint, :2]
     indices = np.flatnonzero(np.hypot(*offsets.T) <= _switch_radius(requirements, waypoint))
@@ -302,9 +307,10 @@ def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint
 
 
 def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) -> int:
-    """Return the number of photos that the camera takes over a whole flight, on the lines and beside them.
+    """Return the number of photos that the camera takes on a whole flight, on and between the photo lines.
 
-    The camera takes the first photo where it is switched on.  Items that state no distance between photos add none.
+    The camera takes the first photo where it is switched on.  Items that state no distance between photos add no
+    photos.
     """
     setup, track, photo_count = requirements.setup, aligned.track, 0
     spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
@@ -360,14 +366,14 @@ class OverlapMeasure:
 
     @property
     def needed_photo_spacing(self) -> float | None:
-        """Longest distance between photos with the required front overlap at the lowest place, m; None if unknown."""
+        """Largest photo spacing with the required front overlap at the lowest height, m; None if unknown."""
         if self.front is None or self.camera.front is None:
             return None
         return (1.0 - self.camera.front) * self.camera.along * self.height
 
     @property
     def needed_line_spacing(self) -> float | None:
-        """Longest distance of lines with the required side overlap at the lowest place, m; None if unknown."""
+        """Largest line spacing with the required side overlap at the lowest height, m; None if unknown."""
         if self.side is None or self.camera.side is None:
             return None
         return (1.0 - self.camera.side) * self.camera.across * self.side_height
@@ -440,7 +446,7 @@ def measure_overlap(
 def _line_strip(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine
 ) -> _Strip | None:
-    """Return a line as flown, or as planned; None if it was not flown."""
+    """Return the strip of photos along a line, flown or planned; None if the line was not flown."""
     if aligned is None:
         axis = LineAxis(requirements.points[line.first : line.last + 1])
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
@@ -476,7 +482,8 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
         overlaps = _overlaps(spacing, camera.along, heights)
         lowest_index = int(np.argmin(overlaps))
         if measure.front is None or overlaps[lowest_index] < measure.front:
-            lowest_spacing, is_slow = float(spacing[lowest_index]), bool(spacing[lowest_index] > line.photo)
+            lowest_spacing = float(spacing[lowest_index])
+            is_slow = bool(spacing[lowest_index] > line.photo)
             measure = replace(
                 measure,
                 front=float(overlaps[lowest_index]),
@@ -503,8 +510,8 @@ def _with_side_overlap(
 ) -> OverlapMeasure:
     """Return the measure with the minimum overlap between neighbouring lines.
 
-    Two lines are neighbours where they run side by side, no other line (lost or not) lies between them, and their
-    distance is not much more than the survey's spacing.  A larger distance spans a notch in the survey's area.
+    Two lines are neighbours if they run side by side, no other line lies between them (even one that was lost), and
+    their distance is close to the survey's spacing.  A much larger distance spans a notch in the survey's area.
     """
     ranks, offsets = _lateral_ranks(survey), np.array(survey.offsets)
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
@@ -533,7 +540,8 @@ def _with_side_overlap(
                     step_middles, (point_along[strip.is_usable] - min_along)[order], values[strip.is_usable][order]
                 )
                 this_line[row] = np.where(is_used, line_values, np.nan)
-        gaps, heights = np.abs(this_line[0] - previous_line[0]), 0.5 * (this_line[1] + previous_line[1])
+        gaps = np.abs(this_line[0] - previous_line[0])
+        heights = 0.5 * (this_line[1] + previous_line[1])
         previous_numbers = np.nan_to_num(previous_line[3], nan=number).astype(int)
         is_neighbor = (ranks[number] - ranks[previous_numbers] == 1) & (
             np.abs(offsets[number] - offsets[previous_numbers]) <= _MAX_NEIGHBOR_SPACINGS * survey.spacing

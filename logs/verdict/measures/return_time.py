@@ -18,10 +18,11 @@ _MAH_PER_AH = 1000.0
 
 
 def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFailsafe) -> float:
-    """Return an upper bound of the time of a return from any place of the mission, s; infinite if there is none.
+    """Return an upper bound of the time of a return from anywhere on the mission, s; inf without a bound.
 
-    It is the time of the way from the farthest place to the farthest destination, with the longest landing sequence,
-    against the strongest wind, of the climb from the lowest place, and of the descent to the lowest destination.
+    The bound is the sum of three times: for the path from the farthest place to the farthest destination and through
+    the longest landing sequence, against the strongest wind; for the climb from the lowest place; and for the descent
+    to the lowest destination.
     """
     setup = requirements.setup
     flown = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
@@ -49,17 +50,17 @@ def longest_return_time(requirements: RouteRequirements, failsafe: ReturnTimeFai
 
 
 def _path_length(places: Floats) -> float:
-    """Return the length of a chain of places (n, 3) on the map, m."""
+    """Return the horizontal length of a polyline through points (n, 3), m."""
     return float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
 
 
 def remaining_time(
     requirements: RouteRequirements, failsafe: ReturnTimeFailsafe, energy: float, power_factor: float
 ) -> float:
-    """Return a lower bound of the autopilot's estimate of the time for which the battery lasts, s; NaN if unknown.
+    """Return a lower bound of the battery time that the autopilot estimates, s; NaN if unknown.
 
-    The autopilot divides the remaining charge by its average of the current in level flight, which begins at a
-    parameter (`Battery::computeRemainingTime`).
+    The autopilot divides the remaining charge by its average of the current in level flight.  A parameter sets the
+    initial value of this average (`Battery::computeRemainingTime`).
 
     energy: energy used, Wh.
     power_factor: factor on the power of the aircraft's model.

@@ -125,7 +125,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
 
 
 def _sample_route(route: Route, spacing: float) -> _Samples:
-    """Sample the legs of a route about every `spacing` (m); a loiter is one sample, however many laps it has."""
+    """Sample the legs of a route about every `spacing` (m); each loiter is one sample."""
     points = route.positions[:, :2]
     positions, radii, distances = [points[:1]], [np.zeros(1)], [np.zeros(1)]
     sample_of_waypoint = np.zeros(len(points), dtype=np.int64)
@@ -171,15 +171,16 @@ def _loiter_center(route: Route, waypoints: Sequence[int]) -> tuple[Floats, floa
 
 
 def rtl_waypoints(route: Route) -> range:
-    """Return the waypoints of an RTL, which represent the path that the autopilot chooses; empty without an RTL."""
+    """Return the waypoints that represent an RTL, whose path the autopilot chooses; empty without one."""
     return range(0) if route.rtl_start is None else range(route.rtl_start + 1, route.rtl_end)
 
 
 def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
-    """Return the center of an RTL's loiter, m, (2,), and the radius within which the RTL has arrived at it, m.
+    """Return the center (m, (2,)) and the arrival radius (m) of an RTL's loiter; None without an RTL.
 
-    Return None without an RTL.  A simulated flight arrives within the same radius
-    (`flight.simulation.tick.update_rtl_loiter`), which does not depend on the waypoints that represent the loiter.
+    An RTL has arrived once the aircraft is within the arrival radius of the center.  A simulated flight arrives within
+    the same radius (`flight.simulation.tick.update_rtl_loiter`), which does not depend on the waypoints that represent
+    the loiter.
     """
     loiter = route.rtl_loiter
     if loiter is None:
@@ -191,7 +192,7 @@ def rtl_arrival_circle(route: Route) -> tuple[Floats, float] | None:
 
 @compiled
 def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
-    """Match a track to route samples, both only forward, with the minimum sum of costs.
+    """Match the rows of a track to the samples of a route at the lowest total cost, without going back.
 
     The cost of a row is min(distance, capture)^2; the cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
     `_SKIP_DISTANCE_M`^2.  Of equally good ends the earliest is taken.

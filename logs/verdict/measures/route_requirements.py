@@ -62,7 +62,7 @@ class Airspace:
     scenario_zone_count: int = 0
 
     def place(self, index: int) -> Place:
-        """Return a zone as the place of a finding."""
+        """Return the place of a finding on a zone."""
         zone = self.zones[index]
         return Place(zone.kind, index, name=zone.name)
 
@@ -76,10 +76,8 @@ class Airspace:
         [2]
         """
         boxes = self.records.zones
-        min_corner, max_corner = (
-            np.minimum(points[:-1], points[1:]) - _BOX_MARGIN_M,
-            np.maximum(points[:-1], points[1:]) + _BOX_MARGIN_M,
-        )
+        min_corner = np.minimum(points[:-1], points[1:]) - _BOX_MARGIN_M
+        max_corner = np.maximum(points[:-1], points[1:]) + _BOX_MARGIN_M
         east = (boxes["west"][:, None] <= max_corner[:, 0]) & (boxes["east"][:, None] >= min_corner[:, 0])
         north = (boxes["south"][:, None] <= max_corner[:, 1]) & (boxes["north"][:, None] >= min_corner[:, 1])
         return np.flatnonzero(~boxes["exclusion"] | (east & north).any(axis=1))
@@ -88,8 +86,7 @@ class Airspace:
 def judged_airspace(setup: FlightSetup) -> Airspace:
     """Return the exclusion and inclusion zones that apply to a setup's flight.
 
-    A fence that cannot be converted to zones, as in logs from before fences were judged, is omitted; `fence_fault`
-    then states the reason.
+    A fence that cannot be converted to zones is omitted; `fence_fault` then states the reason.
 
     >>> from logs.recording.example_log import example_log
     >>> judged_airspace(example_log().setup).zones
@@ -112,7 +109,7 @@ _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 
 def _cached_records(zones: tuple[Zone, ...]) -> ZoneRecords:
-    """Return the records of zones, cached for the last tuple; the records must not be changed."""
+    """Return the records of zones, cached for the last tuple of zones; do not modify them."""
     for cached_zones, records in _last_records:
         if cached_zones is zones:
             return records
@@ -122,7 +119,7 @@ def _cached_records(zones: tuple[Zone, ...]) -> ZoneRecords:
 
 
 def with_fence_zones(setup: FlightSetup) -> FlightSetup:
-    """Return the setup with its mission's fence among its scenario's zones, for drawing.
+    """Return the setup with its mission's fence added to its scenario's zones, for drawing.
 
     >>> from logs.recording.example_log import example_log
     >>> with_fence_zones(example_log().setup).scenario.zones
@@ -163,7 +160,7 @@ LegPerformance = Callable[[int, float], PerformanceTable]
 
 
 def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformance:
-    """Return the function that gives the aircraft's performance on a leg at an airspeed, m/s.
+    """Return a function that computes the aircraft's performance on a leg at an airspeed, m/s.
 
     winds: wind of each leg; () for the wind of the limits on all legs.
     """
@@ -172,15 +169,17 @@ def leg_performance(limits: Limits, winds: Sequence[Wind] = ()) -> LegPerformanc
 
 
 def find_leg_winds(setup: FlightSetup, route: Route) -> tuple[Wind, ...]:
-    """Return the wind of each leg: in a forecast, at the leg's middle when the aircraft is there; otherwise ().
+    """Return each leg's wind from a forecast, at the middle of the leg; () without a forecast.
 
-    The times are those of a flight at the route's airspeeds in these winds, without loiters.
+    The wind is taken at the time when the aircraft reaches the middle of the leg, at the route's airspeeds and without
+    loiters.
     """
     if setup.scenario.wind.field is None:
         return ()
     points, courses, winds, time = route.positions, leg_courses(route.positions), [], 0.0
     for leg, length in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1).tolist()):
-        middle, airspeed = 0.5 * (points[leg] + points[leg + 1]), float(route.leg_airspeeds[leg])
+        middle = 0.5 * (points[leg] + points[leg + 1])
+        airspeed = float(route.leg_airspeeds[leg])
         wind = setup.scenario.local_wind(middle.tolist(), time + 0.5 * length / airspeed)
         components = wind.components_on_course(float(courses[leg]), float(middle[2]))
         speed = ground_speed(airspeed, *components)
@@ -210,9 +209,9 @@ def turn_requirements(route: Route, performance: LegPerformance) -> TurnRequirem
 
 
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
-    """Return the length of leg (m) that a turn (rad) uses before and after its waypoint.
+    """Return the lengths of leg (m) that a turn (rad) uses before and after its waypoint.
 
-    A fly-over uses only the leg after it.
+    A fly-over uses only the leg after its waypoint.
     """
     if turn < 1e-9:
         return 0.0, 0.0
@@ -227,7 +226,7 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 def _reversal_lengths(
     route: Route, performance: LegPerformance, courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
-    """Return the length of each leg that the roll between opposite banks uses, m, (w - 1,).
+    """Return the length that the roll between opposite banks uses on each leg, m, (w - 1,).
 
     The length is 0 between turns to the same side.
     """
@@ -249,8 +248,8 @@ def available_lengths(
 ) -> tuple[float, float]:
     """Return the lengths (m) of the legs before and after waypoint i that its turn may use.
 
-    Each turn may use at least half of a leg.  If the leg is too short for its two turns, the turns that use more than
-    half of it are at fault.
+    Each turn may use at least half of a leg.  If the leg is too short for both of its turns, a turn that needs more
+    than half of it is at fault.
     """
     return (
         max(runs[i - 1] - length_after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1],
@@ -276,10 +275,10 @@ def _sharpest_turns(
 
 
 def sharpest_fly_over_turn(radii: float) -> float:
-    """Return the sharpest fly-over turn (rad) that uses at most a length of the leg after it, in turn radii.
+    """Return the sharpest fly-over turn (rad) that fits a leg of a given length, in turn radii.
 
-    This is the inverse of `fly_over_run`.  With half the turn h and z = (cos h + sqrt(1 + cos^2 h))^2, the square of
-    that length is 6 z - z^2 - 1.
+    The turn uses only the leg after its waypoint.  This is the inverse of `fly_over_run`.  With half the turn h and z =
+    (cos h + sqrt(1 + cos^2 h))^2, the square of the length is 6 z - z^2 - 1.
 
     >>> round(math.degrees(sharpest_fly_over_turn(fly_over_run(math.radians(70.0)))), 6)
     70.0
@@ -417,11 +416,11 @@ class RouteRequirements:
         return self.winds[leg] if self.winds else self.setup.scenario.wind
 
     def waypoint(self, index: int) -> Place:
-        """Return a waypoint as the place of a finding."""
+        """Return the place of a finding on a waypoint."""
         return Place("waypoint", index, self._item_number(index), number=int(self.setup.route.stops[index]))
 
     def leg(self, index: int) -> Place:
-        """Return a leg as the place of a finding, with the item to which it leads."""
+        """Return the place of a finding on a leg, with the item to which the leg leads."""
         # As in `Route.leg_numbers`, which is too slow to compute for each leg of a long mission.
         number = max(int(self.setup.route.stops[index + 1]) - 1, 0)
         return Place("leg", index, to_item=self._item_number(index + 1), number=number)
@@ -432,14 +431,14 @@ class RouteRequirements:
         return None if item < 0 else item
 
     def turnaround_waypoints(self) -> set[int]:
-        """Return the waypoints of all surveys' turn-arounds, ends, entries and exits included.
+        """Return the waypoints of the turn-arounds of all surveys, including ends, entries and exits.
 
         The autopilot decides the path of a turn-around.
         """
         return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last + 1)}
 
     def turnaround_legs(self) -> set[int]:
-        """Return the legs of all surveys' turn-arounds, entries and exits included."""
+        """Return the legs of the turn-arounds of all surveys, including entries and exits."""
         return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last)}
 
     def leg_unit(self, leg: int) -> Floats:
@@ -447,9 +446,9 @@ class RouteRequirements:
         return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
 
     def straight_start(self, leg: int) -> Floats:
-        """Return the point where a leg leaves the circle of a loiter, or its first waypoint without a loiter, (3,) m.
+        """Return the point where a leg leaves a loiter's circle, or its first waypoint without a loiter, (3,) m.
 
-        The waypoints of a loiter are corners outside the circle, which the leg leaves at a tangent point.
+        The waypoints of a loiter are corners outside its circle; the leg leaves the circle at a tangent point.
         """
         start = self.points[leg].copy()
         start[:2] += (float(self.runs[leg]) - self.straight_length(leg)) * self.leg_unit(leg)
@@ -476,7 +475,7 @@ class RouteRequirements:
 def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
     """Compute the requirements of a setup's route.
 
-    envelope: False to omit the aircraft's limits and judge by only the flown evidence.
+    envelope: False to judge by the flight alone, without the aircraft's limits.
     """
     route, limits = true_airspeed_route(setup), setup.limits
     points = route.positions
@@ -528,7 +527,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
 
 def _possible_bank(setup: FlightSetup) -> float:
-    """Return the largest bank limit that may apply in a flight, rad: the setup's unless the aircraft's is a guess."""
+    """Return the largest bank limit that may apply, rad: the setup's unless the aircraft's limit is a guess."""
     envelope, stated_bank = setup.envelope, setup.scenario.flight.max_bank_deg
     if not envelope.bank_guessed or setup.max_bank < envelope.max_bank:
         return setup.max_bank
@@ -545,8 +544,8 @@ _MAX_KEPT_SURVEYS = 4
 def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     """Return the surveys of a setup's mission that are judged by their lines, cached for the last setups.
 
-    A plan made by planfly has none.  Other missions have the surveys whose camera is switched, or, if the scenario
-    states "lines", all legs with the form of a survey.
+    A plan made by planfly has no surveys.  In other missions, these are the surveys that switch the camera; if the
+    scenario states "lines", all legs that form a survey pattern.
     """
     for cached_setup, surveys in tuple(_last_surveys):
         if cached_setup is setup:
@@ -557,6 +556,7 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
+    """Find the surveys of a setup's mission that are judged by their photo lines."""
     mode = setup.scenario.limits.surveys
     if setup.plan is not None or mode == "path":
         return ()
@@ -608,12 +608,14 @@ def _leg_limits(
 ) -> tuple[Floats, Floats, Floats]:
     """Return each leg's climb and dive limits over the ground (rad) and ground speed (m/s), (legs,) each.
 
-    Each is the minimum at the start, the middle and the end of the leg; the ground speed is NaN if any is unknown.
+    Each value is the minimum of the values at the start, the middle and the end of the leg.  The ground speed is NaN if
+    one of the three is unknown.
     """
     legs = len(courses)
     climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
-        table, course = performance(leg, float(route.leg_airspeeds[leg])), float(courses[leg])
+        table = performance(leg, float(route.leg_airspeeds[leg]))
+        course = float(courses[leg])
         altitudes = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
         speeds[leg] = min(ground_speed_on(table, course, altitude) for altitude in altitudes)
         if any(math.isnan(ground_speed_on(table, course, altitude)) for altitude in altitudes):
@@ -623,7 +625,7 @@ def _leg_limits(
 
 
 def _fly_by_offsets(route: Route, turns: TurnRequirements) -> Floats:
-    """Return the distance by which the fly-by passes each waypoint, (w,) m."""
+    """Return the distance at which the fly-by path passes each waypoint, (w,) m."""
     offsets = np.zeros(len(turns.radius))
     for i in np.flatnonzero(np.isfinite(turns.radius) & ~route.fly_over).tolist():
         radius = float(turns.radius[i])
@@ -632,7 +634,7 @@ def _fly_by_offsets(route: Route, turns: TurnRequirements) -> Floats:
 
 
 def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turns: TurnRequirements) -> Floats:
-    """Return the length of leg next to each turn on which the slope still changes, (w,) m.
+    """Return the length, next to each turn, over which the slope still changes, (w,) m.
 
     The altitude follows a parabola about each end of the arc, or about the waypoint if there is no arc.
     """
@@ -669,7 +671,7 @@ class SteepArc:
 
 
 def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
-    """Return the tighter turn limit (rad) of scenario and aircraft at a waypoint, and its source."""
+    """Return the turn limit (rad) at a waypoint, the tighter of scenario and aircraft, and its source."""
     return tighter_turn_limit(requirements, i, float(requirements.turn_limit[i]))
 
 
@@ -683,7 +685,7 @@ def tighter_turn_limit(requirements: RouteRequirements, i: int, aircraft_limit: 
 
 
 def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, float]:
-    """Return the tighter limits on climb and dive along a leg's course, rad, positive."""
+    """Return the limits on climb and dive along a leg, tighter of scenario and aircraft, rad, positive."""
     return (
         slope_limit(requirements, leg, is_climb=True)[0],
         slope_limit(requirements, leg, is_climb=False)[0],
@@ -693,7 +695,7 @@ def slope_limits(requirements: RouteRequirements, leg: int) -> tuple[float, floa
 def slope_limit(requirements: RouteRequirements, leg: int, *, is_climb: bool | None = None) -> tuple[float, str]:
     """Return the tighter limit of scenario and aircraft on a climb or a dive, rad, positive, and its source.
 
-    is_climb: None for the leg's own direction: a dive on a descending leg, a climb on every other leg.
+    is_climb: None for the direction of the leg itself: a dive on a descending leg, a climb on every other leg.
     """
     is_climb = bool(requirements.slopes[leg] >= 0.0) if is_climb is None else is_climb
     scenario_limit = requirements.limits.max_climb if is_climb else requirements.limits.max_dive
@@ -721,11 +723,12 @@ class GroundSlopeLimit(NamedTuple):
 def ground_slope_limit(
     requirements: RouteRequirements, leg: int, altitudes: tuple[float, float], *, is_climb: bool, is_landing: bool
 ) -> GroundSlopeLimit:
-    """Return the limit on a climb from the ground or a descent to it, on a leg's course, the tighter of both ends.
+    """Return the slope limit of a climb from the ground, or of a descent to it, on a leg's course.
 
-    The airspeed of a landing is the autopilot's on the glide: ArduPlane flies it from the leg's start on, as soon as
-    it is lined up (AP_Landing_Slope.cpp, `type_slope_verify_land` and `type_slope_get_target_airspeed_cm`), but here no
-    slower than level flight.  Any other airspeed is the leg's.
+    The limit is the tighter of the limits at both ends of the leg.  A take-off uses the leg's airspeed.  A landing uses
+    the autopilot's airspeed on the glide, but at least the minimum airspeed of level flight.  ArduPlane flies the
+    glide's airspeed from the start of the leg, as soon as it is lined up (AP_Landing_Slope.cpp,
+    `type_slope_verify_land` and `type_slope_get_target_airspeed_cm`).
 
     altitudes: altitudes of both ends, m AMSL.
     """
@@ -749,23 +752,23 @@ def ground_slope_limit(
 def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     """Return the fly-by arc at a leg's end if it is too steep, otherwise None.
 
-    An arc is not too steep if the airspeed stays within `SPEED_TOLERANCE_MPS`; the climb or descent that the aircraft
-    cannot make on the arc changes its speed by g dh / V.
+    An arc is too steep if the airspeed changes by more than `SPEED_TOLERANCE_MPS`.  The part dh of the climb or descent
+    that exceeds the aircraft's ability changes the airspeed V by g dh / V.
     """
     i = leg + 1
     if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arc_radii[i] > 0.0:
         return None
-    turn_length, length = (
-        float(requirements.length_before[i]),
-        float(requirements.radius[i]) * abs(float(requirements.turns[i])),
-    )
+    turn_length = float(requirements.length_before[i])
+    length = float(requirements.radius[i]) * abs(float(requirements.turns[i]))
     if not 0.0 < turn_length < min(requirements.runs[leg : leg + 2]):
         return None
-    slope_before, slope_after = math.tan(requirements.slopes[leg]), math.tan(requirements.slopes[i])
+    slope_before = math.tan(requirements.slopes[leg])
+    slope_after = math.tan(requirements.slopes[i])
     tangent = arc_slope(slope_before, slope_after, turn_length, float(requirements.radius[i]))
     limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
-    limit, speed = float(np.tan(limits).mean()), float(requirements.route.leg_airspeeds[leg])
+    limit = float(np.tan(limits).mean())
+    speed = float(requirements.route.leg_airspeeds[leg])
     missing_height = (abs(tangent) - limit) * length
     return SteepArc(tangent, limit, missing_height) if GRAVITY * missing_height / speed > SPEED_TOLERANCE_MPS else None

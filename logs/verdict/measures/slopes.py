@@ -88,7 +88,7 @@ def straight_span(
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Return a leg's flown course, or None if the leg was not flown.
 
-    The course of a leg that is too short for a fit is the mean course over at least a second, with a larger tolerance.
+    If a leg is too short for a fit, its course is the mean over at least a second and has a larger tolerance.
     """
     if not aligned.has_flown(leg):
         return None
@@ -128,7 +128,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Return a leg's flown slope, or None if less than a second of the leg was flown.
 
-    The slope of a leg that is too short for a fit between its blends is rough, with a larger tolerance.
+    If a leg is too short for a fit between its blends, its slope is rough and has a larger tolerance.
     """
     if not aligned.has_flown(leg):
         return None
@@ -161,8 +161,8 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
     """Return the tolerance (rad) of an angle fitted over a distance (m) with an RMS residual (m).
 
-    The tolerance is ``floor`` (rad) plus the angle by which residuals of twice the RMS at the ends would rotate the
-    line.
+    The tolerance is ``floor`` (rad) plus an angle: the rotation of the line if both of its ends are off by twice the
+    RMS.
     """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 
@@ -215,7 +215,7 @@ class SlopeMeasure:
 
 
 def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> SlopeMeasure:
-    """Measure how a leg was climbed or descended; all fields are at their defaults if the leg was not flown."""
+    """Measure the climb or descent on a leg; the fields keep their defaults if the leg was not flown."""
     if not aligned.has_flown(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
@@ -236,10 +236,11 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest signed altitude error from the leg's line, m, and True for a leg of only blends.
+    """Return the largest altitude error on a leg, m, with its sign, and True if the leg has only blends.
 
-    On a leg without any part clear of the slope blends, the error is taken between the turns; it is None if no row lies
-    between the turns.  On a leg that follows the ground, the error is from the altitude above the ground there.
+    The error is measured from the leg's line, outside the slope blends.  On a leg that consists of blends only, it is
+    measured between the turns; it is None if no row lies between the turns.  On a leg that follows the ground, it is
+    measured from the demanded height above ground.
     """
     if follows_ground(requirements, leg):
         return _ground_following_error(requirements, leg, position), False
@@ -258,7 +259,7 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def _ground_following_error(requirements: RouteRequirements, leg: int, position: Floats) -> float | None:
-    """Return the largest signed error between a leg's turns from the height above ground that it demands, m."""
+    """Return the largest error from a leg's height above ground, between its turns, m, with its sign."""
     distance_along, _ = project_onto_leg(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, 0.0)
     inside = position[(distance_along >= span_start) & (distance_along <= span_end)]
@@ -268,7 +269,7 @@ def _ground_following_error(requirements: RouteRequirements, leg: int, position:
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from the time at which its commanded airspeed can be reached; the slice may be empty."""
+    """Return the rows of a leg from the time at which its commanded airspeed can be reached, maybe none."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -313,7 +314,7 @@ def _pitch_limit_time(requirements: RouteRequirements, aligned: AlignedTrack, le
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Return two masks (n,): True for rows with full throttle, and True for rows with idle throttle.
 
-    Full throttle is the autopilot's own upper limit.
+    Full throttle means the autopilot's upper limit.
     """
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
@@ -325,13 +326,14 @@ def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows
 
 
 def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> Ability | None:
-    """Measure the aircraft's ability at the throttle limit that a leg needs: full to climb, idle to descend.
+    """Measure the climb rate that the aircraft can reach at the throttle limit on a leg.
 
-    The excess of thrust over drag corresponds to the climb rate v_up + v . a / g, where v is the velocity relative to
-    the air and a the acceleration over the ground.  This is exact in any gust, because lift does no work.  The climb
-    rate is fitted by a least-squares plane over airspeed and altitude, and evaluated at the commanded airspeed and the
-    highest measured altitude, where an aircraft climbs least.  Return None if the throttle was at the limit for too
-    short a time, or if the standard error is too large.
+    The throttle limit is full in a climb and idle in a descent.  The excess of thrust over drag corresponds to the
+    climb rate v_up + v . a / g, where v is the velocity relative to the air and a the acceleration over the ground.
+    This is exact in any gust, because lift does no work.  A least-squares plane fits the climb rate over airspeed and
+    altitude.  It is evaluated at the commanded airspeed and the highest measured altitude, because an aircraft climbs
+    least there.  Return None if the throttle was at the limit for too short a time, or if the standard error is too
+    large.
     """
     rows = steady_rows(requirements, aligned, leg)
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
@@ -353,7 +355,8 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     acceleration = np.gradient(velocity, track.time[rows], axis=0)
     climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_measured]
-    commanded_speed, altitude = float(requirements.route.leg_airspeeds[leg]), track.position[rows, 2][is_measured]
+    commanded_speed = float(requirements.route.leg_airspeeds[leg])
+    altitude = track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
     excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
     fit = _fit_plane_at_origin(
@@ -372,7 +375,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
 
 
 def _rows_after_run(mask: Flags, count: int) -> Flags:
-    """Return a mask: True for each row in ``mask`` whose ``count`` previous rows are in ``mask``, too."""
+    """Return a mask: True for each row that is set in ``mask`` together with the ``count`` rows before it."""
     rows = np.arange(mask.size)
     return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
@@ -396,10 +399,11 @@ def _fit_plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: floa
 
 
 def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the airspeed that the aircraft would have in the mean wind, without gusts, m/s."""
+    """Return the airspeed calculated with the mean wind instead of the gusty wind, m/s."""
     track = aligned.track
     mean_wind = requirements.setup.scenario.wind_velocities(track.position[rows], track.time[rows])
-    east, north = track.velocity[rows, 0] - mean_wind[:, 0], track.velocity[rows, 1] - mean_wind[:, 1]
+    east = track.velocity[rows, 0] - mean_wind[:, 0]
+    north = track.velocity[rows, 1] - mean_wind[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 

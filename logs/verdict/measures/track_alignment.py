@@ -93,8 +93,8 @@ class AlignedTrack:
     def leg_segments(self, leg: int) -> tuple[int, int]:
         """Return the first segment of the track on a leg, and the segment after the last; both are 0 for none.
 
-        The first leg includes the track before it, the last leg the track after it.  A short leg of which both
-        waypoints were passed at one row, as in the turn between its neighbours, has the segment after this row.
+        The first leg includes the track before it, the last leg the track after it.  If both waypoints of a short leg
+        were passed at the same row, as within a turn, the leg has the segment after this row.
         """
         if not self.has_flown(leg) and not self.passed[leg + 1]:
             return 0, 0
@@ -114,7 +114,7 @@ class AlignedTrack:
         return f"east {east:.0f} m, north {north:.0f} m"
 
     def rows_around(self, first: int, last: int, margin: float) -> slice:
-        """Return the rows from `first` to `last`, and the rows up to a time `margin` (s) before and after them."""
+        """Return the rows from `first` to `last`, extended by a time `margin` (s) on both sides."""
         time = self.track.time
         start = int(np.searchsorted(time, time[first] - margin))
         return slice(start, int(np.searchsorted(time, time[last] + margin, side="right")))
@@ -171,9 +171,9 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 
 
 def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
-    """Return the circle around each waypoint within which a track that ends has arrived at the waypoint.
+    """Return the arrival circle of each waypoint: centers, m, (w, 2), and radii, m, (w,).
 
-    Return the centers, m, (w, 2), and the radii, m, (w,).
+    A track that ends within this circle has arrived at the waypoint.
     """
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.turns.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.points))
@@ -202,9 +202,9 @@ def _arrival_circles(requirements: RouteRequirements) -> tuple[Floats, Floats]:
 def _advance_target_to_arrival(
     track: Track, progress: RouteProgress, centers: Floats, arrival_radius: Floats
 ) -> RouteProgress:
-    """Return the progress with its target advanced past each waypoint that the track has reached for good.
+    """Advance the target past each waypoint whose arrival circle the track enters and never leaves.
 
-    Once inside a waypoint's arrival circle, without leaving it again, the aircraft already flies to the next waypoint.
+    Inside this circle, the aircraft already flies to the next waypoint.
     """
     final_row, target = len(track) - 1, progress.target
     first_row, last_row = progress.first.copy(), progress.last.copy()
@@ -226,10 +226,10 @@ def _advance_last_leg(
     centers: Floats,
     arrival_radius: Floats,
 ) -> None:
-    """Move the start of the track's last leg in ``rows`` to the row at which the track entered the arrival circle.
+    """Move the start of the last leg in ``rows`` to the row at which the track entered the arrival circle.
 
-    ``rows`` changes only if the track ends inside the arrival circle of the last passed waypoint, before the waypoint:
-    the autopilot is then already on the next leg.
+    ``rows`` changes only if the track ends inside the arrival circle of the last passed waypoint, before the waypoint
+    itself: the autopilot is then already on the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if (
@@ -274,8 +274,8 @@ def closest_approaches(position: Floats, target: Floats) -> tuple[Floats, Floats
 def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
     """Return a mask (t,): True for rows with finite, plausible numbers and an increasing time.
 
-    is_own: True for planfly's own flights, which have all numbers in every row.  Of an imported log only positions and
-        velocities are checked here, because each rule checks the other data that it needs.
+    is_own: True for planfly's own flights, which have all numbers in every row.  In an imported log, only positions and
+        velocities are checked here: each rule checks the other data that it needs.
     """
     is_usable = np.isfinite(track.time)
     plausible_bounds: tuple[tuple[str, float], ...] = (
@@ -301,10 +301,10 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
 
 
 def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Return the row at which each waypoint was passed, and the row's distance from the waypoint's apex, m, (w,) each.
+    """Return the row at which each waypoint was passed, and its distance from the apex, m, (w,) each.
 
-    The rows minimize the sum of squared distances, and never decrease.  Only rows along each waypoint's legs are
-    considered.
+    The row numbers never decrease, and minimize the sum of squared distances from the apexes.  Only rows along each
+    waypoint's legs are considered.
     """
     position, count, last_row = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last_row)
@@ -361,9 +361,10 @@ def _match_chords(
     """Assign each mark to a chord of the track (``step`` rows long), with the chords in order of time.
 
     The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming; of equally good assignments the
-    earliest is taken.  Only chords from `first` to `last` can capture a mark.
+    earliest is taken.  A mark can be captured only by the chords from `first` to `last`.
 
-    Returns the chord of each mark, and a mask: True for each mark that no row of its chord captures.
+    Returns the chord of each mark, and a mask: True for each mark that is farther than `capture` from all rows of its
+    chord.
     """
     last_row = position.shape[0] - 1
     chords = -(-last_row // step)

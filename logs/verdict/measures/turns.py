@@ -160,7 +160,7 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> lis
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> TurnMeasure:
-    """Measure the turn at inner waypoint `i`; all fields are at their defaults if one of its legs was not flown."""
+    """Measure the turn at inner waypoint `i`; the fields keep their defaults if one of its legs was not flown."""
     if not aligned.has_flown(i - 1) or not aligned.has_flown(i):
         return TurnMeasure()
     track = aligned.track
@@ -216,11 +216,12 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
 def _course_change(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int
 ) -> tuple[float | None, float | None, bool]:
-    """Return waypoint `i`'s flown course change (rad), its tolerance, and True if both courses are fitted.
+    """Return the flown course change at waypoint `i`, its tolerance, and True if both courses are fitted.
 
-    Return None, None, False if either leg was flown too little.
+    The angles are in rad.  Return None, None, False if either leg was flown too little.
     """
-    course_before, course_after = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
+    course_before = leg_course(requirements, aligned, i - 1)
+    course_after = leg_course(requirements, aligned, i)
     if course_before is None or course_after is None:
         return None, None, False
     change = abs(math.remainder(course_after.value - course_before.value, 2.0 * math.pi))
@@ -255,7 +256,7 @@ def _arc_overshoot(
     distance_along: Floats,
     lateral_offset: Floats,
 ) -> float | None:
-    """Return the maximum distance outside the arc, and after the arc outside the next leg, m; 0 if never outside.
+    """Return the maximum distance outside the arc, and beyond its end outside the next leg, m; at least 0.
 
     Return None if the turn has no fly-by arc.
     """
@@ -289,7 +290,7 @@ def _settled_distance(
 ) -> float:
     """Return the mean distance from the next leg's line in the last second before the next turn, m.
 
-    If no row of this second lies past the turn at waypoint `i`, return the distance in the last row.
+    If this second has no row after the turn at waypoint `i`, return the distance in the last row.
     """
     time = aligned.track.time[first_row : first_row + end_row + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))

@@ -17,7 +17,7 @@ from world.threats import Threats
 
 
 def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
-    """Return the legs of the planned path that violate the threat, zone or area of a failed finding.
+    """Return the legs of the planned path that violate a failed finding's threat, zone or area.
 
     Return () for a finding of another rule.
     """
@@ -31,7 +31,8 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
         return tuple(range(int(facts["entry leg"]), int(facts["exit leg"]) + 1))
     if finding.rule == "bounds":
         (west, east), (south, north) = scenario.bounds.tolist()
-        min_corner, max_corner = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
+        min_corner = np.array([west, south, scenario.floor])
+        max_corner = np.array([east, north, scenario.ceiling])
         is_outside = np.asarray(
             ((path.points < min_corner - ROUNDING_M) | (path.points > max_corner + ROUNDING_M)).any(axis=1)
         )
@@ -42,7 +43,7 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
 def legs_near_missiles(requirements: RouteRequirements, max_distance: float) -> dict[int, tuple[float, int]]:
     """Return the legs of the planned path that pass a missile's sphere closely.
 
-    Each leg has its distance from the sphere that is nearest, m, negative inside, and the index of that threat.
+    Each leg comes with its distance from the nearest sphere, m, negative inside, and the index of the threat.
 
     max_distance: distance from a sphere within which a leg is returned, m.
     """

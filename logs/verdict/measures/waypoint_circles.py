@@ -29,10 +29,10 @@ class WaypointCircle(NamedTuple):
 
 
 def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> list[WaypointCircle]:
-    """Return the circles that an autopilot flew because it was outside its altitude tolerance at a waypoint.
+    """Return the circles that were flown at waypoints reached outside the altitude tolerance.
 
-    Such an autopilot flies on from a waypoint once it has reached it within the tolerance; if it reaches it outside the
-    tolerance, it circles.  Return [] for an autopilot that flies on at any altitude.
+    Some autopilots circle at a waypoint until they are within their altitude tolerance.  Return [] for an autopilot
+    that flies on at any altitude.
     """
     setup, route, track = requirements.setup, requirements.setup.route, aligned.track
     if not setup.autopilot.deviations.altitude_parameter:
@@ -59,7 +59,7 @@ def waypoint_circles(requirements: RouteRequirements, aligned: AlignedTrack) -> 
 
 
 def circles_text(requirements: RouteRequirements, circles: Sequence[WaypointCircle]) -> str:
-    """State where an autopilot circled, with which height errors, and which parameter made it circle.
+    """State where an autopilot circled, its altitude errors there, and the parameter that made it circle.
 
     Return "" without circles.
     """

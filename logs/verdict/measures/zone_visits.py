@@ -61,10 +61,10 @@ def distances_outside_zone(
 
 @inlined
 def violation_depth(exclusion: bool, outline_distance: float, band_distance: float) -> float:
-    """Return the depth of a violation at a position, m; negative if the position complies.
+    """Return how deep a position violates a zone, m; negative if it complies.
 
-    The depth is the shortest horizontal or vertical distance to the zone's limit, or NaN if it depends on unknown
-    ground.
+    The depth is the shortest distance to the zone's limit, horizontally or vertically.  It is NaN if it depends on
+    unknown ground.
     outline_distance, band_distance: from `distances_outside_zone`.
     """
     if band_distance != band_distance:
@@ -98,7 +98,7 @@ def copy_move_part(source: Record, target: Record) -> None:
 def depth_bounds(
     exclusion: bool, part: Record, length: float, height_change: float, max_distance: float
 ) -> tuple[float, float]:
-    """Return lower and upper bounds of the violation's depth along one part of a move, m.
+    """Return lower and upper bounds of the depth of a violation along one part of a move, m.
 
     The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
 
@@ -107,11 +107,10 @@ def depth_bounds(
     max_distance: upper bound of the depth relative to the zone's outline alone, m.
     """
     sign = -1.0 if exclusion else 1.0
-    outline_sum, band_sum = (
-        sign * (part.outline_distance + part.end_outline_distance),
-        sign * (part.band_distance + part.end_band_distance),
-    )
-    outline_min, outline_max = 0.5 * (outline_sum - length), min(max_distance, 0.5 * (outline_sum + length))
+    outline_sum = sign * (part.outline_distance + part.end_outline_distance)
+    band_sum = sign * (part.band_distance + part.end_band_distance)
+    outline_min = 0.5 * (outline_sum - length)
+    outline_max = min(max_distance, 0.5 * (outline_sum + length))
     if band_sum != band_sum:
         # If the ground is unknown at one end, only the outline can show that the part is not inside an exclusion.
         return (-math.inf, outline_max) if exclusion else (outline_min, math.inf)
@@ -137,10 +136,8 @@ def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record
         min_distance = math.inf
         for edge_index in (part.edge, part.end_edge):
             edge = records.edges[edge_index]
-            start_distance, end_distance = (
-                distance_to_edge(edge, part.east, part.north),
-                distance_to_edge(edge, part.end_east, part.end_north),
-            )
+            start_distance = distance_to_edge(edge, part.east, part.north)
+            end_distance = distance_to_edge(edge, part.end_east, part.end_north)
             min_distance = min(min_distance, max(start_distance, end_distance))
         return min_distance + chord_deviation
     if not zone.exclusion:
@@ -200,7 +197,9 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
     moves: the path, (m,) of dtype `logs.verdict.measures.path_moves.MOVE`.
     terrain: None if unknown.
     """
-    heights, to_pixel, spacing = read_only(np.full((2, 2), np.nan, dtype=np.float32)), np.zeros(1, POLYMAP)[0], 1.0
+    heights = read_only(np.full((2, 2), np.nan, dtype=np.float32))
+    to_pixel = np.zeros(1, POLYMAP)[0]
+    spacing = 1.0
     if terrain is not None:
         heights, to_pixel, spacing = terrain.heights, terrain.to_pixel.record, terrain.spacing
     # Arrays from compiled code are not numpy record arrays, whose fields are attributes.
@@ -257,8 +256,8 @@ def _fill_visit(
 
     known_depth: depth below which the result need not be exact, m.
 
-    The work has three rounds: round 0 checks only the moves' ends; round 1 finds the deepest point, which is near the
-    deepest end; and, if the zone is violated, round 2 finds the times.
+    There are three rounds.  Round 0 checks only the ends of the moves.  Round 1 finds the deepest point, which is near
+    the deepest end.  If the zone is violated, round 2 finds the times.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -266,11 +265,10 @@ def _fill_visit(
         for b in range(blocks.shape[0]):
             block = blocks[b]
             ground_slope = block.steepest if above_ground else 0.0
-            half_width, half_length = 0.5 * (block.east - block.west), 0.5 * (block.north - block.south)
-            half_diagonal, half_height = (
-                math.sqrt(half_width * half_width + half_length * half_length),
-                0.5 * (block.high - block.low),
-            )
+            half_width = 0.5 * (block.east - block.west)
+            half_length = 0.5 * (block.north - block.south)
+            half_diagonal = math.sqrt(half_width * half_width + half_length * half_length)
+            half_height = 0.5 * (block.high - block.low)
             outline_distance, band_distance, _ = distances_outside_zone(
                 records,
                 z,
@@ -348,7 +346,7 @@ def _bisect_move(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Bisect a move until each part is certain, and update a visit with the parts.
+    """Bisect a move until each part can be decided, and update a visit with the parts.
 
     in_order: True to bisect until each part is on one side of the limit, and add the parts in order of time; False to
         bisect until no part can be deeper than the known depth.
@@ -400,11 +398,9 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if the depths at both ends depend on unknown ground, so that the whole part is unknown."""
-    start_depth, end_depth = (
-        violation_depth(exclusion, part.outline_distance, part.band_distance),
-        violation_depth(exclusion, part.end_outline_distance, part.end_band_distance),
-    )
+    """Return True if the depth of a part is unknown because the ground is unknown at both of its ends."""
+    start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
+    end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     return start_depth != start_depth and end_depth != end_depth
 
 
@@ -425,10 +421,8 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 @inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Add the violation in a part of a move to a visit.  The part crosses the zone's limit at most once."""
-    start_depth, end_depth = (
-        violation_depth(exclusion, part.outline_distance, part.band_distance),
-        violation_depth(exclusion, part.end_outline_distance, part.end_band_distance),
-    )
+    start_depth = violation_depth(exclusion, part.outline_distance, part.band_distance)
+    end_depth = violation_depth(exclusion, part.end_outline_distance, part.end_band_distance)
     if not (start_depth > 0.0 or end_depth > 0.0):
         return
     entry_fraction, exit_fraction = part.first, part.last
@@ -436,7 +430,8 @@ def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> Non
         entry_fraction += (exit_fraction - entry_fraction) * start_depth / (start_depth - end_depth)
     elif end_depth <= 0.0:
         exit_fraction = entry_fraction + (exit_fraction - entry_fraction) * start_depth / (start_depth - end_depth)
-    entry_time, exit_time = move.time + entry_fraction * move.lasts, move.time + exit_fraction * move.lasts
+    entry_time = move.time + entry_fraction * move.lasts
+    exit_time = move.time + exit_fraction * move.lasts
     visit.violation_time += exit_time - entry_time
     if visit.entries == 0 or entry_time > visit.exit_time + _MERGE_TIME_S:
         visit.entries += 1

@@ -87,13 +87,13 @@ class DrawnReturns:
 
     @property
     def worst_by_start(self) -> list[SimulatedReturn]:
-        """The worst return from each start, in order of time."""
+        """Worst return from each start, in order of time."""
         by_time = sorted(self.returns.each, key=lambda ret: ret.time)
         return [min(group, key=worst_first_key) for _, group in groupby(by_time, lambda ret: ret.time)]
 
     @property
     def segments_by_outcome(self) -> list[tuple[Kind, list[SimulatedReturn]]]:
-        """Segments of the path with the same outcome of their returns."""
+        """Segments of the path, each with one outcome of the returns that start on it."""
         return group_segments(self.worst_by_start, lambda ret: ret.kind)
 
 
@@ -116,7 +116,7 @@ def group_segments(elements: Sequence[Element], key: Callable[[Element], Key]) -
 def drawn_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, glides: Glides = NO_GLIDES
 ) -> DrawnReturns:
-    """Add all data for drawing to judged returns.
+    """Add the data for drawing to judged returns.
 
     starts: the starts of the judged returns.
     """
@@ -125,12 +125,15 @@ def drawn_returns(
 
 
 def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Add the data for drawing to judged returns, without glides and minimum altitudes, which take longest."""
+    """Add the data for drawing to judged returns, without the slow parts: glides and minimum altitudes."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Select the returns to draw: the worst of each kind of failure, then others; or the lowest if all are safe."""
+    """Select the returns to draw.
+
+    These are the worst of each kind of failure, then others; the lowest return if all are safe.
+    """
     unsafe_ranges = [return_range for return_range in returns.ranges if not return_range.worst.safe]
     worst_range_by_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe_ranges)}
     ranked_ranges = [
@@ -156,7 +159,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
 
 
 def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> Floats:
-    """Return the position at which a return fails or, if it is safe, is lowest, m, (3,)."""
+    """Return the position at which a return fails, m, (3,); if it is safe, its lowest position."""
     if ret.kind == "threat":
         distances = np.linalg.norm(path - world.environment.spheres[ret.threat], axis=1)
         return np.asarray(path[int(np.argmin(distances))])
@@ -179,25 +182,22 @@ def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltit
     min_offset = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
     is_safe = meets_return_limits(world, selected_starts)
     # Last safe and last unsafe offset from the flight's altitude, m.
-    last_safe_offset, last_unsafe_offset = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
+    last_safe_offset = np.where(is_safe, 0.0, math.nan)
+    last_unsafe_offset = np.where(is_safe, math.nan, 0.0)
     search_direction = np.where(is_safe, -1.0, 1.0)
     is_unfinished = np.isfinite(min_offset)
     for step in range(1, _MAX_STEPS + 1):
         offsets = np.maximum(search_direction * step * _STEP_M, min_offset)
         is_offset_safe = _are_safe_at_offset(world, selected_starts, offsets, is_unfinished)
-        last_safe_offset, last_unsafe_offset = (
-            np.where(is_unfinished & is_offset_safe, offsets, last_safe_offset),
-            np.where(is_unfinished & ~is_offset_safe, offsets, last_unsafe_offset),
-        )
+        last_safe_offset = np.where(is_unfinished & is_offset_safe, offsets, last_safe_offset)
+        last_unsafe_offset = np.where(is_unfinished & ~is_offset_safe, offsets, last_unsafe_offset)
         is_unfinished &= (is_offset_safe == is_safe) & (offsets > min_offset)
     for _ in range(_HALVING_COUNT):
         is_bracketed = np.isfinite(last_safe_offset) & np.isfinite(last_unsafe_offset)
         midpoints = np.where(is_bracketed, 0.5 * (last_safe_offset + last_unsafe_offset), 0.0)
         is_offset_safe = _are_safe_at_offset(world, selected_starts, midpoints, is_bracketed)
-        last_safe_offset, last_unsafe_offset = (
-            np.where(is_bracketed & is_offset_safe, midpoints, last_safe_offset),
-            np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe_offset),
-        )
+        last_safe_offset = np.where(is_bracketed & is_offset_safe, midpoints, last_safe_offset)
+        last_unsafe_offset = np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe_offset)
     return MinSafeAltitudes(
         selected_starts.time, np.where(np.isfinite(min_offset), selected_starts.rows["up"] + last_safe_offset, math.nan)
     )

@@ -98,14 +98,15 @@ class _CellBlocks(NamedTuple):
 
     @classmethod
     def from_map(cls, grid: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_CellBlocks":
-        """Return the blocks of a map within ranges to the east and north, m."""
+        """Group the cells of a map within ranges to the east and north (m) into blocks."""
         rows, columns = grid.floor.shape
         axes = ((north, grid.south, rows), (east, grid.west, columns))
         first_cell = [math.floor(max(0.0, (limits[0] - origin) / grid.cell)) for limits, origin, _ in axes]
         end_cell = [math.ceil(min(count - 1.0, (limits[1] - origin) / grid.cell)) + 1 for limits, origin, count in axes]
         counts = [max(0, end_cell - start) for start, end_cell in zip(first_cell, end_cell, strict=True)]
         cells_per_side = max(1, math.ceil(max(counts) / _MAX_BLOCKS))
-        west, south = grid.west + (first_cell[1] - 0.5) * grid.cell, grid.south + (first_cell[0] - 0.5) * grid.cell
+        west = grid.west + (first_cell[1] - 0.5) * grid.cell
+        south = grid.south + (first_cell[0] - 0.5) * grid.cell
         return cls(
             west,
             south,
@@ -123,12 +124,12 @@ class _CellBlocks(NamedTuple):
         return np.asarray(block_values.max(axis=(1, 3)))
 
     def outlines(self, is_chosen: Flags) -> tuple[Part, ...]:
-        """Return the outlines of the areas of chosen blocks, with their holes; neighbouring blocks are joined."""
+        """Join chosen blocks into areas, and return the areas' outlines with their holes."""
         return cell_outlines(self.west, self.south, self.side, is_chosen)
 
 
 def cell_outlines(west: float, south: float, side: float, is_chosen: Flags) -> tuple[Part, ...]:
-    """Return the outlines of the areas of chosen square cells, with their holes; neighbouring cells are joined.
+    """Join chosen square cells into areas, and return the areas' outlines with their holes.
 
     west, south: south-western corner of the first cell, m.
     side: side of a cell, m.

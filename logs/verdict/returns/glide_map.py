@@ -71,8 +71,9 @@ class GlideMap:
     sphere_tops: Floats
 
     def cell_at(self, east: float, north: float) -> tuple[int, int]:
-        """Return the row and the column of the cell that contains a position (m), which may lie off the map."""
-        row, column = round((north - self.south) / self.cell), round((east - self.west) / self.cell)
+        """Return the row and the column of the cell at a position (m); the cell may lie off the map."""
+        row = round((north - self.south) / self.cell)
+        column = round((east - self.west) / self.cell)
         return row, column
 
     def cell_center(self, row: int, column: int) -> tuple[float, float]:
@@ -83,7 +84,7 @@ class GlideMap:
 def glide_map(
     terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = MAP_MARGIN_M
 ) -> GlideMap | None:
-    """Make the map of cells around positions; return None if the cells of such a large map are too coarse.
+    """Make a map of cells around positions; return None if it is so large that its cells are too coarse.
 
     positions: east and north, m, (p, 2).
     margin: height above ground that a glide keeps, m.
@@ -102,10 +103,12 @@ def glide_map(
     cell = max(_MIN_CELL_M, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
     if cell > max(_MAX_CELL_M, _MAX_CELL_PIXELS * spacing):
         return None
-    columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
+    columns = math.ceil((east - west) / cell) + 1
+    rows = math.ceil((north - south) / cell) + 1
     max_ground = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
     center_heights = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
-    sphere_bottoms, sphere_tops = np.full(max_ground.shape, math.inf), np.full(max_ground.shape, -math.inf)
+    sphere_bottoms = np.full(max_ground.shape, math.inf)
+    sphere_tops = np.full(max_ground.shape, -math.inf)
     result = GlideMap(west, south, cell, center_heights, max_ground + margin, sphere_bottoms, sphere_tops)
     for center, radius in zip(spheres, radii, strict=True):
         if radius > 0.0:
@@ -114,7 +117,7 @@ def glide_map(
 
 
 def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
-    """Widen the altitude ranges in which cells of ``grid`` lie in kill spheres by one sphere.
+    """Add one kill sphere to the altitude ranges in which the cells of ``grid`` lie in kill spheres.
 
     Each cell is checked at its point nearest to the sphere's center.
     """
@@ -146,7 +149,7 @@ MAX_LANDING_ROUGHNESS_M = 1.5
 def landable_cells(grid: GlideMap) -> Flags:
     """Return a mask (n, e): True for each cell outside kill spheres that has flat ground around it.
 
-    The ground comes from the elevation file, which has no trees, houses or water.
+    The ground is taken from the elevation file, which does not show trees, houses or water.
     """
     half_count = max(1, math.ceil(0.5 * (LANDING_SQUARE_M / grid.cell - 1.0) - 1e-9))
     offsets = np.arange(-half_count, half_count + 1)
@@ -155,15 +158,11 @@ def landable_cells(grid: GlideMap) -> Flags:
     # Heights relative to their mean, so that the sums of their squares lose no digits.
     relative_heights = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
     unit_weights = np.ones(offsets.size)
-    height_sums, squared_height_sums = (
-        _square_sums(relative_heights, unit_weights, unit_weights),
-        _square_sums(relative_heights * relative_heights, unit_weights, unit_weights),
-    )
+    height_sums = _square_sums(relative_heights, unit_weights, unit_weights)
+    squared_height_sums = _square_sums(relative_heights * relative_heights, unit_weights, unit_weights)
     distances = np.asarray(offsets * grid.cell, dtype=np.float64)
-    east_moments, north_moments = (
-        _square_sums(relative_heights, unit_weights, distances),
-        _square_sums(relative_heights, distances, unit_weights),
-    )
+    east_moments = _square_sums(relative_heights, unit_weights, distances)
+    north_moments = _square_sums(relative_heights, distances, unit_weights)
     offset_moment = offsets.size * float((offsets**2).sum()) * grid.cell**2
     residuals = squared_height_sums - height_sums**2 / count - (east_moments**2 + north_moments**2) / offset_moment
     is_flat = np.hypot(east_moments, north_moments) / offset_moment <= MAX_LANDING_GRADIENT
@@ -186,7 +185,7 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
 
 def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
-    """Set the mask ``is_flat``, (n, e), to False in exclusion zones that reach down to a height above ground, m."""
+    """Set the mask ``is_flat``, (n, e), to False in exclusion zones whose floor is below ``height``."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
         _exclude_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
@@ -286,7 +285,7 @@ def glide_slopes(
 ) -> GlideSlopes:
     """Return the glide slopes between two altitudes (m AMSL) at an equivalent airspeed (m/s).
 
-    possible_winds: winds of a forecast, of which the worst on each course is used; None for the mean wind.
+    possible_winds: winds of a forecast; the worst of them on each course is used.  None for the mean wind.
     """
     courses = np.array(glide_steps()[0]["course"])
     slopes = np.zeros((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
@@ -306,9 +305,9 @@ def _fill_slopes(
     winds: Floats,
     slopes: Floats,
 ) -> None:
-    """Fill the table `slopes`, (c, h), which is 0, with glide slopes by course and altitude.
+    """Fill the zeroed table `slopes`, (c, h), with glide slopes by course and altitude.
 
-    winds: possible winds by altitude, m/s, (n, h, 2), of which the worst is used; none for the mean wind.
+    winds: possible winds by altitude, m/s, (n, h, 2); the worst of them is used.  Empty for the mean wind.
     """
     for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
@@ -365,7 +364,8 @@ def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, ma
     is_on_map = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
     row, column = row[is_on_map], column[is_on_map]
     floor_altitudes = grid.floor[row, column]
-    sphere_bottoms, sphere_tops = grid.sphere_bottoms[row, column], grid.sphere_tops[row, column]
+    sphere_bottoms = grid.sphere_bottoms[row, column]
+    sphere_tops = grid.sphere_tops[row, column]
     min_altitude[row, column] = np.where(
         (sphere_bottoms < floor_altitudes) & (floor_altitudes < sphere_tops), sphere_tops, floor_altitudes
     )
@@ -461,7 +461,7 @@ def _settle_cells(
 
 @inlined
 def _slope_at(slopes: Floats, step_index: int, position: float) -> float:
-    """Return the slope of a step at a fractional index of the table's altitudes, by linear interpolation."""
+    """Interpolate the slope of a step at a fractional index into the altitudes of the table."""
     index = int(position)
     return slopes[step_index, index] + (position - index) * (slopes[step_index, index + 1] - slopes[step_index, index])
 
@@ -478,7 +478,7 @@ def _step_start_altitude(
     end_altitude: float,
     altitude_loss: float,
 ) -> float:
-    """Return the minimum altitude at the start of a step from which it clears all crossed cells, m AMSL.
+    """Return the minimum altitude at the start of a step that clears all crossed cells, m AMSL.
 
     The result is NaN if the ground is unknown.
 

@@ -45,17 +45,18 @@ def remaining_glide_altitudes(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return, for each of n starts, the altitude (m) left on arrival at the best destination, and its cell.
+    """Return the altitude left on arrival at each start's best destination, m, and its cell, (n,) each.
 
     starts: (n,) of dtype `flight.autopilots.simulated_returns.RETURN_START`.
     glide_altitudes: result of the backward search from the destinations.
     airspeed: equivalent airspeed of the glide, m/s.
     bank: bank of the turn, rad; limited to the bank that the airspeed allows.
 
-    The altitude is negative if the destination is out of reach, and -inf if no path leads to one.  The cell is numbered
-    through all rows of the map, as in `logs.verdict.returns.glide_map.GlideAltitudes`; -1 without a path.
+    The altitude is negative if the destination is out of reach, and -inf if no path leads to one.  The cell is a flat
+    index into the map, row by row, as in `logs.verdict.returns.glide_map.GlideAltitudes`; -1 without a path.
     """
-    altitude_left, reached_cells = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
+    altitude_left = np.full(len(starts), -math.inf)
+    reached_cells = np.full(len(starts), -1, dtype=np.int32)
     grid = glide_altitudes.grid
     glider: Record = np.zeros(1, _GLIDER)[0]
     glider.airspeed, glider.bank = airspeed, bank
@@ -80,7 +81,7 @@ def remaining_glide_altitudes(
 
 
 def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
-    """Return the center of a cell, as east, north and ground altitude, m.  cell: number through all rows of the map."""
+    """Return the center of a cell, as east, north and ground altitude, m. cell: flat index into the map, row by row."""
     row, column = divmod(cell, grid.floor.shape[1])
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
@@ -178,15 +179,14 @@ def _wind_at_start(start: Record, aircraft: Record, field: Floats) -> tuple[floa
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
     """Return True if the aircraft is on the map, above the cell's minimum altitude, and outside every kill sphere."""
-    i, j = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
+    i = round((state.north - glider.south) / glider.cell)
+    j = round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
         return False
     for m in range(spheres.shape[0]):
-        east_offset, north_offset, up_offset = (
-            state.east - spheres[m, 0],
-            state.north - spheres[m, 1],
-            state.up - spheres[m, 2],
-        )
+        east_offset = state.east - spheres[m, 0]
+        north_offset = state.north - spheres[m, 1]
+        up_offset = state.up - spheres[m, 2]
         if east_offset * east_offset + north_offset * north_offset + up_offset * up_offset < radii[m] * radii[m]:
             return False
     return True
@@ -194,13 +194,15 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
 
 @inner
 def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
-    """Return the altitude left, the row and the column of the best cell: the aircraft's cell or one of its neighbours.
+    """Return the altitude left in the best cell, and its row and column.
 
-    Neighbours are included because a cell's center may lie in a sphere even if the aircraft does not.
+    The best cell is the aircraft's cell or one of its neighbours.  Neighbours are included because a cell's center may
+    lie in a sphere even if the aircraft does not.
 
     slope: height lost per meter on the way to a cell's center.
     """
-    row, column = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
+    row = round((state.north - glider.south) / glider.cell)
+    column = round((state.east - glider.west) / glider.cell)
     best_altitude_left, best_row, best_column = -math.inf, row, column
     for i in range(max(0, row - 1), min(min_altitude.shape[0], row + 2)):
         for j in range(max(0, column - 1), min(min_altitude.shape[1], column + 2)):
@@ -216,7 +218,7 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 def _remaining_turn(
     state: Record, i: int, j: int, turn_sign: float, next_step: Codes, step_records: Records, glider: Record
 ) -> float:
-    """Return the turn that remains to the course of the path at a cell, rad.
+    """Return the remaining turn to the course of the path at a cell, rad.
 
     It is negative if the course was overshot, and 0 at the end of the path.
 

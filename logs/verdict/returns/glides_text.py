@@ -4,6 +4,7 @@ import math
 
 from flight.autopilots.simulated_returns import ENGINE_FAILURE_REACTION_S
 from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
+from world.wording import count_text
 
 _NOT_JUDGED_TEXTS: dict[NotJudged, str] = {
     "terrain": "there is no elevation file",
@@ -47,15 +48,16 @@ def glides_headline(glides: Glides) -> str:
         return "no position to glide from"
     counts = [(reach, glides.count(reach)) for reach in REACHES]
     # Home is reported even if it is reached from nowhere.
-    reach_text = ", ".join(
+    home_text, *other_texts = (
         _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
     )
+    reach_text = ", ".join([f"{home_text} of {count_text(len(glides.each), 'position')}", *other_texts])
     if any(glide.own_return.end == "not flown" for glide in glides.each):
         follows_text = ", which would follow the terrain," if glides.follows_terrain else " without the engine"
         own_text = f"{glides.autopilot}'s own return{follows_text} is not simulated"
     else:
         own_text = f"{glides.autopilot}'s own return arrives from {glides.arrivals}"
-    return f"of {len(glides.each)} positions, {reach_text}; {own_text}"
+    return f"{reach_text}; {own_text}"
 
 
 def site_text(site: GlideSite) -> str:
@@ -80,21 +82,24 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
         if glide_range.count == 1
         else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
     )
-    return f"{time_text}: {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide, glides)}"
+    return (
+        f"failure at {time_text}:"
+        f" {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide, glides)}"
+    )
 
 
 def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
     """Describe the best destination of a time range, and the altitude to spare or missing."""
     glide = glide_range.lowest_glide
     altitude_left = glides.altitude_left(glide)
-    worst_text = "" if glide_range.count == 1 else f" in the worst case, a failure at {glide.time:.0f} s"
+    worst_text = "" if glide_range.count == 1 else f" (worst case: failure at {glide.time:.0f} s)"
     match glide.reach:
         case "home" | "site":
             site = site_text(glides.sites[glide_range.site])
             return f"{site} is in reach with {altitude_left:.0f} m of altitude to spare{worst_text}"
         case "flat":
             east, north, up = glide.flat_position
-            position_text = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
+            position_text = f"for example at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
             spare_text = f"with {altitude_left:.0f} m of altitude to spare{worst_text}"
             return f"only flat ground is in reach, {position_text}, {spare_text}"
         case "nothing":

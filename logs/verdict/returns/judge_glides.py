@@ -176,13 +176,16 @@ class Glides:
 
     @property
     def always_reaches_ground(self) -> bool | None:
-        """True if a glide from every start reaches ground where it can land; None if unknown."""
+        """True if a glide from every start reaches ground on which a landing is possible; None if unknown."""
         if self.count("nothing"):
             return False
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, glide: Glide) -> int:
-        """Return the index of the best site in reach: home, or the site with the most altitude left; or -1."""
+        """Return the index of the best site in reach; -1 if none is.
+
+        Home is preferred; otherwise it is the site with the most altitude left on arrival.
+        """
         if glide.reach == "home":
             return 0
         return glide.site if glide.reach == "site" else -1
@@ -285,7 +288,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
 
 
 def _no_glides(world: ReturnWorld) -> Glides:
-    """Return a `Glides` with all that does not depend on simulated glides, and without any glide."""
+    """Return a `Glides` without any glide; its other fields are filled."""
     return Glides(
         (),
         _glide_sites(world),
@@ -298,7 +301,7 @@ def _no_glides(world: ReturnWorld) -> Glides:
 
 
 def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altitude_left: float) -> Reach:
-    """Return the best kind of destination with an altitude left (m) of at least 0."""
+    """Return the best kind of destination that is reached with an altitude left (m) of at least 0."""
     if home_altitude_left >= 0.0:
         return "home"
     if site_altitude_left >= 0.0:
@@ -319,7 +322,7 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
     """Return a mask (n, e): True for each cell on which a landing is possible.
 
-    They are flat, and in no exclusion zone that reaches down to `MARGIN` above the ground.
+    Such a cell is flat, and lies in no exclusion zone that reaches down to `MARGIN` above the ground.
     """
     is_flat = landable_cells(grid)
     exclude_zones(grid, is_flat, world.airspace.records, MARGIN)
@@ -333,8 +336,8 @@ def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
 def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> list[EngineOutReturn]:
     """Simulate the autopilot's own return without thrust from each start.
 
-    If returns follow the terrain, or if the autopilot's return without thrust is not known, none is simulated, and each
-    has the outcome "not flown".
+    Nothing is simulated if returns follow the terrain, or if the autopilot's return without thrust is not known: each
+    return then has the outcome "not flown".
     """
     targets = [world.target(row) for row in starts.rows]
     if not world.is_simulated or not world.autopilot.returns.flies_without_engine:
@@ -344,13 +347,14 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
 
 
 def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
-    """Return the function that gives the winds of a forecast around positions, m, (n, 2), from times (s) on."""
+    """Return a function that gives a forecast's winds around positions, m, (n, 2), from their times (s) on."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     first, last = float(times.min()), float(times.max()) + _MAX_GLIDE_TIME_S
     edges = ((low[0], high[0]), (low[1], high[1]), (first, last))
     axes = [np.linspace(*edge, count) for edge, count in zip(edges, _WIND_SAMPLES, strict=True)]
 
     def winds_at(altitudes: Floats) -> Floats:
+        """Return the forecast's winds at some altitudes (m AMSL), at all positions and times, m/s, (n, h, 2)."""
         east, north, time, amsl = (axis.ravel() for axis in np.meshgrid(*axes, altitudes, indexing="ij"))
         return scenario.wind_velocities(np.column_stack([east, north, amsl]), time).reshape(-1, len(altitudes), 2)
 
@@ -372,7 +376,7 @@ def fly_without_engine(
 
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
-    """Return the outcome of a simulated return without thrust.  result: record of dtype `RETURN_RESULT`."""
+    """Describe a simulated return without thrust. result: record of dtype `RETURN_RESULT`."""
     clearance = float(result["clearance_before_arrival"])
     arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
     if result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:
@@ -386,7 +390,10 @@ def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record)
 
 
 def _engine_out_end(result: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
-    """Classify the outcome of a simulated return without thrust by its record and its heights above ground, m."""
+    """Classify the outcome of a simulated return without thrust.
+
+    clearance, arrival_height: minimum height above ground, and height above ground on arrival, m.
+    """
     if result["outcome"] == RETURN_GROUND_IMPACT:
         return "ground"
     if result["sphere_distance"] <= 0.0:

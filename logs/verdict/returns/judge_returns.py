@@ -211,7 +211,7 @@ class Returns:
 
     @property
     def safe(self) -> bool:
-        """True if every return is safe and nothing is left undecided; a landing at the end is not judged."""
+        """True if every return is safe and none is undecided; a landing at the end of a return is not judged."""
         return bool(self.each) and not self.unjudged_parts and all(ret.safe for ret in self.each)
 
     @property
@@ -330,7 +330,7 @@ class ReturnWorld:
 
     @property
     def min_airspeed(self) -> float:
-        """Equivalent airspeed of a glide, m/s: the lowest that the autopilot accepts."""
+        """Equivalent airspeed of a glide, m/s: the lowest airspeed that the autopilot accepts."""
         limits = self.autopilot.speeds.limits
         return self.setup.airspeed if limits is None else limits.min
 
@@ -359,18 +359,18 @@ class ReturnWorld:
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """Events that can take the aircraft off its mission; unknown, thus empty, for an autopilot without returns."""
+        """Events that can take the aircraft off its mission; empty for an autopilot without an RTL."""
         return () if self.has_other_law else self.autopilot.returns.causes(self.mission)
 
     @property
     def ending(self) -> Ending:
-        """End of an RTL: a circle or a landing sequence."""
+        """Type of ending of an RTL: a circle or a landing sequence."""
         ending_by_join: dict[str, Ending] = {"circle": "on to land", "straight": "straight to land"}
         return ending_by_join.get(self.autopilot.returns.rules.landing_join, "circle") if self.landings else "circle"
 
     @property
     def endings(self) -> tuple[Ending, ...]:
-        """All endings of the returns from the possible causes, the ending of RTL first."""
+        """Endings of the returns from all possible causes, the ending of an RTL first."""
         has_landing = any(cause.action == "land" for cause in self.causes) and self.ending != "straight to land"
         return (self.ending, "straight to land") if has_landing else (self.ending,)
 
@@ -383,15 +383,18 @@ class ReturnWorld:
     def unjudged_parts(self) -> tuple[str, ...]:
         """Parts of the returns that cannot be judged, as in `Returns`."""
         behaviour = self.autopilot.returns
-        unsimulated_text = behaviour.unsimulated_text(self.mission)
+        parts = []
+        if unsimulated_text := behaviour.unsimulated_text(self.mission):
+            parts.append(unsimulated_text)
+        if self.has_other_law:
+            parts.append("law")
+        if any(cause.action == "autoland" for cause in self.causes):
+            parts.append("autoland")
+        parts += behaviour.unjudged_texts(self.mission)
         begins_with_landing = any(landing.is_landing for landing in self.landings)
-        return (
-            *([unsimulated_text] if unsimulated_text else []),
-            *(["law"] if self.has_other_law else []),
-            *(["autoland"] if any(cause.action == "autoland" for cause in self.causes) else []),
-            *behaviour.unjudged_texts(self.mission),
-            *(["landing"] if begins_with_landing and any(ending != "circle" for ending in self.endings) else []),
-        )
+        if begins_with_landing and any(ending != "circle" for ending in self.endings):
+            parts.append("landing")
+        return tuple(parts)
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
         """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by its rules."""
@@ -428,7 +431,7 @@ class ReturnWorld:
 
 
 def unknown_energy_text(setup: FlightSetup) -> str:
-    """Explain why the energy of returns is not judged: battery or power are unknown; return "" if it is judged."""
+    """Explain why the energy of returns is not judged; return "" if it is judged."""
     is_stated = setup.scenario.flight.battery_wh is not None
     if setup.source is not None and not setup.source.aircraft_known:
         return "the log names no aircraft, so energy is not judged"
@@ -438,7 +441,7 @@ def unknown_energy_text(setup: FlightSetup) -> str:
 
 
 def returning_title(setup: FlightSetup) -> str:
-    """Return the title of the autopilot whose return is simulated: ArduPlane if the setup's autopilot has none."""
+    """Return the title of the autopilot whose RTL is simulated; ArduPlane if the setup's autopilot has no RTL."""
     autopilot = setup.autopilot.model
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
@@ -481,9 +484,9 @@ def _make_world(setup: FlightSetup, autopilot: Autopilot) -> ReturnWorld:
 
 
 def without_engine_world(world: ReturnWorld) -> ReturnWorld:
-    """Return the world in which returns without an engine are simulated: by ArduPlane if the autopilot has none.
+    """Return the world for returns without an engine; ArduPlane flies them if the autopilot has no such return.
 
-    ArduPlane's parameters are those of the aircraft, with the airspeeds that the user's PX4 parameter file states.
+    ArduPlane then has the aircraft's parameters, and the airspeeds of the user's PX4 parameter file.
     """
     if world.autopilot.returns.flies_without_engine:
         return world
@@ -493,7 +496,7 @@ def without_engine_world(world: ReturnWorld) -> ReturnWorld:
 
 
 def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None) -> ArduPilotParameters:
-    """Return ArduPlane's parameters with the airspeeds that the user's PX4 parameter file states.
+    """Return ArduPlane's parameters with the airspeeds of the user's PX4 parameter file.
 
     own: the user's parameters; the result is unchanged if they are not PX4's.
     """
@@ -564,7 +567,7 @@ def judge_returns(
 
 
 def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Returns:
-    """Return a `Returns` with all that does not depend on simulated returns, and without any return."""
+    """Return a `Returns` without any return; its other fields are filled."""
     parameters = world.autopilot.parameters
     autoland = int(parameters.rtl_autoland) if isinstance(parameters, ArduPilotParameters) else None
     return Returns(
@@ -587,15 +590,15 @@ def _no_returns(world: ReturnWorld, starts: ReturnStarts, interval: float) -> Re
 
 
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
-    """Return True if an RTL from a low start in a take-off or landing sinks to the ground before it can return.
+    """Return True if an RTL from low in a take-off or landing sinks to the ground before it can return.
 
     The path of the return is then not at fault.
 
     height: height of the start above ground, m.
 
-    Below `MIN_JUDGED_HEIGHT_M` this applies to any return that hits the ground or gets low near its start; above this
-    height, only to a return that also loses half of its height.  A return that flies into rising ground, or hits a hill
-    later, is judged.
+    Below `MIN_JUDGED_HEIGHT_M`, the result is True for any return that hits the ground or gets too low near its start.
+    Above this height, the return must also lose half of its height.  It is False for a return that flies into rising
+    ground, or hits a hill later.
     """
     distance = math.dist(ret.start[:2], ret.lowest_position[:2])
     is_sinking = (
@@ -641,11 +644,11 @@ def simulate_judged_returns(
     min_heights: Floats,
     min_sphere_distances: Floats | None = None,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns for judging: the required height does not apply to a landing sequence's approach.
+    """Simulate returns for judging; the required height does not apply in a landing sequence.
 
-    Beyond the first item of a landing sequence, a return flies the mission's own approach, which descends to the
-    landing; there only the ground, the spheres, the zones and the energy limit it.  If such a return becomes too low,
-    its clearance is measured only up to this item.
+    From the first item of a landing sequence on, a return flies the mission's approach, which descends to the landing.
+    There, only the ground, the spheres, the zones and the energy limit the return.  If a return becomes too low on the
+    approach, its clearance is measured only up to the first item.
 
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
@@ -680,8 +683,8 @@ def simulate_judged_returns(
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Return the required height above ground of the RTL from each start, m, (n,).
 
-    This is the limit, or a height that depends on the start if the flight itself is or soon gets lower, as in a landing
-    sequence.
+    This is the limit.  It is lower for a start at which the flight itself is below the limit, or soon will be, as in a
+    landing sequence.
     """
     start_heights = heights_above_ground(world, starts)
     flight_heights = start_heights - starts.height_loss
@@ -796,8 +799,9 @@ def _recheck_in_jsbsim(
 ) -> tuple[list[SimulatedReturn], list[float]]:
     """Fly doubtful returns in JSBSim, the most doubtful first, and correct the point-mass results.
 
-    A doubtful return that is not flown (it begins in a turn, or `max_flights` are flown) is corrected like the nearest
-    flown return in its group of successive doubtful returns, if the flown return is worse in JSBSim.
+    Some doubtful returns are not flown in JSBSim, because they begin in a turn or `max_flights` are flown already.
+    They get the correction of the nearest flown return among the successive doubtful returns around them, if JSBSim
+    made that return worse.
 
     Returns the corrected returns, and for each flown return the difference in clearance (JSBSim minus point mass, m).
     """
@@ -849,7 +853,7 @@ def _corrected_return(
 ) -> SimulatedReturn:
     """Correct a doubtful return by the differences between JSBSim and the point mass on a flown return.
 
-    If these differences are large and decisive, the outcome becomes "unsure", unless a failure is certain.
+    If these differences are large and change the outcome, it becomes "unsure", unless a failure is certain.
 
     offsets: differences (JSBSim minus point mass) in clearance and in distance outside kill spheres, m.
     flown: result of the point mass for the flown return.
@@ -896,15 +900,17 @@ def can_start_in_jsbsim(world: ReturnWorld, row: Record) -> bool:
     """Return True if a JSBSim flight can begin at a start: the bank is small, and the airspeed is high enough."""
     place = [float(row[name]) for name in ("east", "north", "up")]
     wind_east, wind_north = world.scenario.wind_velocity(place, float(row["time"]))
-    east, north = float(row["velocity_east"]) - wind_east, float(row["velocity_north"]) - wind_north
+    east = float(row["velocity_east"]) - wind_east
+    north = float(row["velocity_north"]) - wind_north
     airspeed = math.hypot(east, north, float(row["velocity_up"]))
     return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.first_airspeed)
 
 
 def limit_ratio(ret: SimulatedReturn) -> float:
-    """Return a return's distance to the nearest limit, divided by the error of the point mass in that distance.
+    """Return the distance of a return from its nearest limit, in units of the point mass's error.
 
-    The limits are the ground, the required height and the kill spheres.  Below 1 the point mass could be wrong.
+    The limits are the ground, the required height and the kill spheres.  Below 1, the error of the point mass may
+    change the outcome.
     """
     if ret.kind in ("zone", "unknown"):
         # These outcomes do not depend on a distance.

@@ -116,7 +116,7 @@ def _height_losses(setup: FlightSetup, time: Floats, position: Floats, start_tim
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Return two masks (n,): True for rows low in take-off or landing, and for rows too slow to fly."""
+    """Return two masks (n,): rows that are low in a take-off or landing, and rows too slow to fly."""
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
@@ -129,7 +129,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return the ground velocities at some rows, m/s, (n, 3); compute missing velocities from positions."""
+    """Return the ground velocities at some rows, m/s, (n, 3), with missing ones computed from positions."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -158,10 +158,8 @@ def planned_starts(setup: FlightSetup, interval: float, requirements: RouteRequi
     course_change = fraction * move["length"] * move["curvature"]
     course_east, course_north = move["course_east"], move["course_north"]
     speed = move["length"] / np.maximum(1e-9, move["lasts"])
-    east, north = (
-        course_east * np.cos(course_change) + course_north * np.sin(course_change),
-        course_north * np.cos(course_change) - course_east * np.sin(course_change),
-    )
+    east = course_east * np.cos(course_change) + course_north * np.sin(course_change)
+    north = course_north * np.cos(course_change) - course_east * np.sin(course_change)
     climb_rate = (move["climb"] + 2.0 * move["bend"] * fraction) / np.maximum(1e-9, move["lasts"])
     velocity = np.stack([speed * east, speed * north, climb_rate], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
@@ -188,7 +186,7 @@ def planned_positions(setup: FlightSetup, interval: float) -> tuple[Floats, Floa
 
 
 def _moves_before_return(setup: FlightSetup) -> Records:
-    """Return the moves of the planned path up to its own return to launch; none if it begins with one."""
+    """Return the moves of the planned path up to its return to launch; none if it begins with a return."""
     route = setup.route
     last_leg = (route.legs if route.rtl_start is None else route.rtl_start) - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
@@ -196,8 +194,9 @@ def _moves_before_return(setup: FlightSetup) -> Records:
 
 
 def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[np.intp], Floats, Floats]:
-    """Return times, s, move numbers, flown fractions of these moves, all (t,), and positions, m, (t, 3).
+    """Sample moves at an interval of time.
 
+    Returns times, s, numbers of the moves, and the flown fraction of each move, all (t,), and positions, m, (t, 3).
     moves: at least one move of a planned path.
     interval: time between samples, s.
     """
@@ -205,7 +204,8 @@ def _sample_positions(moves: Records, interval: float) -> tuple[Floats, NDArray[
     move_numbers = np.searchsorted(moves["time"], times, side="right") - 1
     move = moves[move_numbers]
     fraction = np.clip((times - move["time"]) / np.maximum(1e-9, move["lasts"]), 0.0, 1.0)
-    distance, course_change = fraction * move["length"], fraction * move["length"] * move["curvature"]
+    distance = fraction * move["length"]
+    course_change = fraction * move["length"] * move["curvature"]
     is_curved = move["curvature"] != 0.0
     curvature = np.where(is_curved, move["curvature"], 1.0)
     ahead = np.where(is_curved, np.sin(course_change) / curvature, distance)
@@ -233,10 +233,12 @@ def flown_end(track: Track) -> ReturnStarts:
 
 def planned_end(requirements: RouteRequirements) -> ReturnStarts:
     """Return the end of the planned path as the start of a return, in straight flight, with the predicted energy."""
-    course, slope = float(requirements.courses[-1]), math.tan(float(requirements.slopes[-1]))
+    course = float(requirements.courses[-1])
+    slope = math.tan(float(requirements.slopes[-1]))
     speed = float(_ground_speeds(requirements.setup)[-1])
     velocity = speed * np.array([[math.sin(course), math.cos(course), slope]])
-    time, energy = requirements.path.times[-1:], np.array([predicted_energy(requirements)[0]])
+    time = requirements.path.times[-1:]
+    energy = np.array([predicted_energy(requirements)[0]])
     records = _start_records(time, requirements.points[-1:], velocity, np.zeros(1))
     return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_), np.zeros(1))
 
@@ -244,7 +246,7 @@ def planned_end(requirements: RouteRequirements) -> ReturnStarts:
 def _ground_speeds(setup: FlightSetup) -> Floats:
     """Return the ground speed on each leg in the mean wind, or the airspeed if the wind is too strong, m/s.
 
-    In a forecast, it is the wind at the leg's middle when the aircraft is there.
+    In a forecast, this is the wind at the middle of the leg at the time when the aircraft is there.
     """
     route, speeds = setup.route, []
     courses, winds = leg_courses(route.positions), find_leg_winds(setup, route)

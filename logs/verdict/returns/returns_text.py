@@ -20,7 +20,6 @@ from logs.verdict.returns.suggest_returns import Remedy
 from logs.verdict.wording import quantity_text
 from world.frames import to_geo
 from world.scenario import Scenario
-from world.wording import count_text
 
 # Texts for the outcome of one return, and of several returns.
 _SINGULAR_TEXTS: dict[Kind, str] = {
@@ -122,7 +121,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
     if ret.kind == "ground":
         parts[-1] += f" at {position_text}"
     elif math.isfinite(ret.clearance):
-        parts.append(f"{ret.clearance:.0f} m above ground at the lowest, at {position_text}")
+        parts.append(f"{ret.clearance:.0f} m above ground at the lowest point, at {position_text}")
     if ret.threat >= 0 and ret.sphere_distance <= 0.0:
         parts.append(f"{-ret.sphere_distance:.0f} m inside the sphere of {scenario.threats.names[ret.threat]}")
     elif math.isfinite(ret.sphere_distance):
@@ -172,10 +171,14 @@ def _judged_text(returns: Returns) -> str:
     if failure_counts:
         safe_count = returns.count("safe")
         common_kind = next((kind for kind in KINDS if returns.count(kind) == total), None)
-        if common_kind is not None and total > 1:
-            return f"all {total} returns {_PLURAL_TEXTS[common_kind].format(limit=returns.limit)}"
+        if common_kind is not None:
+            subject, texts = (
+                (f"all {total} returns", _PLURAL_TEXTS) if total > 1 else ("the only return", _SINGULAR_TEXTS)
+            )
+            return f"{subject} {texts[common_kind].format(limit=returns.limit)}"
+        first_count, _, outcomes = failure_counts.partition(" ")
         safe_text = "none is" if safe_count == 0 else "1 is" if safe_count == 1 else f"{safe_count} are"
-        return f"of {count_text(total, 'return')} {failure_counts}; {safe_text} safe"
+        return f"{first_count} of {total} returns {outcomes}; {safe_text} safe"
     # Leave out returns that begin below the limit, as after a take-off: their lowest point is the start.
     high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
     lowest_return = min(high_returns, key=lambda ret: ret.clearance)
@@ -221,7 +224,7 @@ def point_of_no_return_text(returns: Returns) -> str:
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List the events that make the aircraft return, that make it land, and that do neither, in up to three lines.
+    """List, in up to three lines, the events that cause a return, those that cause a landing, and the others.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -229,11 +232,11 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     >>> for line in describe_causes(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     causes of a return: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
-    no return after battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): continues its mission
+    no return after battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): the aircraft ...
     """
 
     def setting_text(cause: Cause) -> str:
-        """Return the parameter of an event and its value in brackets."""
+        """Return the parameter that decides on an event, and its value, in brackets."""
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
     returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.is_return]
@@ -242,7 +245,9 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
         other_causes: dict[str, list[str]] = {}
         for cause in causes:
             if not cause.is_return and (cause.action in ("land", "autoland", "land here")) == is_landing:
-                other_causes.setdefault(ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
+                subject = "" if cause.action == "never" else "the aircraft "
+                action_text = subject + ACTION_TEXTS[cause.action]
+                other_causes.setdefault(action_text, []).append(f"{cause.name}{setting_text(cause)}")
         text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
         lines += [f"{heading} {'; '.join(text)}"] if text else []
     return lines
@@ -251,14 +256,14 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 def describe_landing(returns: Returns) -> list[str]:
     """Return lines that describe how an RTL ends, given RTL_AUTOLAND and the mission's landing sequences.
 
-    For an autopilot other than ArduPlane, return its sentence on the path of an RTL.
+    For any other autopilot than ArduPlane, the line is its text on the path of an RTL.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
-    ['RTL_AUTOLAND 0: a return keeps circling at its target']
+    ['RTL_AUTOLAND 0: a return ends in a loiter at its target']
     """
     if returns.autoland is None:
         return [returns.path_text] if returns.path_text else []
-    loiter_text = "a return keeps circling at its target"
+    loiter_text = "a return ends in a loiter at its target"
     items_text = (
         f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(landing.item) for landing in returns.landings)}"
     )
@@ -293,9 +298,12 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
         else f"{return_range.first:.0f} to {return_range.last:.0f} s"
     )
     reason = f" ({worst_return.target.reason})" if worst_return.target.reason else ""
+    worst_text, start_text = (
+        ("", "") if return_range.count == 1 else ("worst ", f", started at {worst_return.time:.0f} s,")
+    )
     return (
-        f"started at {time_text}, {_judgement_text(worst_return)}: return to {worst_return.target.name}{reason};"
-        f" {_range_outcome_text(worst_return, return_range, returns, scenario)}"
+        f"started at {time_text}: {_judgement_text(worst_return)}; the {worst_text}return to {worst_return.target.name}"
+        f"{reason}{start_text} {_range_outcome_text(worst_return, returns, scenario)}"
     )
 
 
@@ -312,41 +320,39 @@ def _energy_outcome_text(ret: SimulatedReturn, returns: Returns) -> str:
         return "the energy used before is unknown"
     if ret.energy_left < 0.0:
         return f"ends with an empty battery, as {quantity_text(ret.energy_used, 'Wh')} are used before it"
-    left_text, reserve_text = quantity_text(ret.energy_left, "Wh"), quantity_text(returns.reserve, "Wh")
+    left_text = quantity_text(ret.energy_left, "Wh")
+    reserve_text = quantity_text(returns.reserve, "Wh")
     uncertain_text = ", but the power is uncertain" if ret.kind == "power" else ""
     return f"leaves {left_text} of the required {reserve_text}{uncertain_text}"
 
 
-def _range_outcome_text(
-    worst_return: SimulatedReturn, return_range: ReturnRange, returns: Returns, scenario: Scenario
-) -> str:
+def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenario: Scenario) -> str:
     """Describe the outcome of the worst return of a time range, with its position, height or energy."""
-    prefix = "it " if return_range.count == 1 else f"the worst, started at {worst_return.time:.0f} s, "
     east, north, up = worst_return.lowest_position
     position_text = f"{east:.0f} m east, {north:.0f} m north"
     digits = 1 if abs(worst_return.clearance - returns.limit) < 1.0 else 0
     height_text = f"{worst_return.clearance:.{digits}f} m above ground at {position_text}"
     match worst_return.kind:
         case "ground":
-            return f"{prefix}hits the ground at {position_text}, {up:.0f} m AMSL"
+            return f"hits the ground at {position_text}, {up:.0f} m AMSL"
         case "threat":
             return (
-                f"{prefix}flies {-worst_return.sphere_distance:.0f} m into the sphere of"
+                f"flies {-worst_return.sphere_distance:.0f} m into the sphere of"
                 f" {scenario.threats.names[worst_return.threat]}"
             )
         case "zone":
-            return f"{prefix}violates zone {returns.airspace.zones[worst_return.zone].name}"
+            return f"violates zone {returns.airspace.zones[worst_return.zone].name}"
         case "lost":
             end_text = "landing sequence" if worst_return.target.landing is not None else "loiter"
-            return f"{prefix}does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
+            return f"does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy" | "power" | "used":
             taken_text = quantity_text(worst_return.energy, "Wh")
-            return f"{prefix}takes {taken_text} and {_energy_outcome_text(worst_return, returns)}"
+            return f"takes {taken_text} and {_energy_outcome_text(worst_return, returns)}"
         case "unknown":
-            return f"{prefix}flies where the terrain is unknown"
+            return "flies where the terrain is unknown"
         case "unsure":
             return (
-                f"{prefix}stays {height_text} according to the point-mass model, but this return or a similar one,"
+                f"stays {height_text} according to the point-mass model, but this return or a similar one,"
                 f" flown in JSBSim, differs by more than {POINT_MASS_ERROR_M:.0f} m in height or"
                 f" {POINT_MASS_POSITION_ERROR_M:.0f} m in distance from a missile's sphere"
             )
@@ -360,7 +366,7 @@ def _range_outcome_text(
         if math.isinf(worst_return.sphere_distance)
         else f", {worst_return.sphere_distance:.0f} m outside every missile's sphere"
     )
-    return f"{prefix}comes down to {height_text}{sphere_text}{energy_text}"
+    return f"comes down to {height_text}{sphere_text}{energy_text}"
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
@@ -369,7 +375,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
     if remedy.rally is not None:
         noun = "rally point" if len(remedy.rally) == 1 else "rally points"
         changes.append(f"{len(remedy.rally)} {noun} ({'; '.join(rally_texts(remedy.rally, scenario))})")
-    return f"{' and '.join(changes)}: {headline(returns)}"
+    return f"{' and '.join(changes)}; then {headline(returns)}"
 
 
 def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:

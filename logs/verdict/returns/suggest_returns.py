@@ -83,7 +83,8 @@ class _ReturnLimits:
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
     """Return the limits of the return from each start, with a margin, m.
 
-    A start that is itself lower or closer to a sphere has its own value, minus the turn's height loss, as its limit.
+    If the start itself is lower or closer to a sphere, the limit is the start's value instead, minus the height lost in
+    the turn.
     """
     rows = starts.rows
     sphere_distances = np.full(len(starts), math.inf)
@@ -176,9 +177,9 @@ class _ReturnTrial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Suggest the lowest height of the returns that clears the ground or is safe, or another change of parameters.
+    """Suggest the lowest return height that clears the ground or is safe, or another change of parameters.
 
-    Heights are tried one by one, because a higher return may lead through a sphere and so be less safe.
+    Heights are tried one by one, because a higher return is not always safer: it may lead through a sphere.
     """
     limits = _return_limits(world, starts)
     trial = _ReturnTrial(starts, limits)
@@ -237,9 +238,9 @@ class _AltitudeSearch:
 
 
 def _suggest_other_parameters(world: ReturnWorld, trial: _ReturnTrial, altitudes: dict[str, float]) -> list[Remedy]:
-    """Suggest another change of parameters with which all returns meet the requirements; return [] if none does.
+    """Suggest another change of parameters with which all returns meet the limits; return [] without one.
 
-    altitudes: parameters of a height to try in addition, m, by name; empty for no change of it.
+    altitudes: parameters of a return height, m, by name; each change is also tried together with them.  May be empty.
     """
     candidates = [dict(values) for values in world.autopilot.returns.trials.others]
     if altitudes:
@@ -280,7 +281,8 @@ _PAIR_SEED_COUNT = 30
 def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
     """Suggest the fewest rally points that make most returns safe, or None if no point improves the returns.
 
-    Add points greedily, given the autopilot's own choice between them, then swap points, then remove superfluous ones.
+    The search adds the best points one by one, then swaps points, then removes superfluous points.  It assumes that
+    each return goes to the point that the autopilot chooses.
     """
     limits, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
@@ -318,7 +320,7 @@ def _search_in_rounds(
     searched_starts: NDArray[np.intp],
     initial_count: int,
 ) -> tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]]:
-    """Search, simulate all starts, and search again with the starts that remain unsafe.
+    """Search, simulate all starts, and repeat the search with the starts that remain unsafe.
 
     initial_count: number of first candidates that form the initial set.
     Returns the number of good returns, the points, and the starts that remain unsafe.
@@ -387,7 +389,7 @@ def _ground_altitude(world: ReturnWorld, east: float, north: float) -> float:
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the altitude of the highest ground within the loiter around a point, m AMSL; NaN if any is unknown."""
+    """Return the altitude of the highest ground below a loiter around a point, m AMSL; NaN if partly unknown."""
     if world.scenario.terrain is None:
         return world.home.up
     angles = np.arange(16) * (math.pi / 8.0)
@@ -466,7 +468,7 @@ class _RallySearch:
         )
 
     def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
-        """Simulate the returns from starts to their nearest candidates; returns to others are rated as unsafe."""
+        """Simulate the returns from starts to their nearest candidates; returns to others count as unsafe."""
         pairs = [
             (start, int(candidate))
             for start in searched_starts
@@ -484,7 +486,8 @@ class _RallySearch:
             )
             for row, candidate in zip(rows[start_indices], candidate_indices.tolist(), strict=True)
         ]
-        starts, limits = self._starts.subset(start_indices), self._limits.subset(start_indices)
+        starts = self._starts.subset(start_indices)
+        limits = self._limits.subset(start_indices)
         self._is_good[start_indices, candidate_indices] = _meets_criterion(
             self._world, starts, targets, limits, _meets_all_limits
         )

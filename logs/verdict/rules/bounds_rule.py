@@ -18,7 +18,7 @@ from world.arrays import Floats
 def bounds_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum distance inside the area's edges, floor and ceiling, with one finding."""
+    """Judge the minimum distance from the area's edges, floor and ceiling, with one finding."""
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
@@ -54,7 +54,10 @@ def bounds_findings(
 
 
 def _min_distance_inside(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
-    """Return the minimum distance inside the box, m (negative if outside), the edge's name, and the row of `points`."""
+    """Return the minimum distance from the nearest edge of the area, its name, and the row of `points`.
+
+    The distance is in m, negative outside the area.
+    """
     scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
     distances = {

@@ -72,12 +72,13 @@ def clearance_findings(
 
 
 def _known_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return the lowest known height above ground of each segment of a path, and where the ground is first unknown.
+    """Return each segment's lowest known height above ground, and where the ground is first unknown.
 
     points: (n, 3) m.
 
-    The heights are (n - 1,) m, NaN if the ground is unknown along a whole segment; where the ground is known along a
-    part of a segment only, this part is sampled. The places are (n - 1, 3) m, NaN for segments over known ground.
+    The heights have the shape (n - 1,) and the unit m.  A height is NaN if the ground is unknown along the whole
+    segment; if it is known along a part, this part is sampled.  The places have the shape (n - 1, 3) and the unit m,
+    and are NaN for segments over known ground.
     """
     heights, fractions = path_clearance(terrain.heights, terrain.to_pixel.record, points)
     off_terrain = np.full((len(heights), 3), np.nan)
@@ -114,7 +115,7 @@ def _geographic_text(requirements: RouteRequirements, east: float, north: float)
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
     """Report a route with a waypoint clearly below home as undecided; otherwise return [].
 
-    This applies without terrain data, where the ground is assumed to be at home's altitude.
+    Call this without terrain data: the ground is then assumed to be at home's altitude.
     """
     home = requirements.setup.mission.home
     if home is None:
@@ -132,9 +133,10 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
 
 
 def _home_above_ground_findings(requirements: RouteRequirements, leg_findings: list[Finding]) -> list[Finding]:
-    """Report a mission whose home lies above the ground as undecided if a leg would be too low with home on the ground.
+    """Report a home above the ground as undecided if a leg would be too low with home on the ground.
 
-    An autopilot sets home to its own position when it is armed, and all heights above home are lowered with it.
+    When an autopilot is armed, it sets home to its own position on the ground.  All heights above home are then lower
+    by the height of the mission's home above the ground.
 
     leg_findings: findings on the legs with the mission's own home.
     """
@@ -214,9 +216,9 @@ class _Landing(NamedTuple):
 def _find_landing(requirements: RouteRequirements) -> _Landing | None:
     """Return the landing of a mission; None without a landing, and for a plan without planned ground phases.
 
-    Without a `[landing]` a flight ends in the air, over the landing point at the height of the waypoint before it: this
-    says nothing about the descent, which the rules `landing` and `approach` judge.  In an imported log the descent ends
-    on the ground.
+    Without a `[landing]`, a flight ends in the air, over the landing point and at the height of the waypoint before it.
+    It then says nothing about the descent, which the rules `landing` and `approach` judge.  In an imported log, the
+    descent ends on the ground.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     approach = (setup.ground_phases if ground is None else ground.procedures).approach
@@ -235,10 +237,10 @@ def _fields_by_leg(
 ) -> dict[int, tuple[tuple[float, float], ...]]:
     """Return, by leg number, positions (east, north, m) near which the leg needs less height above ground.
 
-    The leg after a take-off that was flown or logged has the position of home, and the legs before a landing have the
-    landing point.  The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no
-    such item.  Only the final approach is included, and the legs after the last waypoint that keeps the required height
-    above ground.
+    For the leg after a flown or logged take-off, this is the position of home.  For the legs before a landing, it is
+    the landing point.  These legs begin at DO_LAND_START, or are the last two legs if the mission has no such item.  Of
+    them, only the final approach is included, and the legs after the last waypoint that keeps the required height above
+    ground.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     procedures = setup.ground_phases if ground is None else ground.procedures
@@ -262,7 +264,7 @@ def _fields_by_leg(
 
 
 def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float] | None:
-    """Return the position of home (east, north), m, if an imported log flies a mission with a take-off, else None."""
+    """Return home's position (east, north, m) if an imported log has a take-off, otherwise None."""
     setup, home = requirements.setup, requirements.setup.mission.home
     if setup.source is None or home is None or takeoff_item(requirements)[1] is None:
         return None
@@ -273,8 +275,8 @@ def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float]
 def _first_airborne_segment(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> int:
     """Return the segment of the track from which the clearance of a leg is judged.
 
-    It is the leg's first segment, or in an imported log with a take-off the segment at which the climb-out from near
-    home reaches `GROUND_LEG_CLEARANCE_M`.
+    It is normally the first segment of the leg.  In an imported log with a take-off, it is the segment at which the
+    climb-out from near home reaches `GROUND_LEG_CLEARANCE_M`.
     """
     first, last = aligned.leg_segments(leg)
     home = _logged_takeoff_home(requirements)
@@ -301,18 +303,18 @@ def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
-    """Return a label for where a limit (m) on height above ground comes from."""
+    """Name the source of a limit on height above ground, m."""
     return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
 def _terrain_error_text(clearance: float, limit: float, error: float | None) -> str:
-    """Describe a clearance (m) reduced by the terrain's stated error; return "" if no error is stated."""
+    """Describe a clearance minus the stated error of the terrain, m; return "" if no error is stated."""
     if error is None or math.isnan(clearance):
         return ""
     shortfall_text = (
         f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE_M > clearance - error else ""
     )
-    return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{shortfall_text}"
+    return f"; {clearance - error:.1f} m after subtracting the terrain's stated error of {error:g} m{shortfall_text}"
 
 
 def _planned_finding(
@@ -325,7 +327,7 @@ def _planned_finding(
     off_text: where the leg leaves the terrain data; "" if it does not.
     """
     is_short = planned_height < limit - CLEARANCE_TOLERANCE_M
-    reason = f"{_height_text(planned_height)} at the lowest"
+    reason = f"{_height_text(planned_height)} at the lowest point"
     if is_short:
         reason += f"; {limit:.0f} m are required"
     reason += _terrain_error_text(planned_height, limit, terrain.vertical_error)

@@ -76,23 +76,25 @@ class _Obstacles(NamedTuple):
         """True if the path hits neither ground nor sphere nor zone; False if the ground is unknown."""
         return self.clearance >= 0.0 and not self.entered_hazard
 
-    def obstacle_message(self, subject: str, origin: str) -> Message:
+    def obstacle_message(self, subject: str, origin: str, condition: str = "") -> Message:
         """Describe the obstacle.
 
         subject: name of the path.
         origin: text on the place from which `distance` is measured, such as "from home".
+        condition: clause on the slope at which the path is flown; "" for none.
         """
         if self.entered_hazard:
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
-            f"{subject} hits the ground", f", {-self.clearance:.0f} m below the surface {self.distance:.0f} m {origin}"
+            f"{subject} hits the ground",
+            f": {self.distance:.0f} m {origin} it is {-self.clearance:.0f} m below the surface{condition}",
         )
 
 
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, altitude: float) -> tuple[float, float]:
     """Return the maximum climb slope on a course (rad) at an altitude (m AMSL), m per m.
 
-    The first value is the nominal slope, the second the slope reduced by the uncertainty of the aircraft's model.
+    The first value is the nominal slope.  The second is the slope reduced by the uncertainty of the aircraft's model.
     """
     speed, limits = float(requirements.route.leg_airspeeds[leg]), requirements.limits
     max_slope, certain_slope = (
@@ -110,7 +112,8 @@ def climbout_findings(
 ) -> list[Finding]:
     """Judge the climb from home to the first waypoint.
 
-    Return [] without a home or terrain, if that waypoint is over home, or for a take-off that is vertical or flown.
+    Return [] if home or the terrain is missing, if that waypoint is over home, if the take-off is vertical, or if it
+    was flown.
     """
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not has_ground_paths(requirements) or home is None or terrain is None:
@@ -128,10 +131,8 @@ def climbout_findings(
         launch = _find_launch(requirements)
         course = launch.course
     else:
-        course, distance = (
-            math.atan2(first_point[0] - start[0], first_point[1] - start[1]),
-            math.dist(first_point[:2], start),
-        )
+        course = math.atan2(first_point[0] - start[0], first_point[1] - start[1])
+        distance = math.dist(first_point[:2], start)
         if distance < SAME_POSITION_DISTANCE_M:
             return []
     if math.isnan(ground_altitude):
@@ -167,7 +168,7 @@ def climbout_findings(
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: bool) -> Finding:
-    """Return a finding that a climb-out or an approach is not judged.
+    """Return the finding that a climb-out or an approach is not judged.
 
     is_undecided: True if this finding leaves the verdict undecided.
     """
@@ -196,7 +197,7 @@ class _Launch(NamedTuple):
 def _find_launch(requirements: RouteRequirements) -> _Launch:
     """Return the launch on the scenario's course, or along the first leg if the scenario states no course.
 
-    The length and slope are those of the first leg if it lies on the launch course, otherwise inf and 0.
+    If the first leg lies on the launch course, the launch has the leg's length and slope, otherwise inf and 0.
     """
     stated_launch = requirements.setup.scenario.launch
     first_leg = _Launch(
@@ -229,7 +230,7 @@ def _take_off_climb(
     altitudes: tuple[float, float],
     slope: float,
 ) -> _Climb:
-    """Return the climb of a take-off with a slope (m per m).
+    """Return the take-off climb with a given slope (m per m).
 
     start: east and north of home, m.
     altitudes: altitudes of the ground at home and of the end of the take-off, m AMSL.
@@ -287,13 +288,11 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason, check, ok = f"the terrain below {subject} is unknown", "", None
     elif obstacles.is_clear:
-        reason, check, ok = (
-            f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air",
-            "",
-            True,
-        )
+        reason = f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air"
+        check = ""
+        ok = True
     else:
-        fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
@@ -309,7 +308,7 @@ def _launch_finding(
 ) -> Finding:
     """Judge the climb of a mission that takes off, towards its next waypoint or on a launch course.
 
-    steepest, gentlest: the steepest climb, and the climb that every aircraft of this model flies at least.
+    steepest, gentlest: the steepest climb, and the least climb that this aircraft can be relied on to fly.
     start: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
     certain_slope: steepest climb reduced by the uncertainty of the aircraft's model, m per m.
     """
@@ -322,7 +321,7 @@ def _launch_finding(
         return _path_finding("climbout", place, obstacles, None, reason)
     is_certain, end_height = certain_slope == steepest.slope, start[2] - start[1]
     if not obstacles.is_clear:
-        fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
         climb_text = _climb_text(steepest, launch, item_text, end_height)
         text = f"{fault.text} ({climb_text}){_clear_courses_text(requirements, *start)}"
         fault = replace(fault, text=text)
@@ -351,11 +350,11 @@ def _launch_finding(
 
 
 def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: float) -> str:
-    """Describe the slope of a climb, and its end if it is beyond the item that the climb leads to.
+    """Describe the slope of a climb, and where the climb ends if that is beyond its item.
 
     end_height: height of the take-off's end above home, m.
     """
-    text = _degrees_text(climb.slope)
+    text = f"climb angle {_degrees_text(climb.slope)}"
     # The take-off holds its course until it has reached its height.
     if climb.length > launch.leg_length:
         text += (
@@ -366,9 +365,9 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
 
 
 def _certain_climb_text(max_slope: float, certain_slope: float) -> str:
-    """Return a clause on the part of the steepest climb that is certain; slopes in m per m."""
+    """Return a clause on the slope that is certain, if it is less than the steepest; slopes in m per m."""
     certain_text = _degrees_text(max(0.0, certain_slope))
-    return f"; of the steepest climb, {_degrees_text(max_slope)}, {certain_text} is certain for this aircraft"
+    return f"; the steepest climb is {_degrees_text(max_slope)}, but only {certain_text} is certain for this aircraft"
 
 
 def _degrees_text(slope: float) -> str:
@@ -411,8 +410,8 @@ def _clear_courses_text(
     ]
     widest_range = max(ranges, key=len)
     if len(widest_range) == 1:
-        return f"; a launch on {widest_range[0]:03d}° would be clear of obstacles"
-    return f"; a launch on {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
+        return f"; a launch course of {widest_range[0]:03d}° would be clear of obstacles"
+    return f"; a launch course of {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
 
 
 # ----------------------------------------------------------------------
@@ -503,16 +502,21 @@ def _item_text(place: Place) -> str:
 
 
 def _clearance_text(obstacles: _Obstacles) -> str:
-    """Describe the minimum height above ground on a path without obstacles; "no obstacle" if no height was checked."""
+    """Describe the minimum height above ground on a path without obstacles.
+
+    The text is "no obstacle" if no height was checked.
+    """
     return (
-        "no obstacle" if math.isinf(obstacles.clearance) else f"{obstacles.clearance:.0f} m above ground at the lowest"
+        "no obstacle"
+        if math.isinf(obstacles.clearance)
+        else f"{obstacles.clearance:.0f} m above ground at the lowest point"
     )
 
 
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
-    """Make the finding on a climb-out or an approach; `outcome` is its reason."""
+    """Make the finding on a climb-out or an approach, with `outcome` as its reason."""
     return make_finding(
         rule,
         place,

@@ -39,9 +39,8 @@ def completion_findings(
         if flown_count < leg_count:
             faults.append(message(f"{flown_count} of {count_text(leg_count, 'leg')} flown"))
         faults += _record_faults(aligned)
-    reason = (
-        finding_reason(faults) if faults else f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
-    )
+    success_text = f"all {leg_count} legs flown" if leg_count > 1 else "the only leg flown"
+    reason = finding_reason(faults) if faults else success_text
     return [
         make_finding(
             "completion",
@@ -71,7 +70,7 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:
-    """Return faults for the longest gap between the log's rows, and for positions that contradict the velocities."""
+    """Report the longest gap between the log's rows, and positions that contradict the velocities, as faults."""
     track, faults = aligned.track, []
     steps = np.diff(track.time)
     gap = int(np.argmax(steps))
@@ -96,7 +95,7 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge whether an imported flight completed its mission; a log that ends en route leaves the rest undecided."""
+    """Judge whether an imported flight completed its mission; undecided if the log ends on the way."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))
@@ -118,11 +117,11 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
             faults.append(message(reason))
     elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
-            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, the last of them to "
-            f"its end: {_missing_items_text(missing_items)}"
+            f"{finished_count} of {count_text(leg_count, 'leg')} in the log flown, the last one to"
+            f" its end; {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
-        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, the last of them to its end"
+        last_leg_text = f"{finished_count} of {count_text(leg_count, 'leg')} flown, the last one to its end"
         unflown_legs, doubt_texts = _unflown_legs(setup, stretches, flown_legs)
         if unflown_legs:
             unflown_text = f"{_legs_text(setup, unflown_legs)} not flown along the mission"
@@ -164,7 +163,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
 def _unflown_legs(
     setup: FlightSetup, flown_stretches: Sequence[FlownLegs], flown_legs: set[int]
 ) -> tuple[list[int], list[str]]:
-    """Return the legs that were certainly not flown, and texts on legs that the log may lack."""
+    """Return the legs that were certainly not flown, and texts on legs that may be missing in the log."""
     unflown_legs = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
     begins_in_flight = setup.source is not None and setup.source.begins_in_flight
     unseen_legs = [leg for leg in unflown_legs if begins_in_flight and leg < flown_stretches[0].first]
@@ -195,7 +194,7 @@ def _gap_notes(flown_stretches: Sequence[FlownLegs]) -> list[str]:
 
 
 def _leg_numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
-    """Return the distinct numbers of legs in messages, sorted; all legs of a loiter share one number."""
+    """Return the sorted numbers of legs as used in messages; all legs of a loiter share one number."""
     return sorted({int(setup.route.leg_numbers[leg]) for leg in legs})
 
 

@@ -15,10 +15,11 @@ from logs.verdict.tolerances import ROUNDING_M, RUNWAY_COURSE_TOLERANCE_RAD
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the cross-track distance of each flown leg; with ``geometric``, of each leg's planned turns.
+    """Judge the cross-track distance of each flown leg; if ``geometric``, of each leg's planned turns.
 
-    A survey and the legs to and from it are judged only against a corridor that is stated explicitly: the survey rule
-    judges the photo lines, and the autopilot chooses its turns onto the first line and off the last.
+    A survey, with the legs to and from it, is judged only if the scenario states the corridor explicitly.  The reasons
+    are that the survey rule judges the photo lines, and that the autopilot chooses its turns onto the first line and
+    off the last line.
     """
     has_stated_corridor = requirements.setup.scenario.limits.corridor_m is not None
     return [
@@ -71,10 +72,10 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
 
 
 def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
-    """Return the rows of a leg; for the leg after a take-off, only the rows after the aircraft joined the leg.
+    """Return the rows of a leg; for the leg after a take-off, only the rows after the aircraft joined it.
 
-    The aircraft has joined the leg once it flies on the leg's course and within the limit (m) of its line.  A take-off
-    ends on the launch course, which may differ from the course of the leg.
+    The aircraft has joined the leg once it flies on the leg's course and within the limit (m) of the leg's line.
+    Before, it may still be on the launch course, on which a take-off ends.
     """
     rows, ground = aligned.leg_rows(leg), requirements.ground_phases
     if ground is None or ground.procedures.take_off is None or ground.procedures.take_off.waypoint != leg:

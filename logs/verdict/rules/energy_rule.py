@@ -49,8 +49,8 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    The energy at which a battery failsafe leaves the mission is the limit if it is smaller.  An endless jump fails.  A
-    guessed battery is not judged, and neither is an energy that may exceed the limit if the model's power is uncertain.
+    If a battery failsafe aborts the mission earlier, the energy used up to then is the limit.  An endless jump fails.
+    Nothing is judged if the battery is guessed, or if the model's power is too uncertain.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
@@ -76,8 +76,8 @@ def energy_findings(
     else:
         reason = _used_text(requirements, energy, max_current, is_empty=is_empty)
         if geometric or math.isfinite(planned_energy):
-            flown_text = f"; {planned_energy:.1f} Wh{' for the whole mission' if is_cut_short else ''}"
-            reason += f"{'' if geometric else flown_text} by prediction"
+            mission_text = " for the whole mission" if is_cut_short else ""
+            reason += " (predicted)" if geometric else f"; predicted: {planned_energy:.1f} Wh{mission_text}"
         if is_guessed:
             reason = f"{GUESSED_BATTERY_TEXT}; {reason}"
         elif energy > limit and not failsafe_text:
@@ -109,8 +109,8 @@ def energy_findings(
 def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     """Return the energy that a flight may use, Wh, the limit's source, and a clause on a battery failsafe.
 
-    The clause is "" if the reserve is reached before any failsafe's charge.  The share of one of several batteries in
-    the used charge is unknown, so their failsafes set no limit.
+    The clause is "" if the reserve is reached before any failsafe acts.  With several batteries, their failsafes set no
+    limit, because the share of each battery in the used charge is unknown.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
@@ -130,14 +130,17 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
 
 
 def _max_energy_text(max_energy: float, source: str) -> str:
-    """Return a clause on the upper end of the needed energy, Wh.  source: source of the aircraft's power."""
+    """Return a clause on the most energy that the flight may need, Wh.
+
+    source: source of the aircraft's power.
+    """
     return f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
 
 
 def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, energy_ratio: float) -> list[Message]:
-    """Return a fault if a jump is endless, with the number of rounds for which the usable energy (Wh) lasts.
+    """Return a fault if a jump is endless, with the number of rounds that the usable energy (Wh) permits.
 
-    energy_ratio: ratio of the energy as flown to the prediction; 1 if it is not known.
+    energy_ratio: ratio of the flown energy to the predicted energy; 1 if it is not known.
     """
     route = requirements.setup.route
     if route.endless_jump is None:
@@ -161,7 +164,8 @@ def _endless_jump_faults(requirements: RouteRequirements, usable_energy: float, 
     repeats = math.floor((usable_energy / energy_ratio - first_energy) / round_energy)
     if repeats < 0:
         return [message(f"{fault}, but the energy does not last for one round")]
-    return [message(f"{fault}, but the energy lasts for {count_text(repeats + 1, 'round')}, with a count of {repeats}")]
+    rounds_text = count_text(repeats + 1, "round")
+    return [message(f"{fault}, but the energy lasts for only {rounds_text}: set its count to {repeats}")]
 
 
 def _energy_without_jump(requirements: RouteRequirements) -> float:
@@ -232,17 +236,18 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
                 share_text = f", of {charge_used:.0f} mAh from several monitored batteries"
                 messages.undecided.append(message(f"{name} {limit_text}{share_text}"))
             else:
-                messages.faults.append(message(f"{name} {limit_text}, and the flight needs {charge_used:.0f} mAh"))
+                messages.faults.append(message(f"{name} {limit_text}, but the flight needs {charge_used:.0f} mAh"))
     if return_time_fault := _return_time_fault(requirements, energy_used):
         messages.undecided.append(return_time_fault)
-    clause = f"; whether the battery falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
+    clause = f"; not judged: whether the battery reaches {' or '.join(unjudged)}, which leaves the mission"
     return messages._replace(unjudged_text=clause if unjudged else "")
 
 
 def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> Message | None:
-    """Return a message if the battery may last only for the return before the mission ends; None if it lasts longer.
+    """Return a message if the battery's remaining time may trigger a return before the mission ends, else None.
 
-    The remaining time is that at the end of the mission, and the return the longest: both are bounds for all times.
+    The test compares the shortest remaining time, which is at the end of the mission, with the time of the longest
+    return.  It thus covers all times of the mission.
     """
     failsafe = requirements.setup.autopilot.checks.return_time_failsafe
     if failsafe is None:
@@ -264,10 +269,10 @@ def _return_time_fault(requirements: RouteRequirements, energy_used: float) -> M
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a voltage failsafe may act before the battery is down to its reserve; return "" if it does not.
+    """Explain why a voltage failsafe may act before the battery is down to its reserve; otherwise return "".
 
-    The voltage of a battery under load is not simulated.  A healthy battery with its reserve left has more than
-    `EMPTY_CELL_VOLTAGE_V` in each cell; the number of cells follows from `NOMINAL_CELL_VOLTAGE_V`.
+    The voltage of a battery under load is not simulated.  While the reserve is left, a healthy battery has more than
+    `EMPTY_CELL_VOLTAGE_V` in each cell.  The number of cells is calculated with `NOMINAL_CELL_VOLTAGE_V`.
     """
     setup = requirements.setup
     if math.isfinite(failsafe.remaining_fraction):

@@ -39,6 +39,7 @@ def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
     moves = planned_moves(route_requirements(setup, envelope=False))
 
     def is_entered(zone: Zone) -> bool:
+        """Return True if the planned path violates a zone by more than rounding."""
         return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING_M)
 
     return is_entered
@@ -49,7 +50,7 @@ def fence_findings(
 ) -> list[Finding]:
     """Judge each zone that the planned path or the flight touches; return [] without zones.
 
-    If no zone is violated, the first finding says so.
+    If no zone is violated, the first finding states this.
     """
     airspace = requirements.airspace
     findings = []
@@ -98,10 +99,11 @@ def _compliance_finding(
 ) -> Finding:
     """Return the finding that no judged zone is violated, with the distance to the nearest zone.
 
-    planned_visits, flown_visits: one record for each zone, none of which is violated; see `zone_visits`.
+    planned_visits, flown_visits: one record for each zone; see `zone_visits`.
     """
     airspace, corridor = requirements.airspace, requirements.setup.corridor
-    count, visits = len(airspace.zones), planned_visits if flown_visits is None else flown_visits
+    count = len(airspace.zones)
+    visits = planned_visits if flown_visits is None else flown_visits
     nearest_zone = int(visits["depth"].argmax())
     margin = -float(visits[nearest_zone].depth)
     reason = f"none of {count} zones is violated" if count > 1 else "the zone is not violated"
@@ -136,7 +138,7 @@ def _zone_finding(
 ) -> Finding:
     """Judge how deep the flight violates one zone, or the planned path if nothing was flown.
 
-    The finding is undecided if no violation is known and the terrain below the zone is unknown in places.
+    The finding is undecided if no violation is known but the terrain below the zone is partly unknown.
     """
     airspace = requirements.airspace
     zone = airspace.zones[zone_number]
@@ -144,18 +146,18 @@ def _zone_finding(
     ok: bool | None = visit.depth <= ROUNDING_M
     if ok and visit.unknown:
         ok = None
-    side_text, entry_text, exit_text = ("inside", "enters it", "leaves it")
+    side_text, deepest_text, entry_text, exit_text = ("inside", "deepest", "enters it", "leaves it")
     if zone.kind == "inclusion":
-        side_text, entry_text, exit_text = ("outside", "leaves it", "enters it again")
+        side_text, deepest_text, entry_text, exit_text = ("outside", "farthest out", "leaves it", "enters it again")
+    subject = "path" if flown_visit is None else "flight"
     faults, notes = [], []
     if visit.depth > ROUNDING_M:
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
-                f" at {_event_text(requirements, visit, 'at')}, for {visit.violation_time:.1f} s in all:"
-                f" {entry_text} at {_event_text(requirements, visit, 'entry')}"
-                f" and {exit_text} at {_event_text(requirements, visit, 'exit')}"
-                + (f"; {visit.entries} violations" if visit.entries > 1 else ""),
+                f"; the {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, is {deepest_text} at"
+                f" {visit.at_time:.1f} s and {exit_text} at {visit.exit_time:.1f} s; {visit.violation_time:.1f} s"
+                f" {side_text} in all" + (f" ({visit.entries} violations)" if visit.entries > 1 else ""),
             )
         )
     elif visit.depth > 0.0:

@@ -161,8 +161,9 @@ def go_around_findings(
 ) -> list[Finding]:
     """Judge the go-around of a mission that lands and has a home.
 
-    A go-around with a fault is only a warning, unless the scenario requires go-arounds: then it fails, and an unjudged
-    go-around leaves the verdict undecided.  Return [] if there is nothing to judge and no requirement.
+    If the scenario requires go-arounds, a faulty go-around fails, and an unjudged go-around leaves the verdict
+    undecided.  Otherwise, a fault is only a warning.  Return [] if there is nothing to judge and go-arounds are not
+    required.
     """
     requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
     setup = requirements.setup
@@ -188,7 +189,7 @@ def go_around_findings(
 def _find_landing(
     requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem
 ) -> _Landing | None:
-    """Return the landing at a waypoint, or None if its glide or the climb height of its go-around is not known."""
+    """Return the landing at a waypoint; None if its glide or its go-around's climb height is not known."""
     setup, leg = requirements.setup, waypoint - 1
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
@@ -198,10 +199,8 @@ def _find_landing(
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
     climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
     destinations = _go_around_destinations(requirements, waypoint)
-    ground_altitude, terrain_altitude = (
-        setup.route.landing_ground,
-        float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
-    )
+    ground_altitude = setup.route.landing_ground
+    terrain_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
     if (
         climb_height is None
         or ground_altitude is None
@@ -233,7 +232,7 @@ def _find_landing(
 
 
 def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> tuple[LandingStart, ...]:
-    """Return the landing sequences to which a go-around may fly; without any, the waypoint before the landing."""
+    """Return the destinations of a go-around: landing sequences, or else the waypoint before the landing."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
     previous_item = int(setup.route.items[waypoint - 1])
@@ -321,7 +320,7 @@ def _go_around_finding(
 
 
 def _abort_distances(landing: _Landing) -> Floats:
-    """Return the abort points from the glide's start to its flare, as distances before the landing point, m, (n,)."""
+    """Return abort points from the start of the glide to its flare: distances before landing, m, (n,)."""
     last_distance = min(landing.leg_length, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
     point_count = min(_MAX_ABORT_POINTS, max(2, math.ceil((landing.leg_length - last_distance) / _ABORT_SPACING_M) + 1))
     return np.linspace(landing.leg_length, last_distance, point_count)
@@ -395,7 +394,7 @@ def _judge_go_around(
     destination: LandingStart,
     top_altitude: float,
 ) -> _GoAround:
-    """Return the go-around with the outcome of its simulated path filled in.
+    """Judge a simulated go-around, and return it with its outcome.
 
     result: record of dtype `flight.autopilots.simulated_returns.RETURN_RESULT`.
     positions: one point a second, m, (n, 3).
@@ -465,7 +464,7 @@ def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
 def _required_heights(terrain: Terrain, destination: LandingStart, points: Floats) -> Floats:
     """Return the required heights above ground on the path back, m: an array (n,) for `points` (n, 3).
 
-    Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, the destination's own height is required.
+    Near a destination below `GO_AROUND_CLEARANCE_M`, only the height of the destination is required.
     """
     required = np.full(len(points), GO_AROUND_CLEARANCE_M)
     for east, north, up in (start.position for start in (destination, *destination.next_stops)):
@@ -479,7 +478,7 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Return the next higher climb height above home at which every go-around is clear of obstacles, m; NaN if none is.
+    """Find a higher climb height above home with which all go-arounds are clear, m; NaN without one.
 
     worst_distance: abort point to try first, as a distance before the landing point, m.
 

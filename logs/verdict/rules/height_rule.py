@@ -62,8 +62,8 @@ def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Float
 
     points: ends of the segments as east, north and up, m, (n, 3).
 
-    The place is a fraction of the segment.  The maximum is exact for bilinear ground, because it is the minimum height
-    in the inverted world.  It is NaN if a segment leaves the raster or its data.
+    The place is a fraction of the segment.  The maximum is exact for bilinear ground.  It is found as a minimum height,
+    with path and ground turned upside down.  It is NaN if a segment leaves the raster or its data.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     inverted_heights, fraction = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
@@ -101,7 +101,7 @@ class _LegMaxima:
 
 
 def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
-    """Return the maximum height above ground and the maximum altitude on some segments of a path; None without any."""
+    """Return the maximum height above ground and the maximum altitude on segments; None without segments."""
     if not segments.size:
         return None
     amsl = float(max(path.points[segments, 2].max(), path.points[segments + 1, 2].max()))

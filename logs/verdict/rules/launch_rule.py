@@ -104,9 +104,10 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
 
 
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
-    """Return the minimum height above ground after the launch run, and where it occurs as a distance along the path, m.
+    """Return the minimum height above ground after the launch run, m, and its distance along the path, m.
 
-    The height is inf if the take-off ends within the launch run, NaN without terrain; the distance is then NaN.
+    If the take-off ends within the launch run, the height is inf.  Without terrain it is NaN. In both cases, the
+    distance is NaN.
     """
     terrain, (position, distances) = requirements.setup.scenario.terrain, path
     if terrain is None:
@@ -142,7 +143,7 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
 def _describe_take_off(
     take_off: TakeOff, track: Track, distances: Floats, clearance: float, terrain: Terrain | None
 ) -> list[str]:
-    """Describe course, launch method, climb and minimum height above ground (m) of a take-off, in a list of phrases."""
+    """Describe a take-off in phrases: course, launch method, climb and minimum height above ground (m)."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     notes = [f"launched on a runway on {course}°"]
     if method != "runway":

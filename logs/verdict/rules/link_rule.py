@@ -126,9 +126,9 @@ def _unknown_station_text(requirements: RouteRequirements, link: RadioLink) -> s
 
 
 def _end_of_reactions(requirements: RouteRequirements, aligned: AlignedTrack | None) -> float:
-    """Return the time from which on a loss of the link changes nothing, s; inf without such a time.
+    """Return the time from which a loss of the link no longer has an effect, s; inf without such a time.
 
-    The aircraft then returns in any case, or ArduPlane is in a landing sequence
+    From then on, the aircraft is returning anyway, or ArduPlane is in a landing sequence
     (`Plane::failsafe_in_landing_sequence`).
 
     aligned: None for the planned path.
@@ -166,7 +166,7 @@ def _judge_reaction_returns(
     reactions: Sequence[LinkLossReaction],
     fly_again: FlyAgain | None,
 ) -> Returns | None:
-    """Judge the returns that begin in an outage after the autopilot has noticed it, as other returns are judged.
+    """Judge the returns that begin during an outage after the autopilot has noticed it.
 
     Return None if no reaction is a return, or for a mission without a home.
 
@@ -185,9 +185,9 @@ def _judge_reaction_returns(
 
 
 def _starts_in_outages(starts: ReturnStarts, outages: Sequence[Outage], delay: float, interval: float) -> ReturnStarts:
-    """Return the starts of returns that lie in an outage after the autopilot has noticed it.
+    """Return the starts of returns during outages, from the time at which the autopilot has noticed them.
 
-    One start before and after this time is included.
+    One start before and one start after each such period is included.
 
     delay: time for which a link is lost before the autopilot notices it, s.
     interval: time between starts, s.

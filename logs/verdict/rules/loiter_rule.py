@@ -92,7 +92,7 @@ def _circle_center(requirements: RouteRequirements, i: int) -> Floats:
 def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
+    """Merge the findings on the corners of each loiter; on its legs, keep only each rule's worst finding."""
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -107,12 +107,9 @@ def merge_loiter_findings(
 
     for circle in loiter_circles(requirements):
         # If the mission ends on this loiter, its last waypoint belongs to the loiter.
-        last_items = requirements.setup.route.items[circle.last : circle.last + 2]
-        last = (
-            circle.last + 1
-            if joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
-            else circle.last
-        )
+        last_items = requirements.setup.route.items[circle.last : circle.last + 2].tolist()
+        includes_end = joins_at_center and len(last_items) == 2 and last_items[0] == last_items[1]
+        last = circle.last + 1 if includes_end else circle.last
         corner_findings = remaining_findings(
             ("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)]
         )
@@ -144,10 +141,10 @@ def end_loiter_findings(
 ) -> list[Finding]:
     """Judge the loiter without end after the last waypoint.
 
-    The finding fails if the wind is too strong for a circle, since the aircraft then drifts downwind without end.
-    Before a flight, a finding on the hazards around the loiter is returned otherwise.
+    The finding fails if the wind is too strong for a circle, because the aircraft then drifts downwind.  If the wind
+    permits a circle, hazards around the loiter are reported before a flight, and nothing after a flight.
 
-    Return [] if the mission does not end in such a loiter, or if a flight is judged and the wind permits a circle.
+    Return [] if the mission does not end in such a loiter.
     """
     reach_and_hazards = end_loiter_hazards(requirements)
     if reach_and_hazards is None:
@@ -247,7 +244,7 @@ def _loiter_finding(
 
 
 def _may_pass(requirements: RouteRequirements, circle: LoiterCircle) -> bool:
-    """Return True if a loiter that is too small may be held, because the aircraft's bank limit is a guess."""
+    """Return True if a loiter that is too small may be flyable, as the aircraft's bank limit is a guess."""
     return circle.radius >= _min_radius(requirements, circle, possible=True) - LOITER_RADIUS_TOLERANCE_M
 
 
@@ -270,7 +267,7 @@ def _corner_faults(
 def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possible: bool = False) -> float:
     """Return the radius of a loiter at the bank limit, for the courses of its arcs, m.
 
-    A loiter without end meets every course, also if the route follows it for a part of a lap only.
+    A loiter without end meets every course, even if the route contains only a part of its lap.
 
     possible: True for the largest bank limit that the aircraft may have.
     """
@@ -281,10 +278,8 @@ def _min_radius(requirements: RouteRequirements, circle: LoiterCircle, *, possib
     loiter = None if item is None else stated_loiter(item)
     if loiter is None or not loiter.endless:
         return min_radius
-    altitude, airspeed = (
-        float(requirements.points[circle.first, 2]),
-        float(requirements.route.leg_airspeeds[circle.first - 1]),
-    )
+    altitude = float(requirements.points[circle.first, 2])
+    airspeed = float(requirements.route.leg_airspeeds[circle.first - 1])
     bank_ratio = math.tan(requirements.limits.max_bank) / math.tan(requirements.possible_bank) if possible else 1.0
     # Two half laps cover all courses.
     return max(
@@ -312,16 +307,16 @@ def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
 def _flown_facts(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, radii: Floats
 ) -> list[str]:
-    """Return texts on how a loiter was flown: its number of laps, if known, and its radii (m, (n,))."""
+    """Describe how a loiter was flown: its number of laps, if known, and its radii (m, (n,))."""
     laps = _flown_laps(requirements, aligned, circle)
     laps_text = "" if math.isnan(laps) else f"{laps:.2f} laps "
     return [f"{laps_text}flown at {radii.min():.1f} to {radii.max():.1f} m from the center"] if radii.size else []
 
 
 def _flown_laps(requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle) -> float:
-    """Return the number of laps that an aircraft flew around a loiter's center between the stops before and after it.
+    """Return the number of laps around a loiter's center, flown between the stops before and after it.
 
-    The result is NaN without a flight, if the flight did not reach the loiter's last corner, and for an autopilot that
+    The number is NaN without a flight, if the flight did not reach the last corner of the loiter, or if the autopilot
     follows the corners as they are drawn.
     """
     follows_corners = not requirements.setup.autopilot.loiters.steers_to_center
@@ -341,7 +336,8 @@ def _is_whole(requirements: RouteRequirements, aligned: AlignedTrack | None, cir
     """
     seq = int(requirements.setup.route.items[circle.first])
     loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
-    is_to_altitude, laps = loiter is not None and loiter.to_altitude, _flown_laps(requirements, aligned, circle)
+    is_to_altitude = loiter is not None and loiter.to_altitude
+    laps = _flown_laps(requirements, aligned, circle)
     return math.isfinite(laps) and (is_to_altitude or laps >= circle.laps - LOITER_LAPS_TOLERANCE)
 
 
@@ -360,10 +356,10 @@ def _held_bank(
 ) -> float:
     """Return the bank held in a loiter that is tighter than the bank limit allows, rad.
 
-    min_radius: radius at the bank limit, m.
+    The bank is the largest one-second mean of the measured bank.  Without a measurement, it is the bank that the
+    loiter's radius needs, up to the autopilot's limit.
 
-    It is the largest one-second mean of the measured bank.  Without a measurement, it is the bank needed for the
-    loiter's radius, up to the autopilot's limit.
+    min_radius: radius at the bank limit, m.
     """
     measured_banks = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
     if measured_banks:
@@ -384,7 +380,7 @@ def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_rad
 
 
 def _unjudge_if_unreached_corner(aligned: AlignedTrack | None, corner_finding: Finding) -> Finding:
-    """Return a finding as not judged if it fails only because the flight ended before its corner.
+    """Mark a finding as not judged if it fails only because the flight ended before its corner.
 
     The completion rule judges such an end.
     """
@@ -396,7 +392,7 @@ def _unjudge_if_unreached_corner(aligned: AlignedTrack | None, corner_finding: F
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:
     """Return True if the flight reached a loiter.
 
-    The corners do not show this, because a flight that leaves the loiter when its time is over may miss all of them.
+    The corners cannot show this: a flight that leaves the loiter when its time is over may miss all of them.
     """
     distances, _ = closest_approaches(aligned.track.position, circle.center)
     turn_distance = requirements.setup.autopilot.turns.distance(math.pi, float(requirements.points[circle.first, 2]))
@@ -407,7 +403,8 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
-    speed, bank_text = float(requirements.route.leg_airspeeds[circle.first]), bank_limit_text(requirements.setup)
+    speed = float(requirements.route.leg_airspeeds[circle.first])
+    bank_text = bank_limit_text(requirements.setup)
     need_text = f"at {speed:.0f} m/s and {bank_text} the aircraft needs {min_radius:.0f} m"
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"

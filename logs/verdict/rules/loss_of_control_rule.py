@@ -24,7 +24,7 @@ from world.wording import count_text
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flight by its unusable rows, maximum bank, minimum airspeed and ground contact.
+    """Judge a flight by unusable rows, maximum bank, minimum airspeed and ground contact.
 
     Return [] before a flight; without usable rows, the finding is not judged.
     """
@@ -110,14 +110,14 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
 
 
 def _time_text(time: float) -> str:
-    """Describe a time (s); a time that is not finite is "without a time"."""
+    """Describe a time (s), or return "without a time" if it is not finite."""
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 
 def _min_flying_airspeeds(requirements: RouteRequirements, altitude: Floats) -> Floats:
     """Return the minimum airspeed of controlled flight at each altitude (m AMSL), m/s.
 
-    It is a fixed airspeed for the Aerosonde, and a multiple of the minimum level speed for other aircraft.
+    For the Aerosonde it is a fixed airspeed; for other aircraft, a multiple of the minimum level speed.
     """
     if requirements.setup.aircraft == "aerosonde":
         return np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)

@@ -95,29 +95,34 @@ _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 def _universal_findings(remarks_by_check: list[list[_Remark]]) -> list[Finding]:
     """Return a finding for each of PX4's checks that fails for every autopilot, without PX4's name for it.
 
-    What only PX4 refuses says nothing about a mission that ArduPlane flies.
+    Items that only PX4 refuses are left out, because they do not concern a mission that ArduPlane flies.
     """
-    failures = [[remark for remark in remarks if remark[0] is False] for remarks in remarks_by_check]
-    return [
-        make_finding(
-            "mission",
-            Place("mission", item=item),
-            ok=False,
-            reason=f"{fault.text}{f' (+{len(remarks) - 1} more)' if len(remarks) > 1 else ''}",
-            faults=[fault],
-            source="mission",
-            method="mission items",
+    findings = []
+    for remarks in remarks_by_check:
+        failures = [remark for remark in remarks if remark[0] is False]
+        if not failures:
+            continue
+        _, item, reason = failures[0]
+        fault = reason if isinstance(reason, Message) else message(reason)
+        more_text = f" (+{len(failures) - 1} more)" if len(failures) > 1 else ""
+        findings.append(
+            make_finding(
+                "mission",
+                Place("mission", item=item),
+                ok=False,
+                reason=f"{fault.text}{more_text}",
+                faults=[fault],
+                source="mission",
+                method="mission items",
+            )
         )
-        for remarks in failures
-        for _, item, reason in remarks[:1]
-        for fault in [reason if isinstance(reason, Message) else message(reason)]
-    ]
+    return findings
 
 
 def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
     """Merge the remarks of a check into one finding.
 
-    refuses: True if PX4 is to fly, so that the items that it refuses fail.
+    refuses: True if PX4 is to fly: items that it refuses then fail.
     """
     verdict = False if refuses else None
     sorted_remarks = [(verdict if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
@@ -130,7 +135,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
         "mission",
         Place("mission", item=item),
         ok=ok,
-        reason=f"{first_message.text}{more_text} (PX4 {check})",
+        reason=f"{first_message.text}{more_text} (PX4 function {check})",
         faults=[first_message],
         source="PX4",
         method="mission items",
@@ -139,7 +144,7 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
 
 
 def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
-    """Return a finding if ArduPlane is to fly and refuses items at upload that PX4 accepts, otherwise []."""
+    """Return a finding on items that ArduPlane refuses at upload but PX4 accepts; [] for other autopilots."""
     refused_items = [
         item
         for item in setup.mission.items
@@ -156,7 +161,7 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
             "mission",
             Place("mission", item=refused_items[0].seq),
             ok=False,
-            reason=f"{fault.text} (ArduPlane mavlink_int_to_mission_cmd)",
+            reason=f"{fault.text} (ArduPlane function mavlink_int_to_mission_cmd)",
             faults=[fault],
             source="ArduPlane",
             method="mission items",
@@ -168,9 +173,8 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
 def _unjoined_finding(setup: FlightSetup) -> Finding:
     """Report a waypoint inside the circle of a loiter, or two loiters without a common tangent.
 
-    The path between them is not laid out, so it is not judged.  For an imported flight this is undecided, not a fault:
-    see
-    `logs.verdict.rules.completion_rule.imported_completion_finding`.
+    The path to such a waypoint or loiter is not constructed, so it is not judged.  For an imported flight the finding
+    is undecided: see `logs.verdict.rules.completion_rule.imported_completion_finding`.
     """
     first_stop, *other_stops = setup.route.unjoined_stops
     autopilot = setup.autopilot.title
@@ -204,9 +208,9 @@ _REENTRY_MARKS = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
 def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     """Report navigation items after the mission's end, which are never reached.
 
-    Items after a return to launch fail.  Items after a landing or an endless loiter are reached only if somebody sets
-    the next item, so they leave the verdict undecided.  Items of a landing sequence or of a return path belong after
-    the end, and items that a jump skips are skipped on purpose: neither are reported.
+    Items after a return to launch fail.  Items after a landing or an endless loiter are reached only if the pilot
+    selects the next item, so they leave the verdict undecided.  Three kinds of items are not reported: items of a
+    landing sequence and of a return path, which belong after the end, and items that a jump skips on purpose.
     """
     items = setup.mission.items
     if setup.source is not None or not any(item.command in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH} for item in items):
@@ -266,7 +270,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
     if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
-        steepest_text = f"{max(map(abs, slopes)):.1%}: a touchdown is judged on up to {STEEPEST_STRIP_SLOPE:.0%} only"
+        steepest_text = f"{max(map(abs, slopes)):.1%}; a touchdown is judged only on up to {STEEPEST_STRIP_SLOPE:.0%}"
         reason = f"NAV_LAND: the ground there slopes by {steepest_text}"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
@@ -277,12 +281,14 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
         texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
     for seq, text in [*remarks, *settings]:
+        # What can be done about it is not part of the headline.
+        brief, separator, rest = text.partition("; ")
         yield make_finding(
             "mission",
             Place("mission", item=seq),
             ok=None,
             reason=text,
-            faults=[message(text if seq is None else f"item {seq}: {text}")],
+            faults=[message(brief if seq is None else f"item {seq}: {brief}", separator + rest)],
             source="route",
             method="mission items",
             check=NOT_FLOWN,
@@ -290,7 +296,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
 
 
 def _mission_parts(setup: FlightSetup) -> MissionParts:
-    """Collect the properties of a mission on which the effect of settings depends."""
+    """Collect the properties of a mission that decide which settings have an effect."""
     items, procedures = setup.mission.items, setup.ground_phases
     commands = {item.command for item in items}
     pairs = itertools.pairwise(_flown_items(setup.mission))
@@ -327,7 +333,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
 
 
 def _rally_distance(mission: Mission) -> float:
-    """Return the distance of the nearest rally point from home, m; infinite without one, NaN without a home."""
+    """Return the distance of the nearest rally point from home, m; inf without one, NaN without a home."""
     if mission.home is None:
         return math.nan if mission.rally else math.inf
     origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
@@ -338,7 +344,7 @@ def _rally_distance(mission: Mission) -> float:
 
 
 def _home_fence_violation(setup: FlightSetup) -> str:
-    """Return how home violates the mission's fence, such as "inside an exclusion polygon"; "" if it does not."""
+    """Describe how home violates the mission's fence, such as "inside an exclusion polygon"; else return ""."""
     mission, checks = setup.mission, setup.autopilot.checks
     if mission.home is None or not mission.fences:
         return ""
@@ -348,7 +354,7 @@ def _home_fence_violation(setup: FlightSetup) -> str:
 
 
 def _full_voltage(setup: FlightSetup) -> float:
-    """Return the voltage of the full battery, V; infinite without a battery, and for a guessed battery."""
+    """Return the voltage of the full battery, V; inf without a battery or for a guessed battery."""
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 
@@ -372,8 +378,8 @@ _PX4_LOCATED_COMMANDS = frozenset(
 def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
     """Yield a remark on each item that PX4 refuses at upload.
 
-    refuses: True if PX4 is to fly; a command without coordinates in a frame with coordinates is only then reported,
-        because every file of Mission Planner has such commands.
+    refuses: True if PX4 is to fly.  Only then a command without coordinates in a frame with coordinates is reported,
+        because every Mission Planner file contains such commands.
     """
     for item in mission.items:
         name, support = command_name(item.command), command_support(item.command)
@@ -437,10 +443,10 @@ def _check_landing(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimits) -> Iterator[_Remark]:
-    """Yield a remark on each landing whose approach PX4 would reject, or whose approach has an unknown height.
+    """Yield a remark on each landing approach that PX4 would reject, or whose height is unknown.
 
-    PX4 rejects an approach that begins with an unsupported item, below the landing point, or in an orbit around it, and
-    an approach that is too steep.
+    PX4 rejects an approach that is too steep, or that begins with an unsupported item, below the landing point, or in
+    an orbit around it.
     """
     max_angle = math.degrees(limits.landing_angle)
     for previous, item in zip(mission.items, mission.items[1:], strict=False):
@@ -470,7 +476,7 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimi
 
 
 def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: bool) -> Iterator[_Remark]:
-    """Yield one remark on whether the mission has the take-off and landing that MIS_TKO_LAND_REQ requires.
+    """Yield a remark if the mission lacks the take-off or landing that MIS_TKO_LAND_REQ requires.
 
     A missing item is refused only if the user's parameter file states the requirement.
     """
@@ -541,7 +547,7 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
     """Yield a remark on each flown item below home.
 
-    If the file has no home, the check ends with a remark on the first item whose height is above home.
+    If the file has no home, the check yields a remark on the first item with a height above home, and stops.
     """
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:

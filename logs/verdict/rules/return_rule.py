@@ -56,7 +56,8 @@ def return_findings(
 ) -> list[Finding]:
     """Judge the destination of a planned RTL, and whether an imported flight completed its RTL.
 
-    `flown_return_findings` judges planfly's own flights, because their track does not show how they ended.
+    Flights simulated by planfly are judged by `flown_return_findings`, because their track does not show how they
+    ended.
     """
     if geometric:
         required_findings = _requirement_findings(
@@ -142,7 +143,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge the scenario's requirements on RTLs and glides from the whole path; return [] without requirements.
+    """Judge whether RTLs and glides from the whole path meet the scenario's requirements; [] without any.
 
     starts: function that samples the starts of RTLs at an interval, s.
     """
@@ -163,7 +164,8 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     ok = False if False in results else None if None in results else True
     # Failures come first, then unknown answers.
     answers.sort(key=lambda answer: (answer.ok is not False, answer.ok is not None))
-    reason, method = "; ".join(answer.reason for answer in answers), "; ".join(answer.method for answer in answers)
+    reason = "; ".join(answer.reason for answer in answers)
+    method = "; ".join(answer.method for answer in answers)
     method = f"one return every {interval:.0f} s of the route, {method}"
     # An unknown answer to a requirement leaves the verdict undecided.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
@@ -225,7 +227,7 @@ _JUDGES: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Requir
 def has_completed_return_loiter(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
     """Return True if a track contains at least one lap of the RTL loiter and the loiter's full duration.
 
-    The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
+    The duration starts when the aircraft is near the center and at the loiter's altitude, as in a simulated flight
     (`flight.simulation.tick.update_rtl_loiter`).
     """
     loiter, arrival_circle = requirements.setup.route.rtl_loiter, rtl_arrival_circle(requirements.setup.route)
@@ -254,7 +256,7 @@ def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reas
 def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
     """Return one finding on the path of the mission's RTL, or [] for a mission without an RTL.
 
-    ok: result of the finding; it becomes None if the destination of the RTL is unknown.
+    ok: result of the finding; replaced by None if the destination of the RTL is unknown.
     outcome: text on how far the RTL was flown.
     """
     route = requirements.setup.route
@@ -262,7 +264,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
-    reason = f"by the simulated {requirements.setup.autopilot.title}: {note_text}; {outcome}"
+    reason = f"the simulated {requirements.setup.autopilot.title} returns {note_text}; {outcome}"
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")
     faults = []
     if unknown_reason and requirements.setup.source is None:
@@ -285,7 +287,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
 def without_path_following_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Return the findings without those on how well the RTL follows its drawn path.
+    """Remove the findings on how well the RTL follows its drawn path.
 
     findings: all findings, including the finding on the RTL itself.
     """
@@ -318,7 +320,7 @@ def without_path_following_findings(
 def _suggest_end_loiter(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a loiter without end instead of a last waypoint from which the return by itself fails."""
+    """Suggest a loiter without end at the last waypoint, if the automatic return from there fails."""
     setup, end = requirements.setup, requirements.waypoint(requirements.legs)
     commands = {item.seq: item.command for item in setup.mission.items}
     is_waypoint = commands.get(-1 if end.item is None else end.item) == Command.NAV_WAYPOINT

@@ -65,7 +65,7 @@ def slope_findings(
 def _leg_finding(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None, *, is_complete: bool
 ) -> Finding:
-    """Judge a leg's planned slope, and after a flight also the flown slope, altitude, throttle and climb performance.
+    """Judge a leg's planned slope; after a flight also its flown slope, altitude, throttle and performance.
 
     measure: None before a flight.
     is_complete: True if the flight reached the last waypoint.
@@ -132,14 +132,14 @@ def _fit_text(fit: LegFit) -> str:
 def _flown_messages(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults of a leg as flown, and facts.
+    """Return the faults and facts of a leg as flown.
 
-    If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error on
-    the leg is only reported.
+    If the aircraft's limits apply, the leg is judged by them and by a lack of performance in the flight; the height
+    error is then only reported.
     """
     faults = [*_rate_limit_faults(requirements, leg, measure), *_performance_faults(requirements, leg, measure)]
     need_text = f"; the leg needs {math.degrees(abs(float(requirements.slopes[leg]))):.1f}°"
-    # Said once, with the first of the faults.
+    # The text on the leg's slope is added to the first fault only.
     performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
@@ -151,9 +151,9 @@ def _flown_messages(
 def _planned_slope_messages(
     requirements: RouteRequirements, leg: int, limit: float, source: str
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults of a leg's planned slope, and facts.
+    """Return the faults and facts of a leg's planned slope.
 
-    A leg that is too steep, but only a negligible step in height, is reported as a fact.
+    If a leg that is too steep is only a negligible step in height, this is a fact, not a fault.
     """
     faults: list[Message] = []
     facts: list[str] = []
@@ -186,9 +186,9 @@ class _SteepGround(NamedTuple):
 def _steep_ground(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> _SteepGround | None:
     """Return the ground that a leg cannot follow; None if the height that is missed is negligible.
 
-    A flight decides by the height above ground that it missed, and is limited by the autopilot's rates, too.  Where the
-    ground falls away faster than the aircraft can descend, the aircraft is only higher than the leg demands: the
-    verdict states that height, and it is no fault.
+    After a flight, the missed height above ground decides, and the autopilot's climb and sink rates are limits, too.
+    Ground that falls faster than the aircraft can descend is no fault, because the aircraft is then higher than the leg
+    demands.
     """
     if not follows_ground(requirements, leg):
         return None
@@ -220,7 +220,7 @@ def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _St
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     """Explain why an uncertain aircraft model leaves a slope undecided; return "" if it is decided.
 
-    Only the aircraft's own limits are considered: a tighter limit of the scenario says nothing about its ability.
+    Only the limits of the aircraft are considered, not a tighter limit of the scenario.
     """
     planned_slope, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
     limits, certain_limits, verb = (
@@ -243,7 +243,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
 def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, certain_limit: float) -> float:
     """Return the standard deviation of an uncertain aircraft's limit (rad), over the ground like the limit itself.
 
-    It is the deviation in still air if the certain part of the limit (rad) ends at 0.
+    If the certain part of the limit is 0 rad, it is the deviation in still air.
     """
     envelope = requirements.setup.envelope
     if certain_limit <= 0.0:
@@ -252,9 +252,10 @@ def _limit_deviation(requirements: RouteRequirements, leg: int, limit: float, ce
 
 
 def _ability_text(requirements: RouteRequirements, leg: int, limit: float, source: str, *, has_failed: bool) -> str:
-    """Explain by the aircraft's uncertainty why a slope is undecided, or on which slope the suggestions are based.
+    """Explain how the aircraft's uncertainty leaves a slope undecided, or affects the suggestions.
 
-    Return "" for a certain aircraft, and for a planned slope that is too steep, whose message states the limit (rad).
+    Return "" for a certain aircraft, and for a planned slope that is too steep, because its message states the limit
+    (rad).
     """
     if not has_failed:
         return _uncertainty_text(requirements, leg)
@@ -263,9 +264,9 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State the slope that an uncertain aircraft can certainly fly, on which suggestions are based.
+    """State the slope that an uncertain aircraft can certainly fly, which suggestions use as their limit.
 
-    Return "" if the limit (rad) is certain or is not the aircraft's.
+    Return "" if the limit (rad) is certain, or is not a limit of the aircraft.
     """
     envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
     certain_limit = float((requirements.certain_climb if is_climb else requirements.certain_dive)[leg])
@@ -273,7 +274,8 @@ def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float,
         return ""
     deviation = math.degrees(_limit_deviation(requirements, leg, limit, certain_limit))
     return (
-        f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) {math.degrees(certain_limit):.1f}° is certain"
+        f"with the uncertainty of {envelope.source} (± {deviation:.1f}°) only"
+        f" {math.degrees(certain_limit):.1f}° is certain"
     )
 
 
@@ -305,9 +307,9 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
 
 
 def _is_arc_kept(arc: SteepArc, measure: SlopeMeasure) -> bool:
-    """Return True if a flown arc takes no more height than the tolerance of a leg.
+    """Return True if a flown arc loses no more height than the tolerance of a leg.
 
-    The other rules judge the airspeed and the height above ground that it cost.
+    The other rules judge the airspeed and the height above ground on the arc.
     """
     return measure.is_finished and arc.missing_height <= HEIGHT_ERROR_LIMIT_M
 
@@ -345,10 +347,8 @@ def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
     speed, envelope = float(requirements.route.leg_airspeeds[leg]), requirements.setup.envelope
     for altitude in requirements.points[leg : leg + 2, 2].tolist():
         wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
-        slopes_in_wind, slopes_in_calm_air = (
-            envelope.slope_limits(speed, altitude, *wind),
-            envelope.slope_limits(speed, altitude),
-        )
+        slopes_in_wind = envelope.slope_limits(speed, altitude, *wind)
+        slopes_in_calm_air = envelope.slope_limits(speed, altitude)
         if np.isfinite(slopes_in_calm_air).all() and np.isnan(slopes_in_wind).any():
             tailwind, crosswind = wind
             progress = max(0.0, math.sqrt(max(0.0, speed**2 - crosswind**2)) + tailwind)
@@ -448,7 +448,7 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 
 
 def _aircraft_slope_facts(requirements: RouteRequirements, leg: int) -> list[Fact]:
-    """Return the steepest climb or descent that the aircraft can fly on a leg, which a failed finding exceeds."""
+    """Return the steepest climb or descent that the aircraft can fly on a leg, as a fact of a failed finding."""
     limits = requirements.climb if float(requirements.slopes[leg]) >= 0.0 else requirements.dive
     return [Fact(AIRCRAFT_SLOPE, math.degrees(float(limits[leg])), "deg")]
 
@@ -499,7 +499,7 @@ def _throttle_limit(planned_slope: float) -> str:
 
 
 def _performance_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the aircraft showed less climb or sink ability than the leg needs."""
+    """Return a fault if the aircraft climbed or sank less at the throttle limit than the leg needs."""
     ability, planned_slope = measure.ability, float(requirements.slopes[leg])
     if ability is None or abs(planned_slope) <= LEVEL_SLOPE_RAD:
         return []
@@ -511,8 +511,7 @@ def _performance_faults(requirements: RouteRequirements, leg: int, measure: Slop
     speed = float(requirements.route.leg_airspeeds[leg])
     return [
         message(
-            f"in {ability.duration:.0f} s at {throttle_text} the aircraft showed that"
-            f" it can {verb}"
+            f"measured over {ability.duration:.0f} s at {throttle_text}: the aircraft can {verb} at most"
             f" {math.degrees(ability.slope):.1f}° at {speed:.0f} m/s here",
         )
     ]
@@ -524,7 +523,7 @@ def _height_error_limit(measure: SlopeMeasure) -> float:
 
 
 def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bool) -> tuple[float, str]:
-    """Return the slope over the ground at the autopilot's climb or sink limit on a leg, rad, and the limit's name.
+    """Return the slope over the ground at the autopilot's climb or sink rate limit, rad, and the limit's name.
 
     The slope is infinite without a limit, and in an imported flight whose log does not state the parameter.
     """
@@ -534,14 +533,15 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
     stated_names = {} if parameters is None else parameters.by_origin("file")
     if not rate_limit.name or (setup.source is not None and rate_limit.name.split(" ")[0] not in stated_names):
         return math.inf, ""
-    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    speed = float(requirements.route.leg_airspeeds[leg])
+    altitude = float(requirements.points[leg : leg + 2, 2].mean())
     wind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     slope = ground_slope(math.asin(min(1.0, rate_limit.rate / speed)), speed, *wind)
     return (math.inf if math.isnan(slope) else slope), rate_limit.name
 
 
 def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
-    """Return a fault if the autopilot's climb or sink limit is below a leg's slope, and the flight shows the miss."""
+    """Return a fault if the autopilot's rate limit is below a leg's slope, and the flight missed the slope."""
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
     slope, name = _rate_limit_slope(requirements, leg, is_climb=planned_slope >= 0.0)
@@ -551,7 +551,8 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
         or -sign * measure.height_error <= _height_error_limit(measure)
     ):
         return []
-    speed, altitude = float(requirements.route.leg_airspeeds[leg]), float(requirements.points[leg : leg + 2, 2].mean())
+    speed = float(requirements.route.leg_airspeeds[leg])
+    altitude = float(requirements.points[leg : leg + 2, 2].mean())
     speeds = requirements.setup.autopilot.speeds
     rate = (speeds.climb_limit if sign > 0.0 else speeds.sink_limit).rate
     calm_slope = math.asin(min(1.0, rate / speed))

@@ -68,7 +68,7 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the airspeed on one leg, on which the mission demands a true or equivalent airspeed, m/s."""
+    """Judge the airspeed on one leg; `demanded` is the mission's airspeed, true or equivalent, m/s."""
     commanded = float(requirements.route.leg_airspeeds[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
@@ -131,7 +131,7 @@ def _command_text(demanded: float, commanded: float, min_speed: float, max_speed
     """Describe the commanded airspeed on a leg, and the range of airspeeds in level flight, m/s.
 
     demanded: commanded equivalent airspeed, m/s.
-    commanded: the same command as true airspeed, m/s; named in the text only if it differs.
+    commanded: the commanded airspeed as true airspeed, m/s; the text states it only if it differs.
     """
     true_speed_text = "" if demanded == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(min_speed) and math.isfinite(max_speed)):
@@ -157,9 +157,9 @@ def _find_held_speed(
 ) -> _HeldSpeed | None:
     """Return the airspeed held on a leg if it is far from the command, otherwise None.
 
-    The airspeed is the mean over the second half of the leg's steady rows, because in the first half the autopilot may
-    still change its speed.  Return None also if the leg is too steep for the aircraft, because the slope rule then
-    names the cause, and for an imported flight, because its airspeed sensor may have the same error.
+    The airspeed is the mean over the second half of the leg's steady rows, because in the first half the aircraft may
+    still change its speed.  Return None also in two other cases: if the leg is too steep for the aircraft, because the
+    slope rule then names the cause; and for an imported flight, because its airspeed sensor may have the same error.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE_RAD:
         return None
@@ -169,7 +169,8 @@ def _find_held_speed(
         return None
     middle_row = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
     speed = float(aligned.track.airspeed[middle_row : rows.stop].astype(np.float64).mean())
-    error, allowed_error = speed - commanded, max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
+    error = speed - commanded
+    allowed_error = max(MEAN_SPEED_TOLERANCE_MPS, HELD_SPEED_FRACTION * commanded)
     tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[middle_row]))
     if abs(error) <= allowed_error + tolerance or _is_caused_by_vertical_wind(requirements, aligned, leg, error):
         return None
@@ -182,7 +183,7 @@ def _find_held_speed(
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: float, max_speed: float) -> str:
-    """State an uncertain maximum airspeed, if it leaves a commanded speed undecided or impossible; otherwise ""."""
+    """State an uncertain maximum airspeed that leaves a commanded speed undecided or impossible; else ""."""
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
@@ -229,7 +230,7 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
 
 
 def _nearest_mean_airspeed(aligned: AlignedTrack, leg: int, commanded: float) -> float:
-    """Return the one-second mean airspeed on a leg that is nearest to the command, m/s.
+    """Return the one-second mean of the airspeed on a leg that is nearest to the command, m/s.
 
     On a leg shorter than a second, return the mean over the leg.
     """
@@ -238,7 +239,7 @@ def _nearest_mean_airspeed(aligned: AlignedTrack, leg: int, commanded: float) ->
 
 
 def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the moving one-second means of the airspeed in some rows, m/s; one mean if the rows span less time."""
+    """Return moving one-second means of the airspeed, m/s; a single mean if the rows span less time."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     sums = np.concatenate([[0.0], np.cumsum(speed)])
@@ -246,10 +247,10 @@ def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
 
 
 def _is_caused_by_vertical_wind(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, error: float) -> bool:
-    """Return True if vertical air motion caused a speed error (m/s), instead of a lack of performance.
+    """Return True if a speed error (m/s) was caused by vertical air motion, not by a lack of performance.
 
-    This is assumed if the aircraft was too slow in a climb or too fast in a descent, although it showed the ability to
-    fly the leg's slope.
+    This is assumed if the aircraft was too slow in a climb or too fast in a descent, although the flight shows that it
+    can fly the leg's slope.
     """
     if error * requirements.slopes[leg] >= 0.0:
         return False
@@ -260,17 +261,15 @@ def _is_caused_by_vertical_wind(requirements: RouteRequirements, aligned: Aligne
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return minimum and maximum airspeed (m/s) of level flight on the whole leg, and the command's faults.
+    """Return the airspeed range of level flight on a whole leg, m/s, and faults of the commanded airspeed.
 
     The airspeeds are NaN if level flight is impossible at one end of the leg.
     """
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(altitude) for altitude in altitudes]
     # If level flight is impossible at one altitude, NaN remains for the whole leg.
-    min_speed, max_speed = (
-        float(np.max([lower for lower, _ in speeds])),
-        float(np.min([upper for _, upper in speeds])),
-    )
+    min_speed = float(np.max([lower for lower, _ in speeds]))
+    max_speed = float(np.min([upper for _, upper in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
         number = requirements.leg(leg).number

@@ -46,8 +46,8 @@ def stall_findings(
 ) -> list[Finding]:
     """Judge the minimum margin of airspeed above the stall in a bank; return [] for a route without a turn.
 
-    A route whose speed is below the stall in a bank that it needs fails in flight too, whatever speed was flown: an
-    autopilot that did not accept the speed, or banked less, does not make the route flyable.
+    If a route's airspeed is below the stall speed in a bank that the route needs, the rule also fails after a flight.
+    It does not matter that the autopilot flew faster or banked less: this does not make the route flyable.
     """
     planned = _planned_findings(requirements)
     if geometric:
@@ -63,10 +63,8 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.leg_airspeeds[corner - 1 : corner + 1].tolist():
-            bank, stall_speed = (
-                planned_bank(requirements, corner, speed),
-                min_level_airspeed(requirements, float(requirements.points[corner, 2])),
-            )
+            bank = planned_bank(requirements, corner, speed)
+            stall_speed = min_level_airspeed(requirements, float(requirements.points[corner, 2]))
             margin = _Margin(speed, stall_speed / math.sqrt(math.cos(bank)), stall_speed, bank)
             if (
                 bank > 0.0
@@ -83,10 +81,12 @@ def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
     """Return the bank that a waypoint's turn needs at an airspeed (m/s), up to the bank limit, rad.
 
-    On an arc of radius R the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A turn that ends
-    before the aircraft has rolled in completely needs no more bank than the aircraft reaches by then.
+    On an arc of radius R, the bank is atan(v^2 / (g R)) at the highest ground speed v on the arc.  A short turn ends
+    before the aircraft has rolled in completely: it needs only the bank reached by then.
     """
-    turn, radius, limit = abs(float(requirements.turns[i])), float(requirements.radius[i]), requirements.limits.max_bank
+    turn = abs(float(requirements.turns[i]))
+    radius = float(requirements.radius[i])
+    limit = requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
     # The bank limit's radius belongs to the ground speed of the faster leg.
@@ -110,7 +110,8 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
     """Judge the smallest margin above the stall in a flight; return [] if the margin is never known."""
     track = aligned.track
     width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
-    speed, load = _window_means(track.airspeed, width), _window_means(track.load_factor, width)
+    speed = _window_means(track.airspeed, width)
+    load = _window_means(track.load_factor, width)
     bank = _window_means(np.abs(track.attitude[:, ROLL]), width)
     altitude = _window_means(track.position[:, 2], width)
     envelope = requirements.setup.envelope
@@ -135,7 +136,7 @@ def _window_means(values: NDArray[np.floating], width: int) -> Floats:
 
 
 def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *, geometric: bool) -> Finding:
-    """Return the finding on a margin above the stall.  tolerance: accepted deficit of airspeed, m/s."""
+    """Make the finding on a margin above the stall. tolerance: accepted deficit of airspeed, m/s."""
     stall_text = (
         f"{margin.speed:.1f} m/s {time_or_place_text}, stall {margin.stall_speed:.1f} m/s in"
         f" {math.degrees(margin.bank):.0f}° of bank"

@@ -55,8 +55,8 @@ def survey_findings(
 ) -> list[Finding]:
     """Judge each photo line and the overlap of each survey's photos.
 
-    If ``geometric``, judge a line by the part that the turns at its ends and the climb or descent before it leave, and
-    report turnarounds that cannot be flown as drawn.
+    If ``geometric``, judge a line by the part outside the turns at its ends and outside the climb or descent before it.
+    Also report turnarounds that cannot be flown as drawn.
     """
     findings = []
     for survey in requirements.surveys:
@@ -111,7 +111,7 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the minimum overlap of a survey's photos, the photo lines with this overlap, and the required overlap.
+    """Describe the minimum overlap of a survey's photos, the photo lines with it, and the required overlap.
 
     Return "" if the overlap is unknown.
 
@@ -138,10 +138,10 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report each turnaround that is too tight or too steep to be flown as drawn and has hazards within reach.
+    """Report turnarounds with hazards within reach that are too tight or too steep to be flown as drawn.
 
-    Only a flight shows the path of such a turnaround.  The turns onto the first line and off the last line are included
-    as turnarounds.
+    The path of such a turnaround is known only after a flight.  The turns onto the first line and off the last line
+    count as turnarounds.
     """
     findings = []
     turnarounds = survey.transitions()
@@ -150,7 +150,8 @@ def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Surv
         catch_up_length = _off_altitude_length(requirements, first, last, requirements.legs, CLEARANCE_TOLERANCE_M)
         if not is_tight and not catch_up_length:
             continue
-        points, radii = requirements.points[first : last + 1], requirements.min_radius[first : last + 1]
+        points = requirements.points[first : last + 1]
+        radii = requirements.min_radius[first : last + 1]
         center = points[:, :2].mean(axis=0)
         radius = float(radii[np.isfinite(radii)].max(initial=0.0))
         reach = float(np.hypot(*(points[:, :2] - center).T).max()) + TURN_AROUND_RADII * radius + catch_up_length
@@ -174,7 +175,7 @@ def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
 
 
 def _off_altitude_length(requirements: RouteRequirements, first: int, last: int, end: int, tolerance: float) -> float:
-    """Return the length of route beyond a turnaround on which an aircraft is still off the planned altitude, m.
+    """Return the length of route after a turnaround that is still flown off the planned altitude, m.
 
     The aircraft is at the planned altitude at waypoint `first`, where the turnaround begins, and climbs or descends
     from there no steeper than its limits.
@@ -185,11 +186,9 @@ def _off_altitude_length(requirements: RouteRequirements, first: int, last: int,
     """
     altitude, length = float(requirements.points[first, 2]), 0.0
     for leg in range(first, end):
-        start, target, run = (
-            float(requirements.points[leg, 2]),
-            float(requirements.points[leg + 1, 2]),
-            requirements.runs[leg],
-        )
+        start = float(requirements.points[leg, 2])
+        target = float(requirements.points[leg + 1, 2])
+        run = requirements.runs[leg]
         climb, dive = (
             run * math.tan(min(max(limit, 0.0), _MAX_SLOPE_RAD)) for limit in slope_limits(requirements, leg)
         )
@@ -220,7 +219,7 @@ def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
 def _planned_finding(
     requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int, before: int
 ) -> Finding:
-    """Judge the fraction of a photo line that remains straight between the turns at its ends, and at its altitude.
+    """Judge the fraction of a planned photo line that is flown straight and at its altitude.
 
     before: waypoint at which the turnaround before the line begins.
     """
@@ -255,7 +254,7 @@ def _planned_finding(
 
 
 def _unknown_ground_fraction(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the fraction of a photo line as planned over which the height above ground is unknown."""
+    """Return the fraction of a planned photo line whose height above ground is unknown."""
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
     return float(np.isnan(heights_over_ground(requirements, axis.points_at(along))).mean())
@@ -269,7 +268,7 @@ def _unknown_ground_message(requirements: RouteRequirements, fraction: float, le
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the distance before waypoint `line.ends` at which the turn off a photo line begins, m."""
+    """Return the distance before the waypoint at a photo line's end at which the turn begins, m."""
     setup, last = requirements.setup, line.ends
     if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
         return float(requirements.length_before[last])
@@ -290,7 +289,7 @@ def _flown_finding(
 ) -> Finding:
     """Judge the usable fraction of a photo line as flown.
 
-    A line that was not flown is not judged, nor one whose usable fraction depends on unknown ground.
+    A line is not judged if it was not flown, or if its usable fraction depends on unknown ground.
     """
     name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
@@ -309,7 +308,7 @@ def _flown_finding(
 
 
 def unusable_parts_text(measure: LineMeasure) -> str:
-    """List the causes that make parts of a photo line unusable, the largest first, each with its fraction of the line.
+    """List the causes that make parts of a photo line unusable, with their fractions, the largest first.
 
     Causes below 0.5 % are left out; return "" if none remains.
     """

@@ -59,7 +59,9 @@ def takeoff_findings(
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     source = requirements.setup.source
     if source is not None and not source.aircraft_known:
-        return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), "the aircraft is not named (--aircraft)")]
+        return [
+            _unjudged_finding("takeoff", requirements.waypoint(waypoint), "no aircraft was named: --aircraft names it")
+        ]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
     return [_slope_finding(requirements, "takeoff", 0, waypoint, route.takeoff_ground, altitude)]
 
@@ -67,7 +69,7 @@ def takeoff_findings(
 def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
     """Return a finding if a launch accelerates the aircraft too little to start the motor, otherwise [].
 
-    The list is empty, too, if the autopilot needs no acceleration to start the motor.
+    Also return [] if the autopilot needs no acceleration to start the motor.
     """
     setup = requirements.setup
     trigger, acceleration = setup.autopilot.ground.launch_trigger, launch.acceleration(setup.default_launch_speed)
@@ -110,10 +112,8 @@ def landing_findings(
         route = requirements.setup.route
         if route.rtl_start is not None:
             reason = RTL_NOT_CONTINUED_TEXT
-        end_waypoint, is_return_continued = (
-            requirements.waypoint(requirements.legs),
-            RTL_NOT_CONTINUED_TEXT in " ".join(route.notes),
-        )
+        end_waypoint = requirements.waypoint(requirements.legs)
+        is_return_continued = RTL_NOT_CONTINUED_TEXT in " ".join(route.notes)
         if route.rtl_start is not None and not is_return_continued:
             # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end_waypoint, ok=None, reason=reason, unit="deg")]
@@ -147,8 +147,8 @@ def _slope_finding(
 ) -> Finding:
     """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
 
-    rule: "takeoff" or "landing".
-    An altitude is None if the terrain there is unknown.  After a loiter the slope begins where its circle is left.
+    rule: "takeoff" or "landing".  An altitude is None if the terrain there is unknown.  If waypoint `first` belongs to
+    a loiter, the slope begins where the path leaves its circle.
     """
     waypoint_place = requirements.waypoint(last)
     distance = requirements.straight_length(first) + float(requirements.runs[first + 1 : last].sum())
@@ -199,20 +199,20 @@ def _slope_finding(
 
 
 def _not_flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause that a take-off or a landing is not flown; "" if it is flown."""
+    """Return a clause which states that a take-off or landing is not flown; "" if it is flown."""
     ground_phases = requirements.setup.ground_phases
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     return "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
 
 
 def _flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause that a flight judges the touchdown of a landing instead of its slope; "" if it does not."""
+    """Return a clause which states that a flight will judge the touchdown instead of the slope; else ""."""
     is_flown = rule == "landing" and requirements.setup.ground_phases.approach is not None
     return " without gaining speed; a flight judges its touchdown instead" if is_flown else ""
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
-    """Return a finding that a take-off or landing is not judged, which leaves the verdict undecided."""
+    """Return the finding that a take-off or landing is not judged, which leaves the verdict undecided."""
     fault = message(f"the {_PHASE_TITLES[rule]} at {place_text(place)} is not judged")
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_PATH)
 

@@ -28,7 +28,8 @@ def threat_findings(
 ) -> list[Finding]:
     """Judge each missile or radar sphere that the planned path or the flight touches.
 
-    If no missile sphere is touched, the first finding says so.  Without a scenario, one unjudged finding is returned.
+    If no missile sphere is touched, the first finding states this.  Without a scenario, one unjudged finding is
+    returned.
     """
     scenario = requirements.setup.scenario
     if scenario.external:
@@ -99,7 +100,7 @@ class _Visit:
 
 
 def _sphere_visit(visits: SphereVisits | None, threat: int) -> _Visit:
-    """Return the visit to one threat's sphere; all its values are NaN if there are no visits."""
+    """Return the visit to one threat's sphere; its values are all NaN if the path has no visits."""
     if visits is None:
         return _Visit()
     columns = (visits.time_inside, visits.exposure, visits.closest, visits.closest_time)
@@ -171,7 +172,7 @@ def _no_entry_finding(
 def _sphere_finding(
     place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, nearest_place: str
 ) -> Finding:
-    """Judge a missile's sphere by whether it was entered, and report a radar's sphere, which always passes.
+    """Make the finding on a sphere: a missile's fails if it was entered, a radar's always passes.
 
     flown_visit: None before a flight; the planned visit is then judged.
     radius: radius of the sphere, m.
@@ -185,8 +186,8 @@ def _sphere_finding(
     )
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s), at"
-            f" least {flown_visit.closest:.0f} m from the center"
+            f"; the flight was inside for {flown_visit.time_inside:.1f} s (exposure {flown_visit.exposure:.3g} s),"
+            f" closest {flown_visit.closest:.0f} m from the center"
         )
         facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
     flown_time = None if flown_visit is None else flown_visit.time_inside

@@ -114,7 +114,7 @@ def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
 def _measure_landing(
     requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, touchdown_row: int
 ) -> _Landing:
-    """Measure a landing that touches down at row `touchdown_row`; the field `point_height` stays unset."""
+    """Measure a landing that touches down at row `touchdown_row`; leave the field `point_height` unset."""
     position = np.asarray(track.position, dtype=np.float64)
     distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
     touchdown, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
@@ -134,8 +134,9 @@ def _measure_landing(
 def _landing_finding(
     place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, has_gusts: bool
 ) -> Finding:
-    """Return the finding on a measured landing: it fails with `faults`, and is undecided if the measures are too close.
+    """Make the finding on a measured landing.
 
+    The finding fails if there are `faults`.  It is undecided if a measure is too close to its limit.
     has_gusts: True if the air is turbulent.
     """
     undecided_messages = [] if faults else _undecided_messages(approach, landing, has_gusts=has_gusts)
@@ -180,7 +181,7 @@ def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
 
 
 def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
-    """Return the first row at which the aircraft is as low above ground as in the last row, where it stands still.
+    """Return the first row at which the aircraft is as low above ground as at its final standstill.
 
     Return None if the aircraft does not stand still in the last row.
     """
@@ -197,7 +198,7 @@ def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
 
 
 def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) -> tuple[float, float]:
-    """Return the vertical sink rate just before touch-down, and the sink rate relative to the sloping ground, m/s."""
+    """Return the sink rate just before touch-down, and the sink rate relative to the sloping ground, m/s."""
     row = max(0, row - 2)
     east, north, vertical_speed = (float(value) for value in track.velocity[row])
     position = np.asarray(track.position[row, :2], dtype=np.float64)

@@ -105,7 +105,8 @@ def _judge_planned_turn(
 ) -> tuple[list[Message], list[str], str, float | None]:
     """Judge the planned turn at waypoint i by its limit (rad).
 
-    Return faults and facts, `UNKNOWN_AIRCRAFT` or "", and the turn (rad), or None for a negligible kink.
+    Return faults, facts, a check (`UNKNOWN_AIRCRAFT` or ""), and the turn (rad).  The turn is None for a negligible
+    kink.
     """
     turn = abs(float(requirements.turns[i]))
     turn_text = f"turns {math.degrees(turn):.1f}°"
@@ -137,7 +138,7 @@ def _unflown_turn_text(
 ) -> str:
     """Explain why a turn was not flown: the flight ended before it, or the autopilot skipped a leg.
 
-    For an imported flight, return only that its legs were not flown one after the other.
+    For an imported flight, the text only states that the legs were not flown one after the other.
     """
     if measure.corner is not None:
         return "its legs were not flown one after the other"
@@ -159,7 +160,8 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 
     turn: course change, rad.
     """
-    radius, acceptance = float(requirements.radius[i]), float(requirements.setup.route.points["acceptance_radius"][i])
+    radius = float(requirements.radius[i])
+    acceptance = float(requirements.setup.route.points["acceptance_radius"][i])
     if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
         return []
     offset = fly_by_offset(turn, radius)
@@ -175,14 +177,15 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 def _sharp_turn_message(
     requirements: RouteRequirements, i: int, planned_turn: float, limit: float, source: str
 ) -> Message:
-    """Explain why the planned turn (rad) at waypoint i is too sharp.
+    """Explain why the planned turn at waypoint i is too sharp.
 
-    The message states the scenario's limit (rad), or the leg length that the turn takes.
+    The message states the scenario's limit, or the length of leg that the turn needs.  All angles are in rad.
     """
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
         return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
-    speed, bank_text = float(max(requirements.route.leg_airspeeds[i - 1 : i + 1])), bank_limit_text(requirements.setup)
+    speed = float(max(requirements.route.leg_airspeeds[i - 1 : i + 1]))
+    bank_text = bank_limit_text(requirements.setup)
     radius = float(requirements.radius[i])
     if not math.isfinite(radius):
         return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
@@ -244,7 +247,7 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
 
 
 def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> dict[str, Message]:
-    """Return the faults of the flown turn, by the quantities of `_flown_facts` and by "circles".
+    """Return the faults of a flown turn by quantity: those of `_flown_facts`, and "circles".
 
     limit: largest course change, rad.
     """
@@ -277,9 +280,9 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
 
 
 def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> Message | None:
-    """Return a fault if a turn passed its waypoint closer than the arc at the bank limit does, else None.
+    """Return a fault if a turn passed its waypoint closer than an arc at the bank limit would, else None.
 
-    A tighter arc joins legs that are too short for their turn.  A flight that followed this arc exceeded the bank limit
+    Legs that are too short for their turn are joined by a tighter arc.  A flight along this arc exceeded the bank limit
     or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup

@@ -37,14 +37,16 @@ def waypoint_findings(
 
 def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     """Judge whether the fly-by arc passes within the acceptance distance of its waypoint."""
-    condition, offset = acceptance_condition(requirements, i), float(requirements.fly_by_offset[i])
+    condition = acceptance_condition(requirements, i)
+    offset = float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes {offset:.0f} m away"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
     elif not requirements.setup.autopilot.turns.follows_path:
         fact = _turn_text(requirements, i, condition)
     elif offset > condition.radius + ROUNDING_M:
-        turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
+        turn = math.degrees(abs(float(requirements.turns[i])))
+        radius = float(requirements.radius[i])
         faults.append(
             message(
                 f"the arc of the {turn:.0f}° corner passes the waypoint {offset:.0f} m away",
@@ -141,9 +143,10 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the distance from waypoint `i` at which the track first crossed the line across the leg's end, m.
+    """Return the distance from waypoint `i` at which the track first crossed the end line of the leg, m.
 
-    Return inf if the track did not cross this line, or for the first waypoint.
+    The end line runs through the waypoint, across the leg.  Return inf if the track did not cross it, or for the first
+    waypoint.
     """
     if i == 0:
         return math.inf
@@ -193,7 +196,7 @@ def _closest_approach(
 def explain_by_circles(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Add to the reason of each failed finding the circles that the autopilot flew there at a waypoint's altitude."""
+    """Extend the reason of each failed finding by the circles that the autopilot flew at its waypoints."""
     circles = [] if aligned is None else waypoint_circles(requirements, aligned)
     if aligned is None or not circles:
         return tuple(findings)

@@ -19,14 +19,14 @@ def risk_kml(setup: FlightSetup, volumes: Sequence[RiskVolume]) -> str:
     """Return a KML document of the volumes and the route."""
     zones = [
         MapZone(
-            one.name,
-            tuple(tuple(_to_degrees(setup, ring)[:, ::-1] for ring in part) for part in outline_parts(one.area)),
-            one.height,
+            volume.name,
+            tuple(tuple(_to_degrees(setup, ring)[:, ::-1] for ring in part) for part in outline_parts(volume.area)),
+            volume.height,
             above_ground=True,
             folder="ground risk",
-            role=one.role,
+            role=volume.role,
         )
-        for one in volumes
+        for volume in volumes
     ]
     return kml_text(f"{setup.scenario.name}: ground risk", [plan_line(setup)], zones)
 
@@ -36,25 +36,25 @@ def risk_geojson(setup: FlightSetup, volumes: Sequence[RiskVolume], properties: 
 
     properties: properties of each feature in addition to its name and its height above ground.
 
-    Across the antimeridian longitudes continue beyond 180 degrees, so that no area is torn.
+    At the antimeridian, longitudes continue beyond 180 degrees, so that no area is split.
     """
     features = [
         {
             "type": "Feature",
-            "properties": {"name": one.name, "height_above_ground_m": _rounded(one.height), **properties},
+            "properties": {"name": volume.name, "height_above_ground_m": _round_height(volume.height), **properties},
             "geometry": {
                 "type": "MultiPolygon",
                 "coordinates": [
-                    [_to_degrees(setup, ring).round(7).tolist() for ring in part] for part in outline_parts(one.area)
+                    [_to_degrees(setup, ring).round(7).tolist() for ring in part] for part in outline_parts(volume.area)
                 ],
             },
         }
-        for one in volumes
+        for volume in volumes
     ]
     return json.dumps({"type": "FeatureCollection", "features": features}, indent=1) + "\n"
 
 
-def _rounded(height: float | None) -> float | None:
+def _round_height(height: float | None) -> float | None:
     """Return a height in decimetres, or None."""
     return None if height is None else round(height, 1)
 

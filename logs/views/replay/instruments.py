@@ -144,7 +144,8 @@ class Instruments:
     def _control_lines(self, k: int, bar_width: int) -> list[str]:
         """Return one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
-        controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
+        controls = self.log.track.controls[k].tolist()
+        commands = self.log.track.commands[k].tolist()
         for (name, limit), deflection, command in zip(self.limits, controls, commands, strict=True):
             is_throttle = name == "throttle"
             max_value = limit if math.isfinite(limit) else math.radians(30.0)
@@ -165,7 +166,7 @@ class Instruments:
         return lines
 
     def _threat_text(self, k: int) -> str:
-        """Return the names and distances of the missiles and radars in whose range the aircraft is."""
+        """Return the names and distances of the missiles and radars whose range contains the aircraft."""
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         threats_in_reach = [
@@ -178,7 +179,7 @@ class Instruments:
         )
 
     def _latest_entries(self, time: float) -> list[str]:
-        """Return the last entries of the timeline up to a time, s."""
+        """Return the latest entries of the timeline up to a time, s."""
         entry_count = bisect.bisect_right([entry.time for entry in self.entries], time + 1e-9)
         return [
             f"{entry.time:8.1f} s  {entry.text}"

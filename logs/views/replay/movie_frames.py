@@ -64,7 +64,7 @@ class MovieFrames:
         return np.minimum(self.end, self.start + np.arange(len(self)) * self.speed / RATE)
 
     def frames(self) -> Iterator[Pixels]:
-        """Yield each frame as (height, width, 3); both even, as video formats want them."""
+        """Yield each frame as an array (height, width, 3), with even height and width for video formats."""
         setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
         figure = draw_map(
             flight_map(

@@ -112,7 +112,7 @@ def _split_by_leg(track: Track, route: Route) -> list[_LegRows]:
 
 
 def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
-    """Group the parts of a flight in order: all parts around one loiter form one group, others one each."""
+    """Group the parts of a flight: the parts of one loiter form a group, every other part its own group."""
     first_legs: list[int] = []
     for leg in range(route.legs):
         is_on_circle = min(route.arc_radii[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
@@ -175,7 +175,7 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List an entry for each change to the next leg: the turn of the route, and the peak bank.
 
-    The peak bank is the largest from the middle of one leg to the middle of the next.
+    The peak bank is the largest bank between the middles of the two legs.
     """
     route, track = log.setup.route, log.track
     turns = signed_turns(route.positions)

@@ -34,7 +34,7 @@ from logs.views.report.page import (
     script_text,
     style_text,
 )
-from logs.views.report.text import NOTHING, number, verdict_badge
+from logs.views.report.text import NOTHING, format_columns, number, verdict_badge
 from logs.views.scene import SceneView, script_json
 from world.arrays import Floats
 from world.files import write_atomically
@@ -123,7 +123,8 @@ def _judge_log(log: FlightLog) -> Verdict:
 def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     """Measure a flight; return its values by (name, unit), NaN if unknown."""
     has_position = np.isfinite(track.position).all(axis=1)
-    position, time = np.ascontiguousarray(track.position[has_position]), np.ascontiguousarray(track.time[has_position])
+    position = np.ascontiguousarray(track.position[has_position])
+    time = np.ascontiguousarray(track.time[has_position])
     roll, _, _ = track.attitude.T
     values = {
         ("time in the air", "s"): float(track.time[-1] - track.time[0]),
@@ -228,7 +229,8 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
     array([5., 1.])
     """
     block_starts = np.arange(0, len(track), _BLOCK_POINTS)
-    block_min, block_max = np.minimum.reduceat(track, block_starts), np.maximum.reduceat(track, block_starts)
+    block_min = np.minimum.reduceat(track, block_starts)
+    block_max = np.maximum.reduceat(track, block_starts)
     parts = np.array_split(track, block_starts[1:])
     results = []
     for first in range(0, len(points), _BLOCK_POINTS):
@@ -278,17 +280,12 @@ def difference_lines(comparison: Comparison) -> list[str]:
       not flyable  not flyable
              36.5         36.5        0.00
     """
-    header = ("", "", *comparison.names, "difference")
-    rows = [header, *difference_rows(comparison)]
-    rows = [(f"{name} ({unit})" if unit else name, *values) for name, unit, *values in rows]
-    widths = [max(len(row[k]) for row in rows) for k in range(4)]
-    lines = [
-        "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for row in rows
-    ]
-    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: unknown"])]
+    rows: list[tuple[str, ...]] = [("", *comparison.names, "difference")]
+    for name, unit, *values in difference_rows(comparison):
+        rows.append((f"{name} ({unit})" if unit else name, *values))
+    lines = [line.rstrip() for line in format_columns(rows)]
+    has_unknown = any(NOTHING in line for line in lines)
+    return [*lines, *comparison.notes, *([f"{NOTHING}: unknown"] if has_unknown else [])]
 
 
 # ----------------------------------------------------------------------

@@ -280,7 +280,9 @@ def _page_html(
     failed = failures(verdict, len(setup.route.points))
     rows = finding_rows(verdict.findings, verdict.deciding)
     shown_pictures = report_pictures(subject, page_charts(views), pictures)
-    failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), verdict_badge(verdict)
+    failing = failed_groups(verdict)
+    lines = verdict.lines or ("",)
+    badge = verdict_badge(verdict)
     return page_template("report.html").render(
         name=setup.scenario.name,
         badge=badge,
@@ -316,7 +318,8 @@ def _page_html(
 
 def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View]) -> dict[str, Any]:
     """Return the data for the scripts of the page, escaped for HTML, and the scripts."""
-    script, flight = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS)), report_flight(setup, track)
+    script = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
+    flight = report_flight(setup, track)
     charts = page_charts(views)
     scene = charts.pop("scene")
     return {

@@ -62,11 +62,9 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
     failing: numbers of the legs with a failed finding.
     """
     waypoints = setup.display_waypoints
-    runs, courses, slopes = (
-        leg_runs(waypoints),
-        np.degrees(leg_courses(waypoints)),
-        np.degrees(leg_slopes(waypoints)),
-    )
+    runs = leg_runs(waypoints)
+    courses = np.degrees(leg_courses(waypoints))
+    slopes = np.degrees(leg_slopes(waypoints))
     turns = np.degrees(signed_turns(waypoints))
     heights_above_ground = ground_clearance(setup, track) if track is not None else None
     rows, numbers = [], setup.route.leg_numbers
@@ -119,7 +117,8 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     """Return one sentence on the flight: distance, time, lowest height and energy; "" for a plan."""
     if track is None:
         return ""
-    seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
+    seconds = float(track.time[-1] - track.time[0])
+    distance = float(path_length(track.position)) / 1000.0
     heights_above_ground = ground_clearance(setup, track)
     is_ground_phase = ground_phase_rows(track, setup.ground_phases)
     lowest_text = (

@@ -200,7 +200,7 @@ def _place_and_value(row: FindingRow) -> str:
 
 
 def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
-    r"""Return changes of the plan as text, each of which would make a failed finding pass.
+    r"""Return alternative changes of the plan, as text, that would make a failed finding pass.
 
     Return "" if none is known.
 
@@ -232,7 +232,7 @@ def count_sentence(rows: list[FindingRow]) -> str:
 
 
 def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
-    """Return all numbers and texts of one finding.
+    """Return the row of one finding: its numbers and texts.
 
     deciding: as in `finding_rows`.
     """
@@ -328,7 +328,9 @@ def _rule_row(rule: RuleFindings) -> RuleRow:
     )
     if judged_count < len(rule.findings):
         parts.append(f"{len(rule.findings) - judged_count} not judged")
-    sign, rule_name, counts = f"{_SIGNS[state]} {_WORDS[state]}", rule.words.word, ", ".join(parts)
+    sign = f"{_SIGNS[state]} {_WORDS[state]}"
+    rule_name = rule.words.word
+    counts = ", ".join(parts)
     if rule.closest is None:
         reason = "" if judged_count else rule.findings[0].reason
         return RuleRow(state, sign, rule_name, counts, reason, NOTHING, NOTHING, NOTHING, NOTHING, "")
@@ -374,9 +376,9 @@ def refly_lines(reflight: Reflight) -> list[str]:
     stretch = reflight.stretch
     stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
     legs_text = f", legs {leg_numbers[0]} to {leg_numbers[len(reflight.legs) - 1]}"
-    lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(leg_table)]
+    lines = [f"{stretch_text}{legs_text}: flown / simulated", *format_columns(leg_table)]
     if reflight.turns:
-        lines += ["", *_format_columns(turn_table)]
+        lines += ["", *format_columns(turn_table)]
     return [*lines, "", trust_line(reflight)]
 
 
@@ -423,12 +425,11 @@ def _pair_text(pair: tuple[float, float]) -> str:
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 
-def _format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+def format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Align the cells of a table: the first column left, all others right."""
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return [
-        "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        )
-        for row in rows
-    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for first_cell, *cells in rows:
+        right_cells = [cell.rjust(width) for cell, width in zip(cells, widths[1:], strict=True)]
+        lines.append("  ".join([first_cell.ljust(widths[0]), *right_cells]))
+    return lines

@@ -67,8 +67,8 @@ class BinaryLink(Protocol):
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         """Return the Fisher information of a flight about its predictor.
 
-        width: range of predictors above ``x`` within which a passed flight gives its margin; 0 for a flight that gives
-        only pass or fail.
+        width: range of predictors above ``x`` in which a passed flight reports its margin; 0 if flights report only
+            pass or fail.
         """
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
@@ -226,7 +226,7 @@ _SEED = 1
 def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
     """Return equally likely points of a distribution in random order, (count, k).
 
-    The points are spread most evenly in the first coordinate.
+    The points are spread more evenly in the first coordinate than in the others.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
     mean, covariance: approximate mean (k,) and covariance (k, k) of the distribution.
     count: a power of two.
@@ -310,7 +310,7 @@ class Outcomes:
 
     @property
     def marginal(self) -> Bools:
-        """Mask (n,): True for flights that passed by a known margin of less than a scale."""
+        """Mask (n,): True for flights that passed with a known margin below the rule's scale."""
         return (self.margin > 0.0) & (self.margin < 1.0)
 
     def as_pass_or_fail(self) -> "Outcomes":
@@ -318,7 +318,7 @@ class Outcomes:
         return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
     def margins_given_pass(self) -> "Outcomes":
-        """Return the outcomes of the flights with a known margin, given that they passed."""
+        """Return the outcomes of the passed flights with a known margin, conditional on having passed."""
         has_margin = self.margin > 0.0
         return Outcomes(self.terms[has_margin], self.failed[has_margin], self.margin[has_margin], given_passed=True)
 
@@ -351,11 +351,11 @@ class RegressionFit:
 def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionFit | None = None) -> RegressionFit:
     """Fit the regression of flight outcomes, and return the most probable fit.
 
-    A fit is made with each prior of the draws' coefficients.
+    One fit is made for each prior of the coefficients of the draws.
 
     link: link function between the predictor and the probability of failure.
-    nearby_fit: a fit of the same coefficients, whose mode is an additional start; the posterior of margins only may
-        have two modes.
+    nearby_fit: a fit of the same coefficients, whose mode is used as an additional start point, because a posterior
+        from margins alone may have two modes.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -407,7 +407,7 @@ class _Posterior:
     def coefficients(self, points: Floats) -> Floats:
         """Return the coefficients of the terms at points (..., k).
 
-        A point has the logarithm of the wind's coefficient in place of the coefficient itself.
+        In a point, the wind's coefficient is replaced by its logarithm.
         """
         beta = points.copy()
         beta[..., 1] = np.exp(np.minimum(points[..., 1], _MAX_LOGARITHM))
@@ -415,7 +415,9 @@ class _Posterior:
 
     def log_density(self, points: Floats) -> Floats:
         """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,)."""
-        beta, deviations, has_failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
+        beta = self.coefficients(points)
+        deviations = points - self._prior_mean
+        has_failed = self._outcomes.failed
         predictor = self._terms @ beta.T
         predictor_without_margin = (
             self._outcomes.terms @ beta[:, : self.size].T if self.margin_coefficient else predictor
@@ -423,10 +425,8 @@ class _Posterior:
         # Points with a larger predictor are practically impossible; their logarithm is so large that the other terms
         # would be lost to rounding.
         is_possible = (predictor_without_margin[~has_failed] < _MAX_PREDICTOR).all(axis=0)
-        predictor, predictor_without_margin = (
-            np.where(is_possible, predictor, 0.0),
-            np.where(is_possible, predictor_without_margin, 0.0),
-        )
+        predictor = np.where(is_possible, predictor, 0.0)
+        predictor_without_margin = np.where(is_possible, predictor_without_margin, 0.0)
         log_densities: Floats = -0.5 * (deviations * deviations) @ self._precision
         log_densities += self._link.log_cdf(predictor[has_failed]).sum(axis=0)
         log_densities += self._link.log_survival(predictor[~has_failed & ~self._marginal_passes]).sum(axis=0)
@@ -441,8 +441,8 @@ class _Posterior:
     def sample(self, mode: Floats) -> Floats:
         """Return equally likely coefficients of the terms, (s, size), by importance sampling around the mode.
 
-        With few failures the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
-        Therefore the constant is replaced by the predictor at the wind where the predictor is best known.
+        With few failures, the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
+        Therefore the sampling replaces the constant by the predictor in the wind at which the predictor is known best.
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
         covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
@@ -454,6 +454,7 @@ class _Posterior:
         mean[0] += best_known_wind * np.exp(mode[1])
 
         def constants(points: Floats) -> Floats:
+            """Convert the predictor at the best-known wind, the first coordinate of points, to the constant."""
             changed_points = points.copy()
             changed_points[:, 0] -= best_known_wind * self.coefficients(points)[:, 1]
             return changed_points
@@ -473,14 +474,13 @@ class _Posterior:
         first, second = self._link.derivatives(predictor, self._outcomes.failed)
         if self.margin_coefficient:
             marginal_first, marginal_second = self._link.density_derivatives(predictor)
-            first, second = (
-                np.where(self._marginal_passes, marginal_first, first),
-                np.where(self._marginal_passes, marginal_second, second),
-            )
+            first = np.where(self._marginal_passes, marginal_first, first)
+            second = np.where(self._marginal_passes, marginal_second, second)
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
             terms_without_margin = self._outcomes.terms
-            first, second = self._link.derivatives(self._predictor_without_margin(beta), self._outcomes.failed)
+            predictor = terms_without_margin @ beta[: self.size]
+            first, second = self._link.derivatives(predictor, self._outcomes.failed)
             slope[: self.size] += terms_without_margin.T @ first
             curvature[: self.size, : self.size] += (terms_without_margin * second[:, None]).T @ terms_without_margin
         if self.margin_coefficient:
@@ -493,24 +493,22 @@ class _Posterior:
         curvature[1, 1] += slope[1]
         return slope + self._precision * (point - self._prior_mean), curvature + np.diag(self._precision)
 
-    def _predictor_without_margin(self, beta: Floats) -> Floats:
-        """Return the predictor of each flight without the term of its margin, (n,)."""
-        return self._outcomes.terms @ beta[: self.size]
-
 
 def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
     """Find the mode of a posterior from a start point, and return the fit: mode, covariance and evidence.
 
-    The search is Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss
-    is not convex, which is possible with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006,
-    sections 3.4 and 19.2).
+    The search is Newton's method with halved steps.  Where the loss is not convex, which happens only with margins
+    alone, the absolute eigenvalues of the curvature are used (Nocedal and Wright, Numerical Optimization, 2nd edition,
+    2006, sections 3.4 and 19.2).
     """
     size = posterior.size
 
     def loss(point: Floats) -> float:
+        """Return the negative log-density of the posterior at a point."""
         return -float(posterior.log_density(point[None])[0])
 
     value = loss(point)
+    # Each step is halved until the loss does not increase.
     for _ in range(_MAX_STEPS):
         slope, curvature = posterior.slope_and_curvature(point)
         eigenvalues, axes = np.linalg.eigh(curvature)

@@ -37,7 +37,7 @@ class Tally(NamedTuple):
 
     @property
     def unknown(self) -> int:
-        """Number of lost and undecided flights: failures in lower bounds, and successes in upper bounds."""
+        """Number of lost and undecided flights: failures in a lower bound, successes in an upper bound."""
         return self.lost + self.undecided
 
     @property
@@ -63,7 +63,7 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
-    """Return Wilson's score interval (JASA 22, 1927), which is used in pictures.
+    """Return Wilson's score interval (JASA 22, 1927), for use in pictures.
 
     Its mean coverage is near ``confidence``.
 
@@ -152,7 +152,7 @@ class StoppingBound:
 
     @property
     def _required_evidence(self) -> float:
-        """Logarithm of E(p) from which p is excluded."""
+        """Logarithm of E(p) at and above which p is excluded."""
         return -math.log1p(-self.confidence)
 
     @cached_property
@@ -190,7 +190,7 @@ class StoppingBound:
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded by a fraction of successes above p, or below p if `above` is False."""
+        """Return True if p is excluded and lies below the fraction of successes; above it if `above` is False."""
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
@@ -206,7 +206,7 @@ class StoppingBound:
         return Interval(lower, upper)
 
     def _find_edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
-        """Find by bisection the excluded value of p closest to the values that are not excluded.
+        """Find the edge of the values of p that are not excluded, by bisection.
 
         excluded, included: an excluded value, and a value that is not excluded.
         """
@@ -219,9 +219,9 @@ class StoppingBound:
         return excluded
 
     def bounds(self, tally: Tally) -> Interval:
-        """Return the interval for a tally, in which lost and undecided flights count against either bound.
+        """Return the interval for a tally; lost and undecided flights widen it.
 
-        They are failures for the lower bound, and successes for the upper bound.
+        They count as failures for the lower bound, and as successes for the upper bound.
         """
         lower = self.interval(tally.flyable, tally.failed + tally.unknown).low
         upper = self.interval(tally.flyable + tally.unknown, tally.failed).high
@@ -320,9 +320,9 @@ class Estimator:
         return is_reached or bound.excludes(tally.flyable + tally.unknown, tally.failed, target, above=False)
 
     def deciding_flights(self, tally: Tally) -> int | None:
-        """Return the number of flights that decide the target if flyable and undecided ones keep their shares.
+        """Return the number of flights that would decide the target if the shares of all outcomes stay as now.
 
-        None if it is larger than `MAX_DECIDING_FLIGHTS`.  tally: at least one flight, which leave the target undecided.
+        Return None for more than `MAX_DECIDING_FLIGHTS`. tally: at least one flight; the target is undecided.
 
         >>> Estimator(Goal(0.95, False, 20)).deciding_flights(Tally(20, 0))
         59
@@ -331,7 +331,7 @@ class Estimator:
         too_few, enough = tally.flown, 2 * tally.flown
 
         def decides(flights: int) -> bool:
-            """Return True if so many flights decide; a fraction of a flight counts against the decision."""
+            """Return True if this number of flights decides the target; rounding counts against a decision."""
             is_above = target is not None and share >= target
             flyable = math.floor(share * flights + 1e-9) if is_above else math.ceil(share * flights - 1e-9)
             undecided = min(flights - flyable, math.ceil(flights * tally.undecided / tally.flown))
@@ -379,8 +379,10 @@ class Estimator:
 # "Global sensitivity measures from given data", EJOR 226, 2013).  The chance difference of small groups is subtracted,
 # as in Kelley's epsilon squared (PNAS 21, 1935), so that a quantity without effect has an index of 0.
 
-# Minimum number of flights for an index.
-MIN_FLIGHTS_FOR_INDEX = 30
+# Minimum number of flights for an index.  Without any effect, a campaign of eight quantities names one in 2 to 4 % of
+# seeded draws with 8 to 30 flights alike, so the power decides: a quantity that explains 70 % of the variance is named
+# in 97 % of the draws with 20 flights, in 80 % with 15, and in 44 % with 10.
+MIN_FLIGHTS_FOR_INDEX = 20
 # Maximum number of groups.
 _MAX_GROUPS = 64
 
@@ -416,8 +418,9 @@ def _split_into_groups(x: Floats, y: Floats) -> list[Floats]:
 def chance_probability(x: Floats, y: Floats) -> float:
     """Return the probability that y depends on x by chance at least as much as these values do, 0 to 1.
 
-    It is the smaller p-value of two tests, doubled: Kruskal and Wallis's of the groups of `first_order_index` (Journal
-    of the American Statistical Association 47, 1952), and Spearman's, which finds a rise or fall in fewer values.
+    It is twice the smaller p-value of two tests.  One is the test of Kruskal and Wallis on the groups of
+    `first_order_index` (Journal of the American Statistical Association 47, 1952).  The other is Spearman's test, which
+    finds a rise or fall with fewer values.
 
     Returns 1 for fewer than `MIN_FLIGHTS_FOR_INDEX` values, or if x or y does not vary.
 

@@ -148,7 +148,7 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
     models.
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     has_failed: True for each flight that failed in this mode, (n,).
-    margin: margin of each passed flight as a fraction of the rule's scale, (n,): 1 for a scale or more, 0 for unknown.
+    margin: margin of each passed flight as a fraction of the rule's scale, (n,): 1 for the scale or more, 0 if unknown.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -162,7 +162,8 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
     joint_fit = fit_regression(outcomes, link)
     if not outcomes.marginal.any():
         return _make_mode(link, joint_fit, joint_fit.log_evidence)
-    failure_fit, passed_outcomes = fit_regression(outcomes.as_pass_or_fail(), link), outcomes.margins_given_pass()
+    failure_fit = fit_regression(outcomes.as_pass_or_fail(), link)
+    passed_outcomes = outcomes.margins_given_pass()
     # The separate distribution of the margins may have either link.
     separate_evidence = failure_fit.log_evidence + max(
         fit_regression(passed_outcomes, margin_link, joint_fit).log_evidence for margin_link in LINKS
@@ -187,7 +188,7 @@ WIND_ORIGIN_MPS = 10.0
 def make_regressors(speeds: Floats | float, draws: Floats) -> Floats:
     """Return the regressors of n flights, (n, 2 + d).
 
-    They are a constant 1, the wind speed minus `WIND_ORIGIN_MPS`, and the draws.
+    The regressors are a constant 1, the wind speed minus `WIND_ORIGIN_MPS`, and the draws.
 
     speeds: wind speeds, m/s, (n,) or a single value for all flights.
     draws: drawn quantities, in standard deviations from their means, (n, d).
@@ -211,8 +212,8 @@ def fit_modes(
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     failed_modes: modes in which each flight failed; empty for a flyable flight.
     margin: for each flight, the modes that it passed with a small margin, and the margin as a fraction of the rule's
-        scale, 0 to 1, or 0 for an unknown margin.  All other modes were passed with a scale or more.  None for a flight
-        without known margins.
+        scale, 0 to 1, or 0 for an unknown margin.  All other modes were passed with at least the full scale.  None for
+        a flight without known margins.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
@@ -260,7 +261,7 @@ def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> float:
     """Find by bisection the wind in which a fraction of the draws is expected to fail, m/s.
 
-    Returns `max_speed` if a smaller fraction is expected to fail there.
+    Returns `max_speed` if a smaller fraction is expected to fail at that wind.
 
     draws: (m, d).
     """
@@ -269,6 +270,7 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
     ]
 
     def exceeds_fraction(speed: float) -> bool:
+        """Return True if at least the failing fraction is expected to fail in a wind, m/s."""
         success: Floats = np.ones(len(draws))
         for link, predictor, wind_slope in mode_predictors:
             success *= link.survival(predictor + wind_slope * (speed - WIND_ORIGIN_MPS))
@@ -313,7 +315,7 @@ def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
     """Return the derivatives of the boundary with respect to each mode's coefficients.
 
-    They are arrays (2 + d,), m/s, and follow from the implicit function theorem.
+    The derivatives are arrays (2 + d,), m/s, and follow from the implicit function theorem.
 
     draws: (m, d).
     speed: wind speed at the boundary, m/s.

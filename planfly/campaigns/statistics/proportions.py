@@ -25,8 +25,7 @@ class ProportionDifference(NamedTuple):
 def paired_difference(only_first: int, only_second: int, pairs: int, confidence: float = 0.95) -> ProportionDifference:
     """Return the difference of the probabilities of success of paired trials.
 
-    The interval is Tango's score interval (Statistics in Medicine 17, 1998), the p-value that of the exact test of
-    McNemar.
+    The interval is Tango's score interval (Statistics in Medicine 17, 1998).  The p-value is from McNemar's exact test.
 
     only_first, only_second: number of pairs in which only the first trial, or only the second, succeeded.
     pairs: number of all pairs, at least 1.
@@ -46,7 +45,7 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
         return numerator > quantile * _score_deviation(only_first, only_second, pairs, candidate)
 
     def bound(excluded: float) -> float:
-        """Return the bound between the estimate and an extreme difference."""
+        """Return the bound of the interval that lies between the estimate and an excluded difference."""
         if not is_excluded(excluded):
             return excluded
         included = value
@@ -63,7 +62,7 @@ def paired_difference(only_first: int, only_second: int, pairs: int, confidence:
 def _score_deviation(only_first: int, only_second: int, pairs: int, difference: float) -> float:
     """Return the standard deviation of the difference of the counts, for a true difference.
 
-    The probability that only the first trial succeeds is its maximum-likelihood estimate for this difference, the
+    The probability that only the first trial succeeds is estimated by maximum likelihood for this difference: it is the
     larger root of Tango's quadratic equation.
     """
     a = 2.0 * pairs
@@ -78,8 +77,8 @@ def independent_difference(
 ) -> ProportionDifference:
     """Return the difference of the probabilities of success of two independent samples.
 
-    The interval is Newcombe's hybrid of two score intervals (Statistics in Medicine 17, 1998, method 10), the p-value
-    that of Fisher's exact test.
+    The interval is Newcombe's hybrid of two score intervals (Statistics in Medicine 17, 1998, method 10).  The p-value
+    is from Fisher's exact test.
 
     first, second: number of successes and of trials, at least 1.
 

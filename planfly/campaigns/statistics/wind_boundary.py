@@ -59,7 +59,7 @@ def boundary_quantiles(
 ) -> list[float]:
     """Return quantiles of the boundary's posterior, m/s, from 0 to ``max_speed``.
 
-    draws: (m, d) possible draws, evenly spread also if only the first few are used.
+    draws: possible draws, (m, d), spread evenly even if only the first few are used.
     failing_fraction: fraction of flights that fail at the boundary, above 0 and below 1.
     probabilities: probability of each quantile, 0 to 1.
 
@@ -100,7 +100,8 @@ def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fracti
     while (upper - lower).max() > _BRACKET_WIDTH_MPS:
         speed_between = 0.5 * (lower + upper)
         is_above = bracket_fractions.logarithms(speed_between) > np.log(failing_fraction)
-        lower, upper = np.where(is_above, lower, speed_between), np.where(is_above, speed_between, upper)
+        lower = np.where(is_above, lower, speed_between)
+        upper = np.where(is_above, speed_between, upper)
     speed: Floats = 0.5 * (lower + upper)
     previous_speed = speed - _BRACKET_WIDTH_MPS
     previous_error = all_fractions.logarithms(previous_speed) - np.log(failing_fraction)
@@ -125,7 +126,7 @@ class _FailureFractions:
         self._at_origin = [make_regressors(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
-        """Return the logarithm of the failing fraction for each sample at its own wind (n,), m/s."""
+        """Return the logarithm of each sample's failing fraction, (n,), at a wind for each sample, m/s."""
         success = np.ones_like(self._at_origin[0])
         for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
             success *= mode.link.survival(predictor + sample[:, 1] * (speeds - WIND_ORIGIN_MPS))
@@ -291,7 +292,7 @@ class Direction:
 
     @cached_property
     def _failure_distributions(self) -> FailureWindDistributions:
-        """Distributions that replace the regression while all flights have the same outcome."""
+        """Distributions used instead of the regression while all flights have the same outcome."""
         return FailureWindDistributions.on_grid(self.max_speed)
 
 
@@ -336,7 +337,7 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """Return wind (m/s) and draw of the next `count` flights of a direction.
 
-    As long as all flights have the same outcome, the wind is found by bisection; after that, the flights are chosen
+    As long as all flights have the same outcome, the wind is chosen by bisection.  After that, the flights are chosen
     that are expected to reduce the variance of the boundary most.
     """
     if direction.all_flyable or direction.all_failed:
@@ -347,7 +348,7 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
 
 
 def _bisect_speed(direction: Direction) -> float:
-    """Return the next wind, m/s, between flown winds of one outcome and the end of the range."""
+    """Return the next wind while all outcomes are equal, m/s: between the flown winds and the range's end."""
     max_speed = direction.max_speed
     if not direction.speeds:
         return _round_to_grid(0.5 * max_speed, max_speed)
@@ -385,7 +386,9 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
     Each flight is chosen as if the previous ones had been flown.
     """
-    fits, max_speed, flown_count = direction.fits(), direction.max_speed, len(direction.draws)
+    fits = direction.fits()
+    max_speed = direction.max_speed
+    flown_count = len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
         for failing_fraction in (_MIN_FAILING_FRACTION, _MAX_FAILING_FRACTION)
@@ -415,10 +418,10 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _expected_between_fit_reductions(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return the reduction of the boundary's variance between the fits that each flight is expected to bring, (n,).
+    """Return each flight's expected reduction of the boundary's variance between the fits, (m/s)^2, (n,).
 
-    The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction, in
-    (m/s)^2, is the variance over the two outcomes of the mean boundary given the outcome.
+    The fits are alternative models, and the outcome of a flight makes one of them more likely.  The reduction is the
+    variance, over the two outcomes of a flight, of the mean boundary given the outcome.
 
     terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     """
@@ -439,7 +442,7 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return by how much each flight is expected to reduce the boundary's variance, (n,), (m/s)^2.
+        """Return each flight's expected reduction of the boundary's variance, (m/s)^2, (n,).
 
         Only the variance within the fit is considered.
 
@@ -454,7 +457,7 @@ class _ExpectedPosterior:
         return self._fit.weight * expected_gains
 
     def include_flight(self, row: Floats) -> None:
-        """Update the covariances by the information of a flight whose outcome is not known yet.
+        """Update the covariances with the information expected from a flight that is not flown yet.
 
         row: terms of the flight, (2 + d,).
         """

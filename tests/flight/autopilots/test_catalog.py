@@ -166,7 +166,7 @@ def test_a_log_says_who_wrote_it() -> None:
     flown, notes = autopilot_of_log("ArduPlane V4.3.7", {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
     assert flown is not None
     assert (flown.turns.acceptance_radius, flown.version) == (60.0, "4.6")
-    assert notes == ("ArduPlane 4.3 flew it, and 4.6 is simulated",)
+    assert notes == ("flown by ArduPlane 4.3, but simulated with 4.6",)
     assert autopilot_of_log("PX4 v1.14.0", {"WP_RADIUS": 60.0}, "a.ulg") is None
 
 

@@ -8,7 +8,6 @@ import jsbsim
 import pytest
 
 from aircraft.jsbsim_model import CommandProperty
-from flight.dynamics.fdm import silence
 from flight.dynamics.jsbsim_properties import (
     FLAT_DENSITY,
     FLAT_PLANET,
@@ -30,6 +29,7 @@ from flight.dynamics.jsbsim_properties import (
 from flight.dynamics.state import STATE
 from world.errors import FlightError
 from world.kernels import field_names
+from world.silent_output import silence
 
 
 def _in_feet(name: str) -> bool:
@@ -145,7 +145,7 @@ def test_what_an_aircraft_does_not_have_reads_as_zero(access: PropertyAccess) ->
 
 
 def test_a_property_that_is_not_defined_is_refused_and_not_made(manager: FakeManager, access: PropertyAccess) -> None:
-    message = r"^own/own\.xml: property side is needed and not defined$"
+    message = r"^own/own\.xml: the model does not define the property side, which planfly needs$"
     for ask in (access.getter, access.setter, lambda name: access.set(name, 1.0)):
         with pytest.raises(FlightError, match=message):
             ask("side")
@@ -174,7 +174,7 @@ def test_a_stick_has_a_factor_for_each_side(
 def test_an_optional_property_is_needed_only_for_an_unusual_value(manager: FakeManager, access: PropertyAccess) -> None:
     access.set_optional("braking", 0.0, default=0.0)
     assert "braking" not in manager.nodes
-    with pytest.raises(FlightError, match="property braking is needed"):
+    with pytest.raises(FlightError, match="does not define the property braking"):
         access.set_optional("braking", 1.0, default=0.0)
     # Where it stands, the usual value is set too: the model may have another.
     access.set_optional("speed", 1.0, default=1.0)

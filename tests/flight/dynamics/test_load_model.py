@@ -27,7 +27,7 @@ def test_a_missing_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     [
         ("<p> aero/beta-rad </p>", "<p> aero/side-angle </p>", "property aero/side-angle is read, and neither"),
         ("<p> aero/beta-rad </p>", "<p> propulsion/engine[7]/thrust-lbs </p>", "propulsion/engine[7]/thrust-lbs"),
-        ("motor/battery-current-a", "motor/amperes", "property motor/battery-current-a is needed and not defined"),
+        ("motor/battery-current-a", "motor/amperes", "the model does not define the property motor/battery-current-a"),
     ],
 )
 def test_an_unknown_property(old: str, new: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

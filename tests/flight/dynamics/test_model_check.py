@@ -87,7 +87,7 @@ def test_missing_model_is_refused(model: Aircraft) -> None:
 def test_model_without_our_properties_is_refused(model: Aircraft) -> None:
     text = model.model_file.read_text()
     model.model_file.write_text(text.replace("motor/battery-current-a", "motor/amperes"))
-    with pytest.raises(FlightError, match="property motor/battery-current-a is needed and not defined"):
+    with pytest.raises(FlightError, match="the model does not define the property motor/battery-current-a"):
         Fdm(model)
 
 

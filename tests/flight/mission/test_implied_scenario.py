@@ -79,7 +79,7 @@ def test_samples_have_a_scenario_without_terrain(name: str) -> None:
 
 
 def test_heights_over_terrain_need_terrain() -> None:
-    with pytest.raises(MissionError, match=r"item 1: height above terrain.*no terrain is given"):
+    with pytest.raises(MissionError, match=r"item 1: height above terrain.*requires terrain"):
         implied_scenario(read_mission(SAMPLES / "mavproxy_terrain.txt"), None)
 
 

@@ -42,8 +42,8 @@ def test_speeds_count_for_the_legs_after_them() -> None:
 def test_a_distance_to_fly_on_beyond_a_waypoint_is_flown_and_a_negative_one_leaves_the_verdict_open() -> None:
     flown = route(wp(0, 0), wp(0, 900, p="0 0 150.9 0"), wp(900, 900, p="0 0 -50 0"), wp(900, 1800))
     assert flown.notes == (
-        "item 2: NAV_WAYPOINT with 150 m to fly on beyond it, as ArduPlane does",
-        "item 3: NAV_WAYPOINT with -50 m to fly on beyond it: flown as 0, where ArduPlane may fly 255 m",
+        "item 2: NAV_WAYPOINT: flown on for 150 m beyond it, as ArduPlane does",
+        "item 3: NAV_WAYPOINT: -50 m to fly on beyond it: flown as 0 m, but ArduPlane may fly 255 m",
     )
     assert [one.item for one in flown.open_items] == [3]
 
@@ -52,11 +52,11 @@ def test_a_distance_to_fly_on_beyond_a_waypoint_is_flown_and_a_negative_one_leav
     ("change", "airspeed", "noted"),
     [
         ("0 22 -1", 22.0, None),
-        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1: flown as airspeed, as its type is not read"),
-        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2: flown as airspeed, as its type is not read"),
-        ("0 0 -1", 25.0, "DO_CHANGE_SPEED to 0 m/s: back to the autopilot's own airspeed"),
-        ("0 -1 -1", 25.0, "DO_CHANGE_SPEED to -1 m/s: back to the autopilot's own airspeed"),
-        ("0 -2 -1", 25.0, "DO_CHANGE_SPEED to -2 m/s: back to the autopilot's own airspeed"),
+        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1: flown as airspeed, because PX4 ignores the type"),
+        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2: flown as airspeed, because PX4 ignores the type"),
+        ("0 0 -1", 25.0, "DO_CHANGE_SPEED to 0 m/s: returns to PX4's default airspeed"),
+        ("0 -1 -1", 25.0, "DO_CHANGE_SPEED to -1 m/s: returns to PX4's default airspeed"),
+        ("0 -2 -1", 25.0, "DO_CHANGE_SPEED to -2 m/s: returns to PX4's default airspeed"),
         ("0 -1 80", 25.0, "DO_CHANGE_SPEED's throttle: not flown"),
     ],
 )

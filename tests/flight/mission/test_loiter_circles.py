@@ -131,7 +131,7 @@ def test_stops_inside_a_circle_are_left_out() -> None:
     assert "the flight starts in the air, trimmed, on the loiter of item 2" in start.started
     assert math.hypot(*start.positions[0, :2]) == pytest.approx(120.0, abs=0.1)
     two = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 120 0"), wp(0, 2050, command=19, p="30 0 -100 0"), wp(3000, 0))
-    assert any("item 3: its circle has no tangent" in note for note in two.notes)
+    assert any("item 3: no tangent joins its circle" in note for note in two.notes)
     assert circled(two, 3)[1] == 120.0
     here = route(wp(0, 0), wp(0, 2000), "2 18 1 0 120 0 0 0 0", wp(3000, 2000))
     assert list(dict.fromkeys(here.items.tolist())) == [1, 3, 4]
@@ -311,7 +311,7 @@ def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> N
         (
             wp(0, 0, 100, 18, p="2 0 207 0"),
             280.0,
-            "loiter radius 207 m: flown with 280 m, because the radius grows with altitude",
+            "loiter radius 207 m: flown with 280 m, because the autopilot enlarges it with altitude",
         ),
     ):
         made = laid_for(rules, wp(0, -1500), loiter, wp(1500, 1500))

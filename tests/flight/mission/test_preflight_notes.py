@@ -68,11 +68,11 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
     (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
     assert said == (
         "item 4: lands on course 90°, against 4.0 m/s of wind; over 200 m around the landing point the ground rises"
-        " by 3.0% in the landing direction, and falls by 2.0% to the right; the scenario has no [landing], so"
-        " touch-down and roll-out are not judged"
+        " by 3.0% in the landing direction, and falls by 2.0% to the right; touchdown and roll-out"
+        " are not judged, because the scenario has no [landing]"
     )
     assert (
-        "around the landing point the ground is level; the scenario has no [landing]"
+        "around the landing point the ground is level; touchdown and roll-out"
         in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
     )
     assert (
@@ -80,20 +80,20 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
         in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
     )
     (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
-    assert "with 4.0 m/s of tailwind; the terrain there is unknown; the scenario has no [landing]" in said
+    assert "with 4.0 m/s of tailwind; the terrain there is unknown; touchdown and roll-out are not judged" in said
     assert landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0), LandingStrip(2500.0, 2000.0)) == []
 
 
 @pytest.mark.parametrize(("east", "north", "told"), [(0.099, 0.0, False), (0.101, 0.0, True), (0.0, -0.101, True)])
 def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, told: bool) -> None:
     (said,) = landed_on(sloped(east, north), Wind(0.0, 0.0))
-    assert ("(10% is the limit for a plan's landing)" in said) is told
+    assert ("(plans land on slopes of up to 10%)" in said) is told
     # It leaves the verdict open, too.
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     setup = replace(setup, scenario=replace(setup.scenario, terrain=sloped(east, north)))
     left = [one.reason for one in mission_findings(setup) if one.check == NOT_FLOWN]
     assert left == (
-        ["NAV_LAND: the ground there slopes by 10.1%: a touchdown is judged on up to 10% only"] if told else []
+        ["NAV_LAND: the ground there slopes by 10.1%; a touchdown is judged only on up to 10%"] if told else []
     )
 
 
@@ -101,15 +101,17 @@ def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, to
 def test_wind_from_behind_at_a_launch(from_deg: float, tail: float) -> None:
     found = notes(*WAY, launch=Launch("hand"), wind=Wind(4.0, math.radians(from_deg)))
     assert len(found) == (tail > 0.0)
-    assert all(one.startswith("launch: 4.0 m/s of tailwind on 0°") for one in found)
+    assert all(one.startswith("launch: 4.0 m/s of tailwind on course 0°") for one in found)
 
 
 def test_wind_from_behind_at_a_stated_course_and_at_a_landing() -> None:
     wind = Wind(4.0, math.radians(270.0))
     assert notes(*WAY, launch=Launch("hand", course=math.radians(60.0)), wind=wind) == [
-        f"launch: {4.0 * math.cos(math.radians(30.0)):.1f} m/s of tailwind on 60°"
+        f"launch: {4.0 * math.cos(math.radians(30.0)):.1f} m/s of tailwind on course 60°"
     ]
-    assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=wind) == ["landing: 4.0 m/s of tailwind on 90°"]
+    assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=wind) == [
+        ("landing: 4.0 m/s of tailwind on course 90°")
+    ]
     assert notes(*WAY, landing=LandingStrip(2500.0, 2000.0), wind=Wind(4.0, math.radians(90.0))) == []
 
 
@@ -141,7 +143,9 @@ def test_a_rally_point_in_the_ground(alt: float, told: bool) -> None:
 def test_a_rally_point_in_the_ground_is_named_though_the_return_ends_above_it(alt: float, depth: int | None) -> None:
     """PX4 descends to RTL_DESCEND_ALT over a rally point: with 60 m, a point 50 m below the ground looks flyable."""
     found = notes(*WAY, rally(300, 300, alt), rules=ReturnRules(rally_height=60.0))
-    expected = [f"rally point 1 is {depth} m below the ground: {100 + alt:.0f} m AMSL, and the ground there 100 m"]
+    expected = [
+        f"rally point 1 is {depth} m below the ground: {100 + alt:.0f} m AMSL, but the ground there is at 100 m"
+    ]
     assert found == ([] if depth is None else expected)
 
 
@@ -171,7 +175,7 @@ def test_a_return_below_the_hills_about_home(north: float, top: float, told: boo
     found = notes(*WAY, rules=ReturnRules(height=80.0), ground=hill(north, top))
     assert bool(found) is told
     assert all(
-        one.startswith("an RTL loiters 80 m above home, and within 260 m of home the ground rises to 8")
+        one.startswith("an RTL loiters 80 m above home, but within 260 m of home the ground rises to 8")
         for one in found
     )
 
@@ -206,8 +210,8 @@ def test_an_item_that_states_its_height_above_home_as_amsl_is_named() -> None:
     """The ground is at 100 m AMSL and home is on it: 80 m AMSL are 20 m below the ground, 180 m AMSL 80 m above it."""
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 80, frame=0), LAND)
     assert note == (
-        "item 3: flown as stated, as altitudes above mean sea level (frame 0): 20 m below ground;"
-        " check the frame: as heights above home (frame 3) 80 m above ground"
+        "item 3: flown as altitudes above mean sea level (frame 0): 20 m below ground;"
+        " check the frame, because as heights above home (frame 3) they are 80 m above ground"
     )
     # Above the ground in its own frame, and below the ground in both: nothing is said.
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 180, frame=0), LAND) == []
@@ -219,12 +223,12 @@ def test_a_mission_that_states_amsl_as_heights_above_home_is_named() -> None:
     raised = (wp(0, 0, 160, command=22), wp(0, 2000, 180), wp(1500, 2000, 180), wp(2500, 2000, 100, command=21))
     (note,) = notes(*raised)
     assert note == (
-        "items 1, 2, 3, 4: flown as stated, as heights above home (frame 3): 100 to 180 m above ground;"
-        " check the frame: as altitudes above mean sea level (frame 0) 0 to 80 m above ground"
+        "items 1, 2, 3, 4: flown as heights above home (frame 3): 100 to 180 m above ground;"
+        " check the frame, because as altitudes above mean sea level (frame 0) they are 0 to 80 m above ground"
     )
     # One item that is higher than the others by home's altitude, and one that is 1 m short of it.
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 160), LAND)
-    assert note.startswith("item 3: flown as stated, as heights above home (frame 3): 160 m above ground; check the ")
+    assert note.startswith("item 3: flown as heights above home (frame 3): 160 m above ground; check the ")
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 159), LAND) == []
     # A home near sea level does not tell the frames apart.
     low = make_gridded_terrain(np.full((3, 3), 20.0), *[np.array([-9e3, 0.0, 9e3])] * 2, source="", sha256="", datum="")

@@ -257,7 +257,7 @@ def test_a_take_off_without_home_starts_at_the_first_position() -> None:
     assert flown.items.tolist() == [1, 2]
     assert flown.positions[0] == pytest.approx([0.0, 700.0, 380.0], abs=0.01)
     assert "over the first position, as there is no home" in flown.started
-    assert "home has no altitude: taken as the ground at 36.506" in flown.notes[-1]
+    assert "home has no altitude: the ground at 36.506" in flown.notes[-1]
 
 
 def test_heights_of_every_frame_are_amsl() -> None:
@@ -277,13 +277,13 @@ def test_heights_of_every_frame_are_amsl() -> None:
 
 def test_a_home_off_the_ground_is_noted() -> None:
     flown = route(wp(0, 100), wp(0, 900), home="36.5 -84.2 0", terrain=ground())
-    assert "home is at 0.0 m AMSL, and the ground there at 300.0 m" in flown.notes[0]
+    assert "home is at 0.0 m AMSL, but the ground there is at 300.0 m" in flown.notes[0]
 
 
 def test_cruise_speed_is_no_command() -> None:
     flown = make_route(read_mission(SAMPLES / "qgc_amsl.plan"), ORIGIN, None, 25.0, False)
     assert set(flown.leg_airspeeds.tolist()) == {25.0}
-    assert "cruiseSpeed 15 m/s is the ground station's estimate" in flown.notes[-1]
+    assert "cruiseSpeed 15 m/s is only an estimate of the ground station" in flown.notes[-1]
 
 
 def test_stops_at_one_position_are_merged() -> None:
@@ -297,9 +297,9 @@ def test_refusals_name_the_item() -> None:
     assert "no item has a position" in refusal("2 178 0 25 -1 0 0 0 0")
     assert "1 position to fly to" in refusal(wp(0, 0))
     assert "1 position to fly to" in refusal(wp(0, 0), wp(0, 0))
-    assert "item 1: height above terrain (frame 10) at latitude 36.50000, longitude -84.20000: no terrain" in refusal(
-        wp(0, 0, frame=10), wp(0, 900)
-    )
+    assert (
+        "item 1: height above terrain (frame 10) at latitude 36.50000, longitude -84.20000: requires terrain"
+    ) in refusal(wp(0, 0, frame=10), wp(0, 900))
     assert "has no data there" in refusal(wp(0, 0), wp(0, 9000, frame=10), terrain=ground())
     assert "item 2: 9400.0 m AMSL: allowed -500..9000" in refusal(wp(0, 0), wp(0, 900, 9100))
     # Swapped columns that are both within range end on another continent.
@@ -316,7 +316,7 @@ def test_null_in_a_plan_keeps_what_is() -> None:
     assert flown.items.tolist() == [1, 3]
     assert flown.positions[:, 2].tolist() == [400.0, 400.0]
     assert "item 2: NAV_WAYPOINT without a position" in flown.notes[0]
-    assert flown.notes[1] == "item 3: NAV_WAYPOINT without an altitude: keeps the last height"
+    assert flown.notes[1] == "item 3: NAV_WAYPOINT without an altitude: flown at the altitude of the previous item"
     first[6] = None
     with pytest.raises(MissionError, match="item 1: no altitude, and no earlier item has one to keep"):
         make_route(parse_mission(json.dumps(data), "a.plan"), ORIGIN, None, 25.0, False)

@@ -103,9 +103,8 @@ def test_items_whose_seq_jumps_are_counted_as_pymavlink_counts_them(tmp_path: Pa
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
     (said,) = mission.warnings
     assert said == (
-        "a.waypoints:3: a gap in the sequence numbers before 3 (4 in all): items are numbered by their lines,"
-        " as in ground stations, and"
-        " jumps use these numbers"
+        "a.waypoints:3: the sequence numbers have a gap before 3 (4 gaps in all): items are numbered by line"
+        " instead, as ground stations do, and jumps use these numbers"
     )
 
 
@@ -121,9 +120,8 @@ def test_items_whose_seq_does_not_rise_are_counted_as_pymavlink_counts_them(tmp_
     ]
     assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
     assert [said for said in mission.warnings if "not higher" in said] == [
-        "a.waypoints:4: sequence number 3 is not higher than the one before (2 in all): items are"
-        " numbered by their lines, as in ground stations, and"
-        " jumps use these numbers"
+        "a.waypoints:4: sequence number 3 is not higher than the one before (2 such lines in all): items are"
+        " numbered by line instead, as ground stations do, and jumps use these numbers"
     ]
 
 
@@ -138,7 +136,7 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
     assert mission.home is None
     assert [item.seq for item in mission.items] == [1, 2, 3, 4]
     (said,) = mission.warnings
-    assert "not a position: ignored; the mission has no home" in said
+    assert "position: the mission has no home" in said
 
 
 @pytest.mark.parametrize(
@@ -150,8 +148,8 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
             Home(36.5, -84.2, 310.0),
             ["home in frame 3: its height is taken as above mean sea level; the file probably has no home line"],
         ),
-        ("3 22 15 0 0 0 0 0 100", None, ["home at 0, 0, which is not a position"]),
-        ("2 178 0 22 0 0 0 0 0", None, ["home at 0, 0, which is not a position"]),
+        ("3 22 15 0 0 0 0 0 100", None, ["home is at 0, 0, which stands for no position"]),
+        ("2 178 0 22 0 0 0 0 0", None, ["home is at 0, 0, which stands for no position"]),
     ],
 )
 def test_whatever_stands_in_the_line_of_home_is_home_as_in_pymavlink(

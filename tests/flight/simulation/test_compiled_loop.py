@@ -58,7 +58,7 @@ def test_each_law_flies_the_same_in_both(
     engine, *compiled = flown(setup, aerosonde)
     assert engine.startswith("compiled model, bit-identical to JSBSim ")
     chosen, *jsbsim = flown(replace(setup, engine="jsbsim"), aerosonde)
-    assert chosen == "JSBSim, as chosen"
+    assert chosen == "JSBSim, as requested"
     assert compiled == jsbsim
 
 
@@ -76,7 +76,7 @@ def test_a_flight_from_the_ground_to_the_ground_flies_the_same_in_both(method: L
     setup = circuit(Launch(method, math.radians(90.0), 20.0, 6.0, math.radians(12.0)), STRIP, wind=(2.0, 60.0))
     aircraft = load_aircraft("aerosonde")
     compiled, jsbsim = (Flight(replace(setup, engine=engine), aircraft) for engine in ("auto", "jsbsim"))
-    assert (compiled.engine[:8], jsbsim.engine) == ("compiled", "JSBSim, as chosen")
+    assert (compiled.engine[:8], jsbsim.engine) == ("compiled", "JSBSim, as requested")
     found, expected = fly_to_end(compiled), fly_to_end(jsbsim)
     assert found.ended == expected.ended == "completed"
     assert float(found.track.airspeed[-1]) < 5.0
@@ -86,7 +86,7 @@ def test_a_flight_from_the_ground_to_the_ground_flies_the_same_in_both(method: L
 
 def test_jsbsim_flies_a_takeoff_from_a_runway() -> None:
     flight = Flight(circuit(Launch("runway", math.radians(90.0)), None), load_aircraft("aerosonde"))
-    assert flight.engine == "JSBSim, since the compiled model does not cover a start on the ground"
+    assert flight.engine == "JSBSim, because the compiled model does not cover a start on the ground"
 
 
 def test_jsbsim_flies_from_the_start_if_the_compiled_model_differs(
@@ -102,7 +102,7 @@ def test_jsbsim_flies_from_the_start_if_the_compiled_model_differs(
 
     monkeypatch.setattr(CompiledModel, "find_differences", find_one)
     engine, *found = flown(setup, aerosonde)
-    assert engine == "JSBSim, since the compiled model differs from it in metrics/bw-ft"
+    assert engine == "JSBSim, because the compiled model differs from it in metrics/bw-ft"
     assert found == expected
 
 
@@ -111,4 +111,4 @@ def test_jsbsim_flies_what_is_not_covered(
 ) -> None:
     monkeypatch.setattr("flight.dynamics.fdm.Fdm.model_text", lambda _: b"<fdm_config><system/></fdm_config>")
     flight = Flight(make_setup(WAY), aerosonde)
-    assert flight.engine == "JSBSim, since the compiled model does not cover the section <system>"
+    assert flight.engine == "JSBSim, because the compiled model does not cover the section <system>"

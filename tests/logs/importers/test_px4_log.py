@@ -4,7 +4,9 @@ import re
 import struct
 import subprocess
 import sys
+import threading
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 from pyulog import ULog
 
 from flight.mission.items import Home
+from logs.importers import px4_log
 from logs.importers.clean_positions import clean_positions
 from logs.importers.logged_missions import plane_mode, px4_mode, px4_state
 from logs.importers.open_log import open_log
@@ -19,6 +22,7 @@ from logs.importers.px4_log import find_damage, read_px4
 from logs.importers.raw_log import example_raw_log
 from tests.logs.importers.written_logs import px4
 from world.errors import LogError
+from world.silent_output import silence
 
 
 def test_auto_alone_follows_the_mission() -> None:
@@ -41,6 +45,32 @@ def test_rows_are_what_pyulog_reads(tmp_path: Path) -> None:
     for k in np.linspace(0, 459, 10).astype(int):
         assert position.time[k] == pytest.approx(place["timestamp"][k] * 1e-6)
         assert position.values[k].tolist() == [place["lat"][k], place["lon"][k], place["alt"][k]]
+
+
+def test_standard_output_is_given_back_after_two_threads_suppressed_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A log is opened while another thread, which loads JSBSim, suppresses the output, and is closed after it."""
+    path, stdout, has_opened, may_close = px4(tmp_path / "a.ulg"), sys.stdout, threading.Event(), threading.Event()
+
+    def read(*_: object, **__: object) -> None:
+        has_opened.set()
+        may_close.wait(60.0)
+        raise ValueError("read no further")
+
+    def open_log_in_thread() -> None:
+        with suppress(LogError):
+            read_px4(path)
+
+    monkeypatch.setattr(px4_log, "ULog", read)
+    with silence():
+        thread = threading.Thread(target=open_log_in_thread)
+        thread.start()
+        # With a lock the log is not opened yet.
+        has_opened.wait(0.3)
+    may_close.set()
+    thread.join()
+    assert sys.stdout is stdout
 
 
 def test_attitudes_are_the_angles_of_the_quaternion(tmp_path: Path) -> None:

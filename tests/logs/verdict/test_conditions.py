@@ -35,7 +35,7 @@ def test_an_aircraft_that_nobody_named_is_said_to_be_the_default() -> None:
     # An option that says nothing of the aircraft names none either.
     line, _ = lines_of(setup.in_scenario(with_flight(unnamed, airspeed_mps=24.0)))
     assert "no aircraft was named" in line
-    assert "(as stated)" in line
+    assert "(from the scenario or an option)" in line
     line, _ = lines_of(setup.in_scenario(with_flight(unnamed, aircraft="aerosonde")))
     assert "as this is the default" not in line
 
@@ -44,12 +44,14 @@ def test_weather_and_ground() -> None:
     setup = make_setup()
     windy = with_wind(setup.scenario, 8.04, 3.0 * 3.14159265 / 2.0, "moderate")
     _, line = lines_of(setup.in_scenario(windy))
-    begin = "Conditions: wind 8.04 m/s from 270 degrees, moderate turbulence; navigation exact; terrain "
+    begin = (
+        "Conditions: wind 8.04 m/s from 270 degrees, moderate turbulence; navigation without position error; terrain "
+    )
     assert line.startswith(begin)
     assert "heights above " in line
     calm = replace(with_wind(setup.scenario, 0.0, 0.0, "none"), terrain=None)
     _, line = lines_of(setup.in_scenario(calm))
-    assert line == "Conditions: no wind, no turbulence; navigation exact; no terrain; 1 zone"
+    assert line == "Conditions: no wind, no turbulence; navigation without position error; no terrain; 1 zone"
     _, line = lines_of(replace(setup, nav="gnss"))
     assert "; navigation with a GNSS error of 1.5 m on each axis; " in line
 
@@ -92,7 +94,7 @@ def test_the_kind_of_an_airspeed_and_who_states_it() -> None:
     assert said == [
         "25.2 m/s true airspeed (its cruise speed)",
         "25.2 m/s equivalent airspeed (its cruise speed)",
-        "25.2 m/s equivalent airspeed (by the autopilot's parameters)",
+        "25.2 m/s equivalent airspeed (from the autopilot's parameters)",
     ]
     assert judging_conditions(replace(unstated, autopilot=ArduPlane(mine))).autopilot_version == "4.7"
     px4 = Px4.load(FlightTable(autopilot="px4", px4_version="1.16"), load_aircraft("aerosonde"), "a")
@@ -118,8 +120,8 @@ def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     setup = replace(setup.in_scenario(replace(setup.scenario, flight=FlightTable())), source=source)
     lines = lines_of(setup)
     assert lines[0] == (
-        "Aircraft: not named (--aircraft names yours), so none of its limits are judged;"
-        " 25.2 m/s true airspeed (as it was flown)"
+        "Aircraft: not named, so none of its limits are judged (--aircraft names yours);"
+        " 25.2 m/s true airspeed (from the log)"
     )
     assert "turbulence" not in lines[1]
     assert "navigation" not in lines[1]

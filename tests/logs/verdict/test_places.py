@@ -88,7 +88,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
         assert verdict.levels[-1].headline == verdict.headline
     three = asked["geometry", "airframe", "autopilot"]
     assert three.lines[-2:] == (
-        "By geometry only: flyable; flight and geometry agree on every finding that both have",
+        "By geometry only: flyable; flight and geometry agree on every finding that both judge",
         "Airframe alone (planfly's guidance, exact navigation): flyable; both flights agree",
     )
 
@@ -232,3 +232,16 @@ def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilo
         assert verdict.headline == verdict.levels[-1].headline
         assert "not started: no progress" in verdict.headline
         assert verdict.lines[-1] == "By geometry only: flyable"
+
+
+def test_a_flight_that_fails_at_take_off_does_not_pass_with_another_guidance() -> None:
+    """The circuit ends 2 s after its launch; the airframe's flight begins in the air, and flies all its legs."""
+    flown = flown_circuit()
+    track = flown.track.rows(0, int(np.searchsorted(flown.track.time, flown.track.time[0] + 2.0)))
+    verdict = judge_flight(flown.setup, track, "it hit the ground", reference=ReferenceFlights(PASSED))
+    failed_rules = {finding.rule for finding in verdict.failed}
+    assert {"launch", "completion"} <= failed_rules
+    (airframe,) = (level for level in verdict.levels if level.name == "airframe")
+    assert airframe.disagreements == ()
+    assert verdict.lines[-1].endswith("flyable; it begins in the air, after the take-off that failed")
+    assert "passes with planfly's guidance" not in verdict.summary

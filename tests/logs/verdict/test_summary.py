@@ -57,8 +57,8 @@ def test_a_threat_is_named_once() -> None:
     places = (missile("Alfa"), Place("missile", 1), missile("threatening hill"))
     items = [make_finding("threat", place, ok=False, reason="", flown=3.0) for place in places]
     assert headline(items, False) == (
-        "not flyable: threat Alfa (missile) (3.0 s inside its range), threat 2 (missile) (3.0 s inside its range),"
-        " threat threatening hill (missile) (3.0 s inside its range)"
+        "not flyable: missile Alfa (3.0 s inside its range), missile threat 2 (3.0 s inside its range),"
+        " missile threatening hill (3.0 s inside its range)"
     )
 
 

@@ -66,7 +66,7 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
     planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, seed=2, out=out, resume=True)
     assert (out / "plan.json").read_bytes() == plan
     assert len(table(out / "winds.sqlite")) == 1
-    with pytest.raises(planfly.PlanflyError, match="directions 8: the stored flights were requested with 4"):
+    with pytest.raises(planfly.PlanflyError, match="directions 8: expected 4, as in the campaign that is resumed"):
         planfly.winds("paper-07", prove=0.9, directions=8, most=15.0, seed=2, out=out, resume=True)
 
 
@@ -118,6 +118,7 @@ def test_a_campaign_that_goes_on_keeps_its_confidence_unless_one_is_named(
     goals = [campaigns.continued_goal(tmp_path, flights, prove, at_least, one) for one in named]
     assert [one.confidence for one in goals] == list(named)
     assert campaigns.continued_goal(tmp_path, flights, prove, at_least, None) == Goal(0.9, False, 9, 0.8)
+    assert campaigns.continued_goal(tmp_path, 12, prove, at_least, None).target == 0.9
 
 
 def test_a_campaign_that_goes_on_without_a_number_says_its_number(

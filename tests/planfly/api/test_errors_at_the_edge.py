@@ -86,7 +86,10 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
         _Known("a.parm", "", "wp radius\t9", "expected a name and a value"),
     ),
     "a log": (lambda: planfly.read_log(_file("a.mcap", "no log")), _Known("a.mcap", "", None, "")),
-    "an aircraft's name": (lambda: planfly.aircraft("boeing"), _Known("boeing", "", None, "known names: aerosonde")),
+    "an aircraft's name": (
+        lambda: planfly.aircraft("boeing"),
+        _Known("boeing", "", None, "built-in aircraft: aerosonde"),
+    ),
     "an aircraft's folder": (lambda: planfly.aircraft(_own_aircraft()), _Known("mine.toml", "mass_kg", -1, "")),
     "a folder that a flight names": (
         lambda: planfly.plan("tight", aircraft=_own_aircraft()),

@@ -99,7 +99,7 @@ def test_what_a_file_does_not_hold_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.waypoints").write_text(gap)
     gap_note, autopilot_note = planfly.export(tmp_path / "a.waypoints", tmp_path / "a.plan").notes
     assert "names no autopilot" in autopilot_note
-    assert "a gap in the sequence numbers before 2" in gap_note
+    assert "the sequence numbers have a gap before 2" in gap_note
 
 
 def test_a_plan_for_px4_without_a_landing_is_exported_with_a_word(path: planfly.Plan, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def test_addresses_are_split_and_normalised(to: str | list[str]) -> None:
         (("localhost:14550", VEHICLE), "to localhost: expected an IP address"),
         ((STATION, VEHICLE, "me"), "allow me: expected an IP address"),
         # The link's own rule: nobody beyond this machine without a key or a list.
-        ((STATION, "0.0.0.0:14580"), "bind 0.0.0.0:14580: reaches beyond this machine"),
+        ((STATION, "0.0.0.0:14580"), "bind 0.0.0.0:14580: other machines can reach this address"),
     ],
 )
 def test_what_is_no_address_names_its_argument(given: tuple[str, ...], message: str) -> None:

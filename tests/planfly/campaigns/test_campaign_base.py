@@ -64,7 +64,8 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
         check_level_flight_at_medians(made)
         return
     with pytest.raises(
-        SpreadError, match=r"mine.toml: with the median factors mass 1.9, drag 2.85, .* cannot fly level at 25 m/s"
+        SpreadError,
+        match=r"mine.toml: with the medians of its factors \(mass 1.9, drag 2.85\) .* cannot fly level at 25 m/s",
     ):
         check_level_flight_at_medians(made)
 

@@ -1,5 +1,7 @@
 """Two campaigns compared: in pairs where the draws are the same, else as two samples."""
 
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -87,7 +89,7 @@ def test_the_flights_that_both_have_are_compared_and_a_stopped_campaign_is_noted
     second = fly(base, tmp_path / "b", 30, {}, Goal(0.9, True, 5000))
     found = planfly.compare_campaigns(first, second)
     assert (found.pairs, found.answer, found.inputs) == (20, "no difference shown", ())
-    assert found.notes[0] == "the difference is that of the 20 flights that both campaigns have"
+    assert found.notes[0] == "only 20 flights that both campaigns have are compared, in the difference and by rule"
     assert "only approximate" in found.notes[1]
     assert "  differs nothing but planfly's code, if anything" in comparison_lines(found)
 
@@ -100,7 +102,7 @@ def test_a_campaign_is_compared_with_a_campaign_only(
     for argv, words in (
         ([str(first), "flight.mcap"], "flight.mcap: no campaign; expected a folder with a campaign.sqlite"),
         ([str(first), str(empty)], "no flight of this campaign was flown"),
-        ([str(first), str(first), "--svg"], "--svg: only with two flight logs"),
+        ([str(first), str(first), "--svg"], "--svg: allowed only with two flight logs"),
     ):
         assert main(["compare", *argv]) == 2
         assert words in capsys.readouterr().err
@@ -122,3 +124,21 @@ def test_undecided_flights_fail_no_rule_and_are_noted(base: CampaignBase, tmp_pa
 def _made(folder: Path) -> Path:
     folder.mkdir()
     return folder
+
+
+def test_rules_are_compared_on_the_flights_that_both_campaigns_have(base: CampaignBase, tmp_path: Path) -> None:
+    """Of 40 flights the first 10 were flown twice, with the same 4 failures; the other 30 fail only in the first."""
+    same = dict.fromkeys(range(4), "clearance")
+    first = fly(base, tmp_path / "a", 40, same | dict.fromkeys(range(10, 40), "slope"))
+    found = planfly.compare_campaigns(first, fly(base, tmp_path / "b", 10, same))
+    assert (found.difference.value, found.only_first, found.only_second) == (0.0, 0, 0)
+    assert found.rules == [("clearance", 4, 4)]
+    assert "  fails   clearance: as often, in 4 and 4 flights (+0.0 %)" in comparison_lines(found)
+
+
+def test_a_table_whose_rows_were_changed_is_not_compared(base: CampaignBase, tmp_path: Path) -> None:
+    first, second = fly(base, tmp_path / "a", 6, {}), fly(base, tmp_path / "b", 6, {})
+    with closing(sqlite3.connect(second / "campaign.sqlite")) as connection, connection:
+        connection.execute("UPDATE flights SET outcome = 'not flyable' WHERE flight IN (2, 5)")
+    with pytest.raises(planfly.PlanflyError, match=r"2 rows damaged or changed by another program \(flights 2, 5\)"):
+        planfly.compare_campaigns(first, second)

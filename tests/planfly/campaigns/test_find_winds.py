@@ -133,7 +133,8 @@ def test_a_direction_in_which_every_flight_fails_does_not_fail_the_mission_in_ca
     lines = wind_lines(found)
     assert lines[0].startswith("not judged: 4 of 4 directions have too few flights (6 to 10 flights)")
     assert lines[1] == (
-        "180°: fails in 5.0 m/s, the weakest wind flown (4 of 4 flights); the boundary is below 5.0 m/s, not judged"
+        "wind from 180°: 4 of 4 flights fail in 5.0 m/s, the weakest wind flown;"
+        " the boundary is below 5.0 m/s, and is not judged"
     )
     assert not any("calm" in line for line in lines)
     # Flights in nearly calm air show it.
@@ -237,7 +238,7 @@ def test_a_mission_that_always_fails_in_calm_air_is_answered_at_once(
     assert [boundary.estimate for boundary in found.boundaries] == [0.0] * 4
     assert table(tmp_path / WINDS_DATABASE) == []
     lines = wind_lines(found)
-    assert lines[0] == f"does not fly with P >= {target:g} even in calm air"
+    assert lines[0] == f"not flyable with P >= {target:g} even in calm air"
     assert lines[1] == f"in calm air, {flights} of {flights} flights fail"
     assert "clearance" in lines[2]
     assert "leg 3" in lines[2]

@@ -122,14 +122,20 @@ def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBa
     assert table(tmp_path / "part" / CAMPAIGN_DATABASE) == want
 
 
+def kept_goal(folder: Path, confidence: float | None = None) -> Goal:
+    """Return the goal of a campaign that is resumed without a goal."""
+    return resumed_goal(Goal(None, False, 300), folder, confidence, keeps_target=True, keeps_flights=True)
+
+
 def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="there is no campaign to continue"):
-        resumed_goal(None, tmp_path)
+        kept_goal(tmp_path)
     asked = Goal(0.9, False, 40, 0.8)
     with open_store(base, asked, tmp_path, resume=False):
         pass
-    assert resumed_goal(None, tmp_path) == asked
-    assert resumed_goal(None, tmp_path, 0.95) == replace(asked, confidence=0.95)
+    assert kept_goal(tmp_path) == asked
+    assert kept_goal(tmp_path, 0.95) == replace(asked, confidence=0.95)
+    assert resumed_goal(Goal(None, False, 42), tmp_path, keeps_target=True) == replace(asked, flights=42, changed=True)
     assert resumed_goal(Goal(0.9, False, 40), tmp_path) == asked
     assert resumed_goal(Goal(0.9, False, 40), tmp_path, 0.95) == Goal(0.9, False, 40, 0.95)
     assert resumed_goal(replace(asked, target=0.95), tmp_path) == replace(asked, target=0.95)
@@ -148,7 +154,7 @@ def test_a_number_of_flights_that_was_changed_is_said_to_be(base: CampaignBase, 
     assert "changed" not in Goal(None, False, 6).method
     with open_store(base, more, tmp_path, resume=True):
         pass
-    assert resumed_goal(None, tmp_path) == resumed_goal(Goal(None, False, 6), tmp_path) == more
+    assert kept_goal(tmp_path) == resumed_goal(Goal(None, False, 6), tmp_path) == more
     # One that stops is valid at any number.
     assert "changed" not in resumed_goal(Goal(0.9, True, 6), tmp_path).method
 
@@ -163,7 +169,7 @@ def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: Campai
     assert table(tmp_path / CAMPAIGN_DATABASE) == before
     # Nor are the refused question's settings kept.
     assert read_stored_settings(tmp_path / CAMPAIGN_DATABASE)["flights"] == 5
-    assert resumed_goal(None, tmp_path) == Goal(None, False, 5)
+    assert kept_goal(tmp_path) == Goal(None, False, 5)
     with open_store(base, Goal(None, False, 5), tmp_path, resume=True) as store:
         assert store.tally().flown == 5
 

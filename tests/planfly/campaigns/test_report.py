@@ -127,12 +127,14 @@ def test_flights_are_counted_by_wind() -> None:
     first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(ESTIMATED)[1] == (
-        "flies with P >= 0.9, by the best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
-        " over 20 m/s from 270°"
+        "by the best estimate, flyable with P >= 0.9 in wind up to 7.0 m/s from 0° (the lowest; 6.5 to"
+        " 7.5 m/s at 95 %),"
+        " and up to over 20 m/s from 270° (the highest)"
     )
     alike = replace(ESTIMATED, boundaries=(*(WindBoundary(20.0, 18.0 + k, 20.0, True) for k in (1, 0, 1, 1)),))
     assert wind_lines(alike)[1] == (
-        "flies with P >= 0.9, by the best estimate, in wind up to over 20 m/s from 90° (the lowest; 18.0 to over 20 m/s"
+        "by the best estimate, flyable with P >= 0.9 in wind up to over 20 m/s from 90° (the lowest;"
+        " 18.0 to over 20 m/s"
         " at 95 %)"
     )
 
@@ -149,7 +151,9 @@ def test_no_boundary_of_too_few_flights_is_stated(base: CampaignBase, tmp_path: 
     assert "no limit found" not in page
     partly = replace(ESTIMATED, flights=ESTIMATED.flights[:-1])
     assert repr(partly) == "<WindsResult 4 directions, 4 of them not judged, 7.0 m/s the lowest; 599 flights>"
-    assert wind_lines(partly)[1].endswith("(the lowest; 6.5 to 7.5 m/s at 95 %), 9.0 m/s from 180°")
+    assert wind_lines(partly)[1].endswith(
+        "(the lowest; 6.5 to 7.5 m/s at 95 %), and up to 9.0 m/s from 180° (the highest)"
+    )
 
 
 def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
@@ -161,12 +165,12 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
     found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
     # The answer of calm air comes before the direction that is not judged, and is that of the other three.
-    assert wind_lines(found)[0] == "does not fly with P >= 0.9 even in calm air"
+    assert wind_lines(found)[0] == "not flyable with P >= 0.9 even in calm air"
     assert wind_lines(found)[1].startswith("not judged in full: 1 of 4 directions has too few flights (1 flight): each")
     found = replace(found, flights=ESTIMATED.flights)
     assert wind_lines(found)[:4] == [
-        "does not fly with P >= 0.9, by the best estimate, in any wind from 0°, even a light one;"
-        " it flies in wind up to 2.0 m/s from 270°",
+        "by the best estimate, not flyable with P >= 0.9 in any wind from 0°, even a light one;"
+        " flyable in wind up to 2.0 m/s from 270°",
         "in calm air, 3 of 4 flights fail",
         "  failed  slopes in 1: leg 2 in 1",
         "  failed  clearance in 3: leg 4 in 3",
@@ -176,7 +180,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
         found, flights=FOUND.flights, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:])
     )
     assert wind_lines(nowhere)[:2] == [
-        "does not fly with P >= 0.9 even in calm air",
+        "not flyable with P >= 0.9 even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]
 
@@ -199,7 +203,7 @@ def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, t
     clearance, slope = (RuleFailures(rule, 3, ((Place("leg", 4), 3),)) for rule in ("clearance", "slope"))
     most = replace(slope, flights=4)
     found = replace(FOUND, failures=((clearance, most), (slope,), (clearance, slope), ()))
-    line = "fails most often, up to the boundary: slopes from 0° to 90°; clearance from 180°"
+    line = "rule that fails most flights, up to the boundary: slopes from 0° to 90°; clearance from 180°"
     assert [one for one in wind_lines(found) if one.startswith("fails most")] == [line]
     assert not any(one.startswith("fails most") for one in wind_lines(FOUND))
     write_winds(tmp_path, base, found, "planfly winds x")
@@ -262,7 +266,7 @@ def test_the_cases_of_continuous_integration_are_the_answer_and_each_direction()
     flights = ((0, 0.0, False),) * 3
     failing = winds_suite("m", replace(FOUND, boundaries=calm, flights=flights, calm=CalmFailures(0.0, 3, 3, ())))
     assert [case.result for case in failing.cases] == ["failure"] * 5
-    assert {case.message for case in failing.cases} == {"does not fly with P >= 0.9 even in calm air"}
+    assert {case.message for case in failing.cases} == {"not flyable with P >= 0.9 even in calm air"}
 
 
 def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
@@ -292,7 +296,7 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
 
 
 def test_flights_that_could_not_be_flown_are_named() -> None:
-    assert any(line.endswith("and count as not flyable: 1 (8.0 m/s from 0°)") for line in wind_lines(FOUND))
+    assert any(line.endswith("they count as not flyable: 1 (8.0 m/s from 0°)") for line in wind_lines(FOUND))
     assert not any("lost" in line for line in wind_lines(replace(FOUND, lost=())))
 
 

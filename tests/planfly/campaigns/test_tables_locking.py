@@ -124,7 +124,7 @@ def test_another_campaign_and_a_missing_one_are_refused(tmp_path: Path) -> None:
         opened(path, resume=True)
     assert not path.exists()
     opened(path).__exit__(None, None, None)
-    with pytest.raises(StoreError, match=r"another campaign: planfly's code differs"):
+    with pytest.raises(StoreError, match=r"other settings: planfly's code differs"):
         opened(path, "b", resume=True)
 
 

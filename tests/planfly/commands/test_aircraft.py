@@ -147,14 +147,14 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["zeppelin"], "no aircraft called 'zeppelin'"),
         (["./nowhere"], "./nowhere: no such folder; planfly aircraft --new ./nowhere makes it"),
         (["./full"], "full.toml: No such file"),
-        (["c172x", "--motor-braking"], "motor/braking is needed and not defined"),
+        (["c172x", "--motor-braking"], "the model does not define the property motor/braking, which"),
         (["aerosonde", "--out", "full"], "exists and is not empty"),
         (["aerosond"], "did you mean 'aerosonde'?"),
         (["full"], "did you mean './full'?"),
         (["--new", "./full"], "full: exists; --overwrite replaces it, or name another folder"),
         (["--new", "./mine", "--from", "zeppelin"], "no aircraft called 'zeppelin'"),
-        (["mine", "--new", "./mine"], "--new takes only the folder"),
-        (["--from", "aerosonde"], "--from: only with --new"),
+        (["mine", "--new", "./mine"], "mine: cannot be combined with --new FOLDER"),
+        (["--from", "aerosonde"], "--from: allowed only with --new"),
     ],
 )
 def test_a_bad_name_or_folder_is_one_line(
@@ -285,7 +285,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
 @pytest.mark.parametrize(
     ("argv", "told"),
     [
-        (("--mass", "2.1"), "--span: required for a data sheet: 0.5..6 m"),
+        (("--mass", "2.1"), "--span: missing; a data sheet needs it (0.5..6 m)"),
         ((*SIX, "--mass", "60"), "--mass 60.0 kg: allowed 0.5..25 kg"),
         ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
         ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),
@@ -295,10 +295,10 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
             "--battery 631 Wh: allowed up to 630 Wh for an aircraft of 2.1 kg (300 Wh per kg)",
         ),
         ((*SIX, "--prop", "12"), "--prop 12: expected diameter and pitch in inches, such as 12x6"),
-        ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with mass"),
+        ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with --mass"),
         # Given as nothing is given all the same.
-        (("--from", "c172x", "--mass", "0"), "--from c172x: cannot be combined with mass"),
-        (("--from", "c172x", "--prop", ""), "--from c172x: cannot be combined with prop"),
+        (("--from", "c172x", "--mass", "0"), "--from c172x: cannot be combined with --mass"),
+        (("--from", "c172x", "--prop", ""), "--from c172x: cannot be combined with --prop"),
         ((*SIX, "--fuel", "0"), "--fuel 0.0 kg: allowed 0.05..12 kg"),
         (("--battery", ""), "--battery : expected volts and capacity"),
         ((*SIX, "--params", ""), "is a folder; expected a parameter file"),
@@ -317,7 +317,7 @@ def test_a_bad_data_sheet_is_one_line(argv: tuple[str, ...], told: str, capsys: 
 
 def test_a_data_sheet_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", *SIX]) == 2
-    assert "--mass: only with --new FOLDER" in capsys.readouterr().err
+    assert "--mass: allowed only with --new FOLDER" in capsys.readouterr().err
 
 
 def test_an_aircraft_that_holds_no_level_flight_is_refused(
@@ -331,5 +331,5 @@ def test_an_aircraft_that_holds_no_level_flight_is_refused(
     )
     assert main(["aircraft", "aerosonde", "--out", str(tmp_path / "a")]) == 2
     line = capsys.readouterr().err.splitlines()[-1]
-    assert line == "planfly: aerosonde cannot hold level flight at any airspeed, from 0 to 9000 m above sea level"
+    assert line == "planfly: aerosonde cannot fly level: no airspeed is possible at any altitude from 0 to 9000 m AMSL"
     assert not (tmp_path / "a").exists()

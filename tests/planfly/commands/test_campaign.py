@@ -57,8 +57,11 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
         (["--refly", "2", "--json", "-"], "--json: cannot be combined with --refly"),
         (["--refly", "2", "--junit", "r.xml"], "--junit: cannot be combined with --refly"),
         ([], "--resume continues it"),
-        (["--resume", "--seed", "2"], "belongs to another campaign: seed 2 instead of 1"),
-        (["--refly", "1", "--wind", "8,250"], "belongs to another campaign: wind.speed_mps 8.0 instead of 5.0"),
+        (["--resume", "--seed", "2"], "contains a campaign with other settings: seed 2 instead of 1"),
+        (
+            ["--refly", "1", "--wind", "8,250"],
+            "contains a campaign with other settings: wind.speed_mps 8.0 instead of 5.0",
+        ),
         (["--resume", "--spread", "none.toml"], "cannot be read"),
         (["--overwrite", "--spread", "heavy.toml"], "aerosonde cannot fly level at 25 m/s"),
         (

@@ -53,19 +53,19 @@ def test_check_names_px4s_rules(tmp_path: Path) -> None:
     assert main(["check", str(mission), "--geometry", "--autopilot", "px4", "--json", str(target)]) == 4
     findings = json.loads(target.read_text())["findings"]
     reasons = {item["reason"]: item["ok"] for item in findings if item["rule"] == "mission" and item["ok"] is not True}
-    assert [ok for reason, ok in reasons.items() if "(PX4 checkFixedWindLandApproach)" in reason] == [False]
-    assert [ok for reason, ok in reasons.items() if "(PX4 checkMissionItemValidity)" in reason] == [False]
+    assert [ok for reason, ok in reasons.items() if "(PX4 function checkFixedWindLandApproach)" in reason] == [False]
+    assert [ok for reason, ok in reasons.items() if "(PX4 function checkMissionItemValidity)" in reason] == [False]
 
 
 OTHERS = {
-    82: "NAV_SPLINE_WAYPOINT: for a multicopter",
-    92: "NAV_GUIDED_ENABLE: for a multicopter or a rover",
-    94: "NAV_PAYLOAD_PLACE: for a multicopter or a VTOL aircraft",
-    42703: "NAV_ATTITUDE_TIME: for a multicopter",
-    213: "NAV_SET_YAW_SPEED: for a rover",
-    84: "NAV_VTOL_TAKEOFF: for a VTOL aircraft",
-    85: "NAV_VTOL_LAND: for a VTOL aircraft",
-    3000: "DO_VTOL_TRANSITION: for a VTOL aircraft",
+    82: "NAV_SPLINE_WAYPOINT: a command for a multicopter",
+    92: "NAV_GUIDED_ENABLE: a command for a multicopter or a rover",
+    94: "NAV_PAYLOAD_PLACE: a command for a multicopter or a VTOL aircraft",
+    42703: "NAV_ATTITUDE_TIME: a command for a multicopter",
+    213: "NAV_SET_YAW_SPEED: a command for a rover",
+    84: "NAV_VTOL_TAKEOFF: a command for a VTOL aircraft",
+    85: "NAV_VTOL_LAND: a command for a VTOL aircraft",
+    3000: "DO_VTOL_TRANSITION: a command for a VTOL aircraft",
 }
 
 
@@ -79,7 +79,7 @@ def test_a_mission_for_another_vehicle_is_a_line(
     mission.write_text(MISSION.format(up=200) + row, encoding="utf-8")
     for name in ("check", "fly"):
         assert main([name, str(mission)]) == 2
-        wanted = f"planfly: {mission}: item 5: {OTHERS[command]}: planfly flies fixed-wing aircraft\n"
+        wanted = f"planfly: {mission}: item 5: {OTHERS[command]}; planfly flies only fixed-wing aircraft\n"
         assert capsys.readouterr().err == wanted
 
 
@@ -235,8 +235,11 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--for", "px4", "--guidance", "l1"], "cannot be combined with --for, which judges by several autopilots"),
-        (["--for", "px4", "--params", "a.params"], "cannot be combined with --for, which judges by several autopilots"),
+        (["--for", "px4", "--guidance", "l1"], "cannot be combined with --for, which flies with several autopilots"),
+        (
+            ["--for", "px4", "--params", "a.params"],
+            "cannot be combined with --for, which flies with several autopilots",
+        ),
     ],
 )
 def test_what_does_not_go_with_several_autopilots_is_one_line(
@@ -271,8 +274,8 @@ def test_a_gap_in_seq_is_a_note_of_the_verdict(
     lines = [f"{seq} 0 {3 if alt else 0} 16 0 0 0 0 {lat} 8 {alt} 1" for seq, lat, alt in rows]
     Path("gap.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n")
     notes = [
-        "Note: gap.waypoints:4: a gap in the sequence numbers before 3 (1 in all): ",
-        "Note: gap.waypoints:5: sequence number 3 is not higher than the one before (1 in all): ",
+        "Note: gap.waypoints:4: the sequence numbers have a gap before 3 (1 gap in all): ",
+        "Note: gap.waypoints:5: sequence number 3 is not higher than the one before (1 such line in all): ",
     ]
     main(["check", "gap.waypoints", *more, "--json", "a.json", "--junit", "a.xml"])
     printed = capsys.readouterr().out

@@ -190,10 +190,10 @@ def test_a_log_has_its_own_autopilot_and_parameters(
 ) -> None:
     target, params = tmp_path / f"a.{suffix}", tmp_path / "px4.params"
     params.write_text("NAV_ACC_RAD 20\n", encoding="ascii")
-    for option, value in (("autopilot", "px4"), ("params", str(params))):
+    for option, value, word in (("autopilot", "px4", "autopilot"), ("params", str(params), "parameters")):
         assert main(["export", str(log_file), str(target), f"--{option}", value]) == 2
         [line] = capsys.readouterr().err.splitlines()
-        assert line.endswith(f"a log is exported with the {option} that it was flown with")
+        assert line.endswith(f"a log is exported with the {word} of its flight")
     assert not target.exists()
 
 
@@ -227,7 +227,7 @@ def test_what_is_about_a_flight_is_not_written_of_a_plan(
     plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / f"a.{kind}")]) == 2
-    assert f".{kind} is written only from a flight log (.mcap)" in capsys.readouterr().err
+    assert f"only a flight log (.mcap) can be exported as .{kind}" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

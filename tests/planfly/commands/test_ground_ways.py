@@ -57,8 +57,8 @@ def test_the_answer_counts_returns_by_outcome(mission: str, capsys: pytest.Captu
 @pytest.mark.parametrize(
     ("mission", "said"),
     [
-        ("take-off", "climb-out at waypoint 0 (item 1) (the climb from home towards item 2 hits the ground)"),
-        ("landing", "approach at waypoint 2 (item 3) (the glide to item 3 hits the ground)"),
+        ("take-off", "climb-out at waypoint 0, item 1 (the climb from home towards item 2 hits the ground)"),
+        ("landing", "approach at waypoint 2, item 3 (the glide to item 3 hits the ground)"),
     ],
     indirect=["mission"],
 )

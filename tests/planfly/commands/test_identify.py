@@ -128,7 +128,7 @@ def test_a_log_becomes_a_folder_that_flies(
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
         (["--new", "./mine", "--mass", "2", "--until", "20"], "only with --identify"),
         (["--new", "./mine", "--mass", "2", "--out", "./elsewhere"], "--out: --new names the folder"),
-        (["--new", "./mine", "--mass", "2", "--motor-braking"], "--motor-braking: it is chosen for each flight"),
+        (["--new", "./mine", "--mass", "2", "--motor-braking"], "--motor-braking: it is an option of each flight"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(
@@ -158,7 +158,7 @@ def test_an_identified_aircraft_is_no_base(capsys: pytest.CaptureFixture[str]) -
     Path("known/posterior.toml").write_text('base = "aerosonde"\n', encoding="utf-8")
     write_motion(Path("a.BIN"), short_motion())
     said = refused(["--identify", "a.BIN", *ARGUMENTS, "--base", "./known", "--out", "./mine"], capsys)
-    assert "--base ./known: this aircraft was itself identified from flight logs: name its base" in said
+    assert "--base ./known: this aircraft was itself identified from flight logs; name the --base that its" in said
 
 
 def test_only_the_rows_before_until_are_used(

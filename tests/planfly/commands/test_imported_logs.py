@@ -118,7 +118,7 @@ def test_the_wrong_place_and_the_wrong_order_are_told_in_a_line(tmp_path: Path, 
     assert main(["check", str(log), "--plan", str(wrong_order)]) == 2
     error = capsys.readouterr().err
     assert (
-        error == f"planfly: {log}: not a flight of {wrong_order}; the order differs: the flight passed the items as"
+        error == f"planfly: {log}: not a flight of {wrong_order}: the flight passed its items in another order:"
         " 3, 2, 1, ...\n"
     )
     elsewhere = tmp_path / "place.waypoints"
@@ -258,7 +258,7 @@ def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Out
     assert main(["check", str(log), "--guidance", "l1"]) == 2
     assert "--guidance: an imported flight is judged with the autopilot" in capsys.readouterr().err
     assert main(["check", str(example_plan(tmp_path)), "--flight", "1"]) == 2
-    assert "--flight: only with an imported log" in capsys.readouterr().err
+    assert "--flight: allowed only with the log of another program, such as .BIN" in capsys.readouterr().err
     assert main(["import", str(log), str(log)]) == 2
     assert "is the input file" in capsys.readouterr().err
 

@@ -63,7 +63,7 @@ def test_a_weaker_receiver_keeps_less_margin() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"frequency": 900.0, "power": 20.0}, r"sensitivity missing: expected a number, or a scenario with \[link\]"),
+        ({"frequency": 900.0, "power": 20.0}, r"sensitivity: missing; state it, or name a scenario with \[link\]"),
         ({**RADIO, "frequency": 29.9}, "frequency 29.9: expected a frequency from 30 to 15,000 MHz"),
         ({**RADIO, "frequency": 15_001.0}, "frequency 15001.0: expected a frequency from 30 to 15,000 MHz"),
         ({**RADIO, "power": math.nan}, "power nan: expected a power from -30 to 60 dBm"),
@@ -157,7 +157,7 @@ def test_the_command_prints_answers_and_draws(log: Path, capsys: pytest.CaptureF
     assert (float(east), float(north)) == pytest.approx(track.position[0, :2].tolist(), abs=0.1)
     assert outage["margin_db"] == pytest.approx(answer["facts"]["smallest margin left after the fade margin"], abs=0.01)
     assert main(["link", str(log), *radio[:4]]) == 2
-    assert "--sensitivity missing: expected a number, or a scenario with [link]" in capsys.readouterr().err
+    assert "--sensitivity: missing; state it, or name a scenario with [link]" in capsys.readouterr().err
 
 
 def test_the_coverage_has_the_margin_of_the_path_below_it(log: Path) -> None:

@@ -130,7 +130,8 @@ def test_where_there_is_no_way_it_says_why_and_leaves_the_file(here: Path, capsy
         (["--from", "46,8", "--to", "46,8.1", "--aircraft", "x9"], "x9"),
         (
             ["--from", "36.3,-84.2", "--to", "36.9,-84.2", "--terrain", "jacksboro"],
-            "planfly: --to 36.9,-84.2: outside jacksboro or within 100 m of its edge: it covers latitude 36.16",
+            "planfly: --to 36.9,-84.2: outside the terrain or within 100 m of its edge; jacksboro"
+            " covers latitude 36.16",
         ),
         (["--from", "46,8", "--to", "46,8.1", "--terrain", "none.tif"], "none.tif"),
     ],

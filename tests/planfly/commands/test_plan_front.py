@@ -64,7 +64,7 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
         (["--front", "1"], "argument --front: '1': expected a whole number of plans, 2 to 100"),
         (["--front", "101"], "argument --front: '101': expected a whole number of plans, 2 to 100"),
         (["--front", "5", "--algorithm", "umda"], "--algorithm umda: not with --front N"),
-        (["--front", "5", "--budget", "900"], "--budget 900: with --front N: expected a number of seconds"),
+        (["--front", "5", "--budget", "900"], "--budget 900: with --front N the budget is a number of seconds"),
     ],
 )
 def test_what_does_not_go_with_a_front_is_refused_in_a_line(

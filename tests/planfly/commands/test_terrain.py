@@ -392,7 +392,7 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
         (["--box", "46,8,47,9", "--source", "http://[::1/"], "its http or https address without"),
         (["--box", "46,8,47,9", "--source", f"http://{'a' * 64}.example/"], "its http or https address without"),
         (["--box", "46,8,47,9", "--source", "http://a/?b"], "its http or https address without"),
-        (["--box", "46,8,47,9", "--source", "none"], "none: terrain path: no such file"),
+        (["--box", "46,8,47,9", "--source", "none"], "none: no such elevation file"),
         (["--box", "40,0,46,9", "--source", "http://127.0.0.1:9"], "tiles: at most 25 are fetched"),
         (["--around", "none.waypoints"], "none.waypoints"),
     ],

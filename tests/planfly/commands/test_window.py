@@ -117,7 +117,7 @@ def test_the_result_in_python(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        ((), "--from: missing: the first time of take-off is needed, or the time that is asked about"),
+        ((), "--from: missing; state the first time of take-off, or --at TIME"),
         (("--from", "06:00"), "--from 06:00: expected a time in ISO 8601 with its offset from UTC"),
         (("--from", f"{DAY}06:00"), f"--from {DAY}06:00: expected a time in ISO 8601 with its offset from UTC"),
         (("--at", f"{DAY}06:00Z/{DAY}07:00Z"), f"--at {DAY}06:00Z/{DAY}07:00Z: expected a time in ISO 8601"),
@@ -149,6 +149,4 @@ def test_numbers_out_of_range(option: tuple[str, str], folder: Path, capsys: pyt
 
 def test_a_window_needs_a_forecast(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["window", "short.waypoints", "--scenario", "short.toml", "--from", f"{DAY}06:00Z"]
-    assert "--forecast: missing: a window needs a forecast, by this option or in [wind]" in refused(
-        words, folder, capsys
-    )
+    assert "--forecast: missing; a window needs a forecast" in refused(words, folder, capsys)

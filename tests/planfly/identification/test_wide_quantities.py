@@ -17,6 +17,8 @@ def test_power_is_wide_from_a_fifth_and_asks_for_the_current(half: float, count:
     found = wide_quantities((7.0, 7.0, 7.0), power, with_current=False)
     assert len(found) == count
     assert all(one.half == pytest.approx(half) for one in found)
-    assert all("known to ±21 % only; fly with the battery's current logged (BAT)" in one.text for one in found)
+    assert all(
+        "known only to ±21 %; to improve this, fly with the battery's current logged (BAT)" in one.text for one in found
+    )
     with_it = wide_quantities((7.0, 7.0, 7.0), power, with_current=True)
     assert all("level runs of 20 s at several speeds" in one.text for one in with_it)

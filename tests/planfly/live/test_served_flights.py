@@ -56,7 +56,7 @@ def test_of_a_verdict_the_worst_comes_first_and_the_rest_is_counted() -> None:
 def test_a_station_reads_the_words_of_the_terminal() -> None:
     lost = Finding("departure", FLIGHT, 0.0, 80.0, 75.0, "check", 0.0, -5.0, "deg", "every row", False, "bank 80°")
     verdict = Verdict((lost,), False, True, ("not flyable",), "flown")
-    assert verdict_texts("flown", verdict)[1] == ("loss of control at flight: bank 80°", WARNING)
+    assert verdict_texts("flown", verdict)[1] == ("loss of control: bank 80°", WARNING)
 
 
 @pytest.fixture

@@ -83,7 +83,7 @@ def test_a_camera_that_cannot_follow_and_settings_that_contradict_the_items_are_
     assert camera_notes(setup.mission, setup.route) == (
         "a survey triggers the camera every 10 m, but the settings of its camera in the file state 29.25 m"
         " (AdjustedFootprintFrontal)",
-        "the camera takes one photo per 1 s; the trigger distance of 10 m asks for one every 0.56 s at 18.0 m/s",
+        "the camera takes one photo per 1 s; the trigger distance of 10 m requires one every 0.56 s at 18.0 m/s",
     )
     # One percent is rounding, and 20 m take more than a second.
     setup = setup_with(tmp_path, survey_of(20.0, stated_photo=20.2))
@@ -95,8 +95,8 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     photos = {"front": 0.35, "photo_spacing": 75.0, "height": 120.0, "min_height": 120.0, "max_height": 160.0}
     sides = {"side": 0.3, "line_pair": (0, 1), "line_spacing": 124.0, "side_height": 120.0}
     front, side, pixels = overlap_lines(OverlapMeasure(CAMERA, **photos, **sides))  # type: ignore[arg-type]
-    assert front.endswith("75 % required: that needs photos at most 29 m apart there")
-    assert side.endswith("65 % required: that needs lines at most 62 m apart there")
+    assert front.endswith("75 % required: this requires photos at most 29 m apart there")
+    assert side.endswith("65 % required: this requires lines at most 62 m apart there")
     assert pixels == "ground sampling distance 2.9 to 3.9 cm per pixel (120 m to 160 m above ground)"
     lost = OverlapMeasure(CAMERA, **photos, **sides, unusable_fraction=0.042)  # type: ignore[arg-type]
     assert overlap_lines(lost)[2] == "overlap not judged on 4 % of the lines' length, where no photo can be used"

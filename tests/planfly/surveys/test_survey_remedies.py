@@ -206,14 +206,14 @@ def test_nearest_trial_is_the_one_that_makes_more_of_each_line_usable(monkeypatc
         mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {}))
     )
     assert found.nearest is not None
-    assert "0 of 4 photo lines can be used, the worst to 92 %" in near_miss_text(found.nearest)
+    assert "0 of 4 photo lines can be used, the worst one to 92 % of its length" in near_miss_text(found.nearest)
     assert found.nearest.what == "turn-arounds of 350 m"
 
 
 def test_a_trial_in_which_no_survey_is_found_has_no_usable_line() -> None:
     verdict = Verdict((), flyable=False, complete=True, lines=("not flyable",), level="flown")
     near_miss = remedies.NearMiss("lines on course 90°", 0, 0, verdict)
-    assert "0 of 0 photo lines can be used, the worst to 0 %" in near_miss_text(near_miss)
+    assert "0 of 0 photo lines can be used, the worst one to 0 % of its length" in near_miss_text(near_miss)
 
 
 def test_what_comes_nearest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -261,7 +261,7 @@ def test_a_sheet_comes_before_parameters() -> None:
 @pytest.mark.parametrize(
     ("sheet", "told"),
     [
-        (DataSheet(2.1, 1.6, 15.0, 0.0), "stall: required for a data sheet: 5..35 m/s"),
+        (DataSheet(2.1, 1.6, 15.0, 0.0), "stall: missing; a data sheet needs it (5..35 m/s)"),
         (replace(FOAM, mass=30.0), "mass 30 kg: allowed 0.5..25 kg"),
     ],
 )

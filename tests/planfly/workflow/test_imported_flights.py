@@ -215,9 +215,9 @@ def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
     raw = replace(example_raw_log(), parameters={})
     flight = judged(tmp_path, raw)
     assert "Note: the log contains no parameters: ArduPlane's defaults are used" in flight.verdict.lines
-    assert "Wind: 3.0 m/s on average, from 000°, by XKF2 of the log" in flight.verdict.lines
+    assert "Wind: 3.0 m/s on average, from 000°, according to XKF2 of the log" in flight.verdict.lines
     assert (
-        "Heights: POS, above mean sea level, according to the log; at the start GPS.Alt +0.5 m relative to it"
+        "Heights: from POS, above mean sea level, according to the log; difference at the start: GPS.Alt +0.5 m"
         in flight.verdict.lines
     )
 

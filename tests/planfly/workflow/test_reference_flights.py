@@ -113,7 +113,8 @@ PITCHED = make_finding("slope", LEG, ok=True, reason="", facts=[Fact(PITCH_LIMIT
         ({"TECS_PITCH_MAX": 15.0, "PTCH_LIM_MAX_DEG": 20.0}, "TECS_PITCH_MAX", 15.0, 18.0),
         ({"TECS_PITCH_MAX": 0.0, "PTCH_LIM_MAX_DEG": 12.0}, "PTCH_LIM_MAX_DEG", 12.0, 18.0),
         ({"TECS_PITCH_MAX": 19.0, "PTCH_LIM_MAX_DEG": 16.0}, "PTCH_LIM_MAX_DEG", 16.0, 18.0),
-        ({"TECS_PITCH_MAX": 17.0, "PTCH_LIM_MAX_DEG": 17.0}, "", 0.0, 0.0),
+        # Two equal limits are raised together, and named so.
+        ({"TECS_PITCH_MAX": 15.0, "PTCH_LIM_MAX_DEG": 15.0}, "TECS_PITCH_MAX and PTCH_LIM_MAX_DEG", 15.0, 18.0),
     ],
 )
 def test_a_pitch_limit_that_the_flight_reached_is_named(
@@ -124,9 +125,8 @@ def test_a_pitch_limit_that_the_flight_reached_is_named(
 
     law = ArduPlane(ArduPilotParameters.defaults()).with_parameters(**values)
     found = find_passing_parameter(law, (LOW, HEIGHTS, PITCHED), climbs)
-    assert (found is not None) is bool(name)
-    if found is not None:
-        assert (found.name, found.current, found.passing, found.unit) == (name, present, passing, "deg")
+    assert found is not None
+    assert (found.name, found.current, found.passing, found.unit) == (name, present, passing, "deg")
     # A flight that did not reach its limit is not flown with another one.
     assert find_passing_parameter(law, (LOW, HEIGHTS), climbs) is None
 

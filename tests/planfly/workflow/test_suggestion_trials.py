@@ -7,16 +7,19 @@ from typing import Any
 
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.edits import movable_indices, raise_items
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Change, ItemMove, Place, RemainingFinding, Suggestion
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
 from planfly.workflow import suggestion_trials
 from planfly.workflow.apply_suggestion import apply_suggestion
-from planfly.workflow.mission_context import MissionContext
+from planfly.workflow.mission_context import JudgedMission, MissionContext
 from planfly.workflow.suggestion_trials import (
     MAX_TRIAL_FLIGHTS,
     MAX_TRIED_FINDINGS,
@@ -96,10 +99,10 @@ def test_what_an_early_end_left_unjudged_is_named() -> None:
         RemainingFinding("clearance", Place("leg", 5), fails=False),
     )
     text = suggestion_text((replace(higher(1, 12.0)[0], remaining=remaining),))
-    fails_text = "afterwards fails: clearance at leg 4"
-    assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; afterwards undecided: clearance at leg 5)"
+    fails_text = "later in the flight fails: clearance at leg 4"
+    assert text == f"raise both ends of leg 1 by 12 m ({fails_text}; later in the flight undecided: clearance at leg 5)"
     lost = replace(higher(1, 12.0)[0], remaining=(RemainingFinding("departure", FLIGHT, fails=True),))
-    assert suggestion_text((lost,)) == "raise both ends of leg 1 by 12 m (afterwards fails: loss of control at flight)"
+    assert suggestion_text((lost,)) == ("raise both ends of leg 1 by 12 m (later in the flight fails: loss of control)")
     # The energy of a flight that ended early passes only for the part that was flown.
     flown_part, whole = (make_finding("energy", FLIGHT, ok=ok, reason="") for ok in (True, False))
     assert is_passed(replace(before, findings=(*before.findings, flown_part)), verdict_of(whole), low(1))
@@ -336,3 +339,60 @@ def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
         assert is_improved(judged.verdict, context.judge(one.setup.mission).verdict, one.finding)
         # As a reader applies it, who knows nothing of the smaller steps that were tried before.
         assert one.setup.mission.items == apply_suggestion(context, judged, one.finding, one.suggestion).items
+
+
+# ----------------------------------------------------------------------
+# Legs that are too low over varied ground are offered to follow it.
+
+
+def over_a_hill(*lines: str, height: float = 80.0, **tables: Any) -> FlightSetup:
+    """A mission over level ground at 0 m with a hill 2,000 m north, where 30 m above ground are required."""
+    hill = [{"east_m": 0.0, "north_m": 2000.0, "height_m": height, "sigma_m": 600.0}]
+    terrain = {"kind": "peaks", "peak": hill}
+    return setup_of(*lines, home="36.5 -84.2 0", terrain=terrain, limits={"min_clearance_m": 30.0}, **tables)
+
+
+def following(judged: Verdict) -> list[tuple[int | None, list[tuple[str, int | None, float]]]]:
+    """The legs that are offered to follow the ground, by the leg of the finding."""
+    return [
+        (finding.place.index, [(change.what, change.place.index, change.wanted) for change in way])
+        for finding in judged.failed
+        for way in finding.suggestions
+        if way[0].what == "terrain height"
+    ]
+
+
+def test_a_low_leg_over_a_hill_is_offered_to_follow_the_ground() -> None:
+    """60 m above home are 20 m below the top, and at the leg's end 60 m above the ground."""
+    lines = [wp(0, 0, 60.0), wp(0, 4000, 60.0), wp(2000, 4000, 60.0)]
+    judged = judge_mission_geometry(over_a_hill(*lines))
+    (leg,) = {finding.place.index for finding in judged.failed if finding.rule == "clearance"}
+    assert following(judged) == [(leg, [("terrain height", leg, 60.0)])]
+    (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    assert finding.suggestion.startswith("follow the ground to item 2 at 60 m above it (frame 10), or raise both ends")
+    # Over ground that varies by less than 20 m, raising the leg is all that is offered.
+    low = judge_mission_geometry(over_a_hill(wp(0, 0, 40.0), wp(0, 4000, 40.0), height=18.0))
+    assert {finding.rule for finding in low.failed} == {"clearance"}
+    assert following(low) == []
+
+
+def test_several_low_legs_are_offered_to_follow_the_ground_together() -> None:
+    """Both legs cross the hill, on which the required 30 m and the 10 m by which a leg may be off are wanted."""
+    lines = [wp(0, 0, 60.0), wp(0, 2000, 60.0), wp(0, 4000, 60.0), wp(2000, 4000, 60.0)]
+    judged = judge_mission_geometry(over_a_hill(*lines))
+    first, second = [finding.place.index for finding in judged.failed if finding.rule == "clearance"]
+    wanted = [("terrain height", first, 40.0), ("terrain height", second, 60.0)]
+    assert following(judged) == [(first, wanted), (second, wanted)]
+    (finding, _) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    setup = over_a_hill(*lines)
+    session = JudgedMission(setup.mission, setup, route_requirements(setup), judged)
+    (following_both,) = [way for way in finding.suggestions if way[0].what == "terrain height"]
+    changed = apply_suggestion(MissionContext.from_setup(setup), session, finding, following_both)
+    assert [(item.frame, round(item.alt)) for item in changed.items] == [(3, 60), (10, 40), (10, 60), (3, 60)]
+
+
+def test_an_autopilot_that_does_not_follow_the_ground_is_not_offered_to() -> None:
+    setup = over_a_hill(wp(0, 0, 60.0), wp(0, 4000, 60.0))
+    law = ArduPlane(ArduPilotParameters.defaults().changed(TERRAIN_ENABLE=0.0))
+    assert len(following(judge_mission_geometry(setup))) == 1
+    assert following(judge_mission_geometry(replace(setup, autopilot=law))) == []

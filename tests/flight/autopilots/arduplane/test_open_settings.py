@@ -196,11 +196,15 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("MIXING_GAIN 0", "MIXING_GAIN 0"),
         ("ARSPD_RATIO 0", "ARSPD_RATIO 0"),
         # Airspeed sensors: the primary one, or else the first that there is.
-        ("ARSPD_TYPE 0", "ARSPD_TYPE 0 leaves no airspeed sensor"),
+        (
+            "ARSPD_TYPE 0",
+            "ARSPD_TYPE 0 leaves no airspeed sensor, which is not simulated; with ARSPD_TYPE 1 and ARSPD_USE 0"
+            " ArduPlane's own program (--sitl) flies without the sensor, with ARSPD_USE 1 the flight is simulated with",
+        ),
         ("ARSPD_ENABLE 0", "ARSPD_ENABLE 0 leaves no airspeed sensor"),
         ("ARSPD_TYPE 0\nARSPD2_TYPE 8\nARSPD2_USE 0", "ARSPD2_USE 0"),
         ("ARSPD2_TYPE 8\nARSPD_PRIMARY 1\nARSPD2_USE 2", "ARSPD2_USE 2"),
-        ("ARSPD_PRIMARY 1\nARSPD_USE 0", "ARSPD_USE 0"),
+        ("ARSPD_PRIMARY 1\nARSPD_USE 0", "ARSPD_USE 0 affects the flight, but is not simulated; with ARSPD_USE 0 Ardu"),
         ("ARSPD_TYPE 0\nARSPD2_TYPE 8\nARSPD2_USE 1", ""),
         ("ARSPD_USE 0\nARSPD2_TYPE 8\nARSPD_PRIMARY 1\nARSPD2_USE 1", ""),
         ("ARSPD2_TYPE 0\nARSPD_PRIMARY 1", ""),

@@ -57,17 +57,21 @@ def test_a_parameter_file_selects_its_release(text: str, version: str, tmp_path:
 @pytest.mark.parametrize(
     ("text", "stated", "note"),
     [
-        ("GLIDE_SLOPE_MIN 20", "4.7", "is of ArduPlane 4.6 (GLIDE_SLOPE_MIN): 4.7 flies it, as named"),
-        ("ALT_SLOPE_MIN 20", "4.6", "is of ArduPlane 4.7 (ALT_SLOPE_MIN): 4.6 flies it, as named"),
+        (
+            "GLIDE_SLOPE_MIN 20",
+            "4.7",
+            "is of ArduPlane 4.6 (GLIDE_SLOPE_MIN), but 4.7 is simulated, because it was named",
+        ),
+        ("ALT_SLOPE_MIN 20", "4.6", "is of ArduPlane 4.7 (ALT_SLOPE_MIN), but 4.6 is simulated, because it was named"),
         (
             "# ArduPlane V4.5.7\nWP_RADIUS 60",
             None,
-            "is of ArduPlane 4.5 (ArduPlane V4.5): 4.6 flies it, the nearest release that planfly simulates",
+            "is of ArduPlane 4.5 (ArduPlane V4.5), but 4.6 is simulated, the nearest release that planfly has",
         ),
         (
             "# ArduPlane V4.9.0\nWP_RADIUS 60",
             None,
-            "is of ArduPlane 4.9 (ArduPlane V4.9): 4.7 flies it, the nearest release that planfly simulates",
+            "is of ArduPlane 4.9 (ArduPlane V4.9), but 4.7 is simulated, the nearest release that planfly has",
         ),
     ],
 )

@@ -79,7 +79,7 @@ def test_a_quantity_that_is_missing_for_a_while_is_told_with_its_times(tmp_path:
 def test_an_aircraft_that_is_not_named_has_no_limits(tmp_path: Path) -> None:
     flight = judged(tmp_path)
     for rule in ("turn", "slope", "speed"):
-        assert reasons(flight, rule) == {"the aircraft is not named (--aircraft)"}
+        assert reasons(flight, rule) == {"no aircraft was named: --aircraft names it"}
     assert outcome(flight, "corridor") == [True, True]
 
 
@@ -89,7 +89,7 @@ def test_a_landing_of_an_aircraft_that_is_not_named_has_no_limit(tmp_path: Path)
     *items, last = found.mission.items
     landing = replace(found.mission, items=(*items, replace(last, command=21, alt=last.alt - 20.0)))
     landing_log = replace(raw, missions=(*raw.missions[:-1], replace(found, mission=landing)))
-    assert reasons(judged(tmp_path, landing_log), "landing") == {"the aircraft is not named (--aircraft)"}
+    assert reasons(judged(tmp_path, landing_log), "landing") == {"no aircraft was named: --aircraft names it"}
 
 
 @pytest.mark.parametrize(("datum", "judged_by"), [("unstated", False), ("ellipsoid", False), ("amsl", True)])
@@ -142,7 +142,9 @@ def test_what_is_wrong_beside_a_gap_is_wrong(tmp_path: Path) -> None:
 
 def test_only_stretches_in_auto_are_judged_each_with_its_time(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "AUTO"), (80.0, "FBWA")), AEROSONDE)
-    assert "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part, from 30.0 s on" in flight.verdict.lines
+    assert (
+        "Judged: AUTO from 20.0 s to 80.0 s, legs 0 to 1, leg 1 in part, which begin at 30.0 s" in flight.verdict.lines
+    )
     assert not flight.verdict.flyable
     completion = next(item for item in flight.verdict.findings if item.rule == "completion")
     assert completion.reason.startswith("AUTO was left for FBWA at 80.0 s, on the way to waypoint 2 (item 3): 1 of 2")
@@ -162,7 +164,7 @@ def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path:
     verdict = judge_flight(on_the_ground, flight.track, "")
     completion = next(item for item in verdict.findings if item.rule == "completion")
     assert (completion.ok, completion.margin) == (False, -1)
-    assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last of them to its end"
+    assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last one to its end"
     assert verdict.answer == "not flown as planned"
 
 
@@ -252,7 +254,7 @@ def test_each_datum_is_named() -> None:
         for datum in ("amsl", "ellipsoid", "pressure", "unstated")
     }
     assert len(set(said.values())) == 4
-    assert said["ellipsoid"] == "POS, above the WGS 84 ellipsoid"
+    assert said["ellipsoid"] == "from POS, above the WGS 84 ellipsoid"
 
 
 def test_what_is_lost_is_told() -> None:

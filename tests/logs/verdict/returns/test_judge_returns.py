@@ -66,7 +66,7 @@ def test_ranges_are_in_order_and_hold_every_return(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     words = {"ground": "unsafe", "low": "too low", "safe": "safe"}
     for one in found.ranges:
-        assert f" s, {words[one.worst.kind]}: return to home; " in range_text(one, found, setup.scenario)
+        assert f" s: {words[one.worst.kind]}; the " in range_text(one, found, setup.scenario)
         inside = [each for each in found.each if one.first <= each.time <= one.last]
         assert len(inside) == one.count
         assert {each.kind for each in inside} == {one.worst.kind}
@@ -324,7 +324,7 @@ def test_where_it_is_required_one_is_flown_from_each_second(tmp_path: Path) -> N
     verdict = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n'))
     (failed,) = [one for one in verdict.failed if (one.rule, one.place) == ("return", FLIGHT)]
     # 6.5 km at the 25 m/s that are commanded.
-    assert int(failed.reason.split()[1]) == pytest.approx(6500.0 / 25.0, abs=2.0)
+    assert int(failed.reason.split()[2]) == pytest.approx(6500.0 / 25.0, abs=2.0)
     assert failed.method.startswith("one return every 1 s of the route, ")
 
 

@@ -215,8 +215,8 @@ def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
     assert kinds["home"] == {"safe"}
     assert "ground" in kinds["the landing sequence at item 4"]
     lines = describe_causes(both.causes)
-    assert "landing after battery low (BATT_FS_LOW_ACT 2): lands by its landing sequence" in lines
-    assert "the mission's end: has landed" in lines[-1]
+    assert "landing after battery low (BATT_FS_LOW_ACT 2): the aircraft lands by its landing sequence" in lines
+    assert "the mission's end: the aircraft has landed" in lines[-1]
     # Nothing triggers it, and it is not flown.
     unset = judged(tmp_path, RTL_AUTOLAND=0, BATT_FS_LOW_ACT=2, BATT_MONITOR=0)
     assert {one.target.name for one in unset.each} == {"home"}

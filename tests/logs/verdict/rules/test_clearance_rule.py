@@ -49,7 +49,7 @@ def test_clearance_is_exact_and_says_where() -> None:
     assert item.planned == pytest.approx(least, abs=1e-3)
     assert int(item.reason.split("north ")[1].split(" m")[0]) == pytest.approx(3000, abs=20)
     # Nothing is required of a leg that passes.
-    assert of(judge_geometry(setup), "clearance", leg(1)).reason == f"{least:.1f} m above ground at the lowest"
+    assert of(judge_geometry(setup), "clearance", leg(1)).reason == f"{least:.1f} m above ground at the lowest point"
     low = make_setup([[0, 0, 285], [0, 2000, 285], [0, 6000, 285]], terrain=hill_at)
     assert failing(judge(low, fly_path(low))) == {("clearance", leg(1))}
     assert failing(judge_geometry(low)) == {("clearance", leg(1))}
@@ -141,7 +141,7 @@ def test_both_levels_show_it_and_it_decides_nothing() -> None:
     for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
         item = of(verdict, "clearance", leg(0))
         assert item.ok is True
-        assert "54.0 m less the terrain's stated error of 16 m, less than the 60 m required" in item.reason
+        assert "54.0 m after subtracting the terrain's stated error of 16 m, less than the 60 m required" in item.reason
         assert (
             "Terrain's stated error: 16 m; the lowest clearance is 70.0 m, or 54.0 m with that error subtracted"
             in verdict.summary

@@ -81,7 +81,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
     assert into_it.ok is None
     assert verdict.undecided
     assert verdict.headline == "not judged in full: the climb from home to item 1 hits the ground"
-    assert into_it.reason.endswith("2 m below the surface 1000 m from home, even at the steepest climb")
+    assert into_it.reason.endswith(": 1000 m from home it is 2 m below the surface, even at the steepest climb")
 
 
 def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
@@ -122,7 +122,9 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
     failed, verdict = judged("climbout", wall(500.0, steepest + 30.0), *TAKEOFF)
     assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
-    assert ", 30 m below the surface 500 m from home, even at the steepest climb (14.1°); a launch on " in failed.reason
+    assert (
+        ": 500 m from home it is 30 m below the surface, even at the steepest climb (climb angle 14.1°); a launch "
+    ) in failed.reason
 
 
 @pytest.mark.parametrize("deviation_deg", [0.0, 3.1])
@@ -134,11 +136,13 @@ def test_a_climb_past_its_item_states_its_angle_and_its_end(deviation_deg: float
     # 95 % of the aircraft climb more steeply than 1.645 standard deviations below the mean.
     certain = math.degrees(math.atan(climb())) - 1.645 * deviation_deg
     slope = 0.7 * math.tan(math.radians(certain))
-    certain_text, reason = "certain " if deviation_deg else "", "; of the steepest climb, 14.1°, 9.0° is certain"
+    certain_text = "certain " if deviation_deg else ""
+    reason = "; the steepest climb is 14.1°, but only 9.0° is certain"
     assert found.ok is None
     assert found.reason == (
-        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground,"
-        f" {80.0 - 400.0 * slope:.0f} m below the surface 400 m from home ({math.degrees(math.atan(slope)):.1f}°,"
+        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground:"
+        f" 400 m from home it is {80.0 - 400.0 * slope:.0f} m below the surface"
+        f" (climb angle {math.degrees(math.atan(slope)):.1f}°,"
         f" straight on past item 2, 300 m from home, until it is 100 m above home after {100.0 / slope:.0f} m"
         f"{f'{reason} for this aircraft' if deviation_deg else ''})"
     )
@@ -149,7 +153,7 @@ def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
     # it from acos(1 / 1.03) = 13.9 degrees on.
     top = 100.0 + 1.03 * 500.0 * climb()
     assert judged("climbout", wall(500.0, top), *TAKEOFF)[0].reason.endswith(
-        "a launch on 020° to 340° would be clear of obstacles"
+        "a launch course of 020° to 340° would be clear of obstacles"
     )
 
     def basin(east: Floats, at: Floats) -> Floats:
@@ -292,9 +296,9 @@ def test_a_glide_into_a_wall_fails_and_one_that_only_just_clears_it_is_left_open
         found, verdict = judged("approach", wall(POINT - 600.0, top), *landing())
         assert (found.ok, verdict.undecided) == (ok, ok is None), top
     failed, verdict = judged("approach", wall(POINT - 600.0, up + 60.0), *landing())
-    assert "approach at waypoint 2 (item 3) (the glide to item 3 hits the ground)" in verdict.headline
+    assert "approach at waypoint 2, item 3 (the glide to item 3 hits the ground)" in verdict.headline
     assert failed.reason == (
-        "the glide to item 3 hits the ground, 60 m below the surface 600 m before the landing point"
+        "the glide to item 3 hits the ground: 600 m before the landing point it is 60 m below the surface"
     )
     _, verdict = judged("approach", wall(POINT - 600.0, up - 3.0), *landing())
     assert verdict.headline == "not judged in full: the glide to item 3 clears the ground by only 3.0 m"

@@ -57,7 +57,7 @@ def test_prediction_and_flight_agree() -> None:
     assert item.flown is not None
     assert predicted == pytest.approx(item.flown, rel=0.06)
     assert peak == pytest.approx(float(np.percentile(flown.track.current, 95)), rel=0.1)
-    assert "by prediction" in item.reason
+    assert "; predicted: " in item.reason
 
 
 @pytest.mark.parametrize(("share", "action", "ok"), [(1.01, 1, True), (0.99, 1, False), (0.99, 0, True)])
@@ -70,14 +70,14 @@ def test_a_charge_at_which_arduplane_leaves_the_mission_fails(share: float, acti
     law = ArduPlane(ArduPilotParameters.of_text(text, "mine.param"))
     item = of(judge_geometry(replace(setup, autopilot=law)), "energy")
     assert item.ok is ok
-    assert (", and the flight needs" in item.reason) is not ok
+    assert (", but the flight needs" in item.reason) is not ok
 
 
 def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judged() -> None:
     law = ArduPlane(ArduPilotParameters.of_text("BATT_LOW_VOLT 21\nBATT_FS_LOW_ACT 2\n", "mine.param"))
     item = of(judge_geometry(replace(real_setup(), autopilot=law)), "energy")
     assert item.ok
-    assert "whether the battery falls below BATT_LOW_VOLT 21, which leaves the mission, is not judged" in item.reason
+    assert "not judged: whether the battery reaches BATT_LOW_VOLT 21, which leaves the mission" in item.reason
 
 
 def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:
@@ -156,7 +156,7 @@ def test_energy_within_what_is_not_known_is_undecided(share: float, ok: bool | N
     assert f"at most {1.50871 * used:.1f} Wh with 95 % probability, because the power is from a data" in item.reason
     if ok is None:
         assert verdict.headline.startswith(
-            "not judged in full: energy is too close to the limit to judge with what is known of the aircraft"
+            "not judged in full: energy is too close to the limit to judge, because the aircraft's limits are uncertain"
         )
 
 
@@ -196,7 +196,7 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     first_energy = power * (6000.0 - first_cut * radius) / 25.0 / 3600.0
     # Of 1000 Wh, 20 % are the reserve.
     repeats = math.floor((800.0 - first_energy) / round_energy)
-    assert f"the energy lasts for {repeats + 1} rounds, with a count of {repeats} (" in item.reason
+    assert f"the energy lasts for only {repeats + 1} rounds: set its count to {repeats} (" in item.reason
     assert item.brief.startswith("the jump of item 5 repeats without end")
 
 
@@ -210,7 +210,7 @@ def test_the_rounds_of_an_endless_jump_leave_the_rest_of_the_mission_and_the_res
 
     words = energy(-1).brief.split()
     count = int(words[-1])
-    assert words[words.index("rounds,") - 1] == str(count + 1)
+    assert words[words.index("rounds:") - 1] == str(count + 1)
     assert count > 2
     assert energy(count).ok
     assert energy(count + 1).ok is False

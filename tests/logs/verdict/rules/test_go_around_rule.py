@@ -86,7 +86,7 @@ def test_where_it_is_required_a_go_around_that_is_too_low_fails_and_one_that_is_
         assert (found.ok, verdict.flyable) == (ok, bool(ok))
     assert verdict.headline.startswith("flyable")
     failed = go_around(higher_field, *landing(HEIGHT, p="50 0 0 0"), **asked)[1]
-    assert "go-around at waypoint 2 (item 3) (a go-around comes too close to the ground)" in failed.headline
+    assert "go-around at waypoint 2, item 3 (a go-around comes too close to the ground)" in failed.headline
     # By planfly's guidance nothing is known of it.
     other = judge_geometry(over(higher_field, *landing(HEIGHT), **asked))
     assert other.headline.startswith("not judged in full: a go-around is not judged")

@@ -161,4 +161,4 @@ def test_an_autopilot_that_flies_no_take_off_says_so_in_a_line(autopilot: str) -
     setup = flown_circuit().setup
     other = replace(setup, autopilot=restore_autopilot(autopilot, StoredAutopilot()))
     assert not other.ground_phases
-    assert "take-off and landing are not flown, and not judged as flown" in judge_geometry(other).summary
+    assert "flies no take-off and no landing: both are judged only by geometry" in judge_geometry(other).summary

@@ -29,7 +29,7 @@ def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
     verdict = judge_geometry(setup_of(*lines, home=home))
     found = [item for item in verdict.findings if item.rule == "mission" and item.check == check]
     assert len(found) == 1, verdict.findings
-    assert found[0].reason.endswith(f"(PX4 {check})"), found[0].reason
+    assert found[0].reason.endswith(f"(PX4 function {check})"), found[0].reason
     assert not (verdict.flyable and found[0].ok is False)
     return found[0]
 
@@ -246,7 +246,7 @@ def test_geofence() -> None:
         fenced = replace(setup, mission=replace(setup.mission, fences=fences))
         (finding,) = [item for item in judge_geometry(fenced).findings if item.check == "checkGeofence"]
         assert finding.ok == (words is None)
-        assert "(PX4 checkGeofence)" in finding.reason
+        assert "(PX4 function checkGeofence)" in finding.reason
         assert words is None or words in finding.reason
 
 
@@ -407,6 +407,10 @@ def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
     left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
     assert [item.ok for item in left] == [None] * len(said)
     assert all(words in item.reason for item, words in zip(left, said, strict=True))
+    # The next step is in the reason, and not in the headline.
+    assert [("--sitl" in item.reason, "--sitl" in item.brief) for item in left] == [
+        ("ARSPD" in words, False) for words in said
+    ]
     # Without a return the terrain is not followed: after any other last item ArduPlane returns by itself.
     alone = mission_findings(replace(setup_of(lines[0], wp(0, 900, command=17)), autopilot=law))
     assert not any("TERRAIN_FOLLOW" in item.reason for item in alone)

@@ -278,8 +278,8 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
         assert told == [("full throttle", 20.0, "s")]
         assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
         assert verdict.headline == (
-            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge with what"
-            " is known of the aircraft;"
+            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because"
+            " the aircraft's limits are uncertain;"
             " an aircraft from a data sheet"
         )
         assert verdict.levels[0].undecided
@@ -290,7 +290,9 @@ def test_a_suggested_slope_follows_from_what_the_reason_says_of_the_data_sheet()
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(16.0)], table=unsure())
     item = of(judge_geometry(setup), "slope", leg(1))
     assert item.ok is False
-    assert "at most 13.7° in calm air; with the uncertainty of a data sheet (± 3.0°) 8.8° is certain" in item.reason
+    assert (
+        "at most 13.7° in calm air; with the uncertainty of a data sheet (± 3.0°) only 8.8° is certain" in item.reason
+    )
     certain = make_setup([[e, n, u + 400] for e, n, u in hill(16.0)])
     assert "certain" not in of(judge_geometry(certain), "slope", leg(1)).reason
 

@@ -95,7 +95,7 @@ def test_air_takes_speed_where_the_aircraft_showed_more_than_the_leg_asks(
         assert f"throttle at {at} for 8 s and 2.0 m/s too {way}" in item.reason
 
 
-@pytest.mark.parametrize(("slope", "what"), [(6.0, "full throttle the aircraft showed that it can climb"), (-6.0, "")])
+@pytest.mark.parametrize(("slope", "what"), [(6.0, "full throttle: the aircraft can climb"), (-6.0, "")])
 def test_an_ability_too_small_is_told_with_its_direction(
     slope: float, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -103,8 +103,8 @@ def test_an_ability_too_small_is_told_with_its_direction(
     for envelope in (True, False):
         item = judged(SlopeMeasure(ability=shown, is_finished=True), monkeypatch, slope, envelope=envelope)
         assert item.ok is False
-        wanted = what or "idle throttle the aircraft showed that it can sink"
-        assert f"in 20 s at {wanted} 4.0° at 25 m/s here; the leg needs 6.0°" in item.reason
+        wanted = what or "idle throttle: the aircraft can sink"
+        assert f"measured over 20 s at {wanted} at most 4.0° at 25 m/s here; the leg needs 6.0°" in item.reason
 
 
 def test_what_the_leg_needs_is_said_once_after_all_that_is_too_little(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +115,7 @@ def test_what_the_leg_needs_is_said_once_after_all_that_is_too_little(monkeypatc
     setup = replace(make_setup(hill(6.0)), autopilot=autopilot)
     requirements = route_requirements(setup, envelope=True)
     reason = slope_findings(requirements, align_track(requirements, fly_path(setup, rate=5.0)))[1].reason
-    assert "the aircraft showed that it can climb 4.0°" in reason
+    assert "the aircraft can climb at most 4.0°" in reason
     assert "TECS_CLMB_MAX 2 m/s permits a climb of 4.4° at 26.3 m/s; the leg needs 6.0°" in reason
     assert reason.count("the leg needs") == 1
 
@@ -202,7 +202,7 @@ def test_the_autopilots_throttle_limit_is_named_where_it_limits_the_climb(
 
     short = flown(2.0, throttle)
     assert short.ok is False
-    assert f"at {limit} the aircraft showed that it can climb 3." in short.reason
+    assert f"at {limit}: the aircraft can climb at most 3." in short.reason
     assert f"throttle at its limit {limit} for 60 s" in short.reason
     # Two hundredths below the limit the throttle shows nothing of it.
     assert flown(2.0, throttle - 0.02).ok

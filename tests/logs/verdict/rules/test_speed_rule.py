@@ -77,7 +77,7 @@ def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | 
             told = "the fastest level flight according to a data sheet is 32.0 m/s ± 2.0 m/s"
             assert item.reason.startswith(f"30.0 m/s is commanded; {told}")
             assert (
-                "airspeeds on 2 legs are too close to the limit to judge with what is known of the aircraft"
+                "airspeeds on 2 legs are too close to the limit to judge, because the aircraft's limits are uncertain"
                 in verdict.headline
             )
             # What is suggested is sure: below 28.71 m/s by what suggestions keep clear of limits.

@@ -85,7 +85,7 @@ def test_a_landing_of_45_degrees_fails_in_flight_too() -> None:
     verdict = judge_flight(setup, flown.track, flown.ended)
     assert flown.ended == "completed"
     assert not verdict.flyable
-    assert "landing at waypoint 2 (item 3) (45° > " in verdict.headline
+    assert "landing at waypoint 2, item 3 (45° > " in verdict.headline
 
 
 def test_a_climb_over_home_is_not_judged_and_the_first_line_says_so() -> None:

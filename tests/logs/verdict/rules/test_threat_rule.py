@@ -43,7 +43,7 @@ def test_time_and_exposure_inside_a_threat_are_exact(rate: float) -> None:
     assert seen.ok is True
     assert seen.limit is None
     assert seen.flown == pytest.approx(2 * math.sqrt(700.0**2 - 300.0**2) / 25.0, abs=1e-3)
-    assert "threat Alfa (missile) (32.0 s inside its range)" in verdict.summary
+    assert "missile Alfa (32.0 s inside its range)" in verdict.summary
 
 
 def test_threats_out_of_reach_give_one_finding() -> None:

@@ -28,7 +28,7 @@ def facts() -> IdentificationFacts:
     models = (Prediction("constant rates", errors), Prediction("identified", errors, (0.36, 0.24, 0.68)))
     predicted = PredictedLog(models, 1500, np.arange(2000) / 50.0, table, 1.02 * table)
     numbers = (("climb at full throttle", "°", 5.8, 7.7, 9.6), ("power in level flight", "W", 380.0, 485.0, 624.0))
-    wide = ("sink at idle: known to ±23 % only; fly glides",)
+    wide = ("sink at idle: known only to ±23 %; to improve this, fly glides",)
     return IdentificationFacts("mine", estimate, (("A.BIN", "ab" * 32),), numbers, predicted, "C<1>.BIN", wide)
 
 
@@ -61,7 +61,7 @@ def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.Monke
         "white at 36 %, 24 %, 68 %",
     ):
         assert said in page, said
-    assert "sink at idle: known to ±23 % only; fly glides" in page
+    assert "sink at idle: known only to ±23 %; to improve this, fly glides" in page
     assert "<1>" not in page
     # Nothing is asked of a network.
     assert "http" not in page.partition('<script type="application/json"')[0].replace("http-equiv", "")

@@ -197,7 +197,8 @@ def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
 
 def test_a_verdict_that_leaves_something_open_neither_passes_nor_fails() -> None:
     lines = (
-        "not judged in full: slope on leg 1 is too close to the limit to judge with what is known of the aircraft",
+        "not judged in full: slope on leg 1 is too close to the limit to judge, because the aircraft's"
+        " limits are uncertain",
     )
     levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
     verdict = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")

@@ -25,6 +25,10 @@ def exact_first_order() -> tuple[float, float, float]:
     return first / whole, second / whole, 0.0
 
 
+# Largest probability by chance with which one of eight quantities is named: 5 % for the campaign.
+MOST_OF_EIGHT = 0.05 / 8
+
+
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("count", [1000, 8000])
 def test_ishigami_within_a_twentieth(seed: int, count: int) -> None:
@@ -65,10 +69,37 @@ def test_chance_is_as_rare_as_it_says() -> None:
     assert 0.02 < np.mean(found < 0.05) < 0.08
 
 
+@pytest.mark.parametrize("has_ties", [False, True])
+def test_the_fewest_flights_name_nothing_that_has_no_effect(has_ties: bool) -> None:
+    """Of 100 campaigns of eight quantities without effect 5 name one, at most; the deviation is 2.2.
+
+    Half of the margins are equal if flights failed by an unknown margin.
+    """
+    random = np.random.default_rng(5)
+    alarms = 0
+    for _ in range(100):
+        margins = random.standard_normal(MIN_FLIGHTS_FOR_INDEX)
+        margins = np.maximum(margins, 0.0) if has_ties else margins
+        quantities = random.random((8, MIN_FLIGHTS_FOR_INDEX))
+        alarms += min(chance_probability(values, margins) for values in quantities) <= MOST_OF_EIGHT
+    assert alarms <= 11
+
+
+def test_the_fewest_flights_name_what_explains_most_of_a_margin() -> None:
+    """20 flights suffice to name a quantity that explains 70 % of the variance, in 9 of 10 campaigns."""
+    assert MIN_FLIGHTS_FOR_INDEX == 20
+    random = np.random.default_rng(6)
+    named = 0
+    for _ in range(200):
+        values, others = random.standard_normal((2, MIN_FLIGHTS_FOR_INDEX))
+        named += chance_probability(values, np.sqrt(0.7) * values + np.sqrt(0.3) * others) <= MOST_OF_EIGHT
+    assert named >= 180
+
+
 def test_a_rise_and_a_valley_are_no_chance() -> None:
     """Spearman finds the rise in 40 values, and the groups find the valley, whose rank correlation is 0."""
     x = np.linspace(-1.0, 1.0, 40)
     assert chance_probability(x, x) < 1e-6
     assert chance_probability(x, x**2) < 1e-3
-    assert chance_probability(x[:20], x[:20]) == 1.0
+    assert chance_probability(x[:19], x[:19]) == 1.0
     assert chance_probability(x, np.ones(40)) == 1.0
