@@ -274,7 +274,7 @@ def model_hash(aircraft: Aircraft) -> str:
 def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> str:
     """Return the SHA-256 of the names, sizes and contents of files, in hexadecimal.
 
-    stamps: modification times and sizes of the files, they are only used as a part of the cache's key.
+    stamps: modification times and sizes of the files, which are only used as a part of the cache's key.
     """
     digest = hashlib.sha256()
     for file in files:

@@ -563,9 +563,8 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
     sheet: the sheet with missing values filled in.
     drag: function that returns the drag in level flight (N) at an airspeed (m/s).
 
-    The performance is the climb and the top speed in the returned sheet. The performance is the climb and the top speed
-    in the returned sheet. Raises FlightError, with the feasible range of a stated value, if no propeller meets the
-    sheet.
+    The performance is the climb and the top speed in the returned sheet. Raises FlightError, with the feasible range of
+    a stated value, if no propeller meets the sheet.
     """
     try:
         return _size_any_motor(stated_sheet, sheet, drag)
@@ -576,7 +575,7 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
 def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
     """Size the engine or the electric motor of an aircraft, and its propeller.
 
-    Arguments and result are those of `_size_propulsion`. Raises _NoPropellerError if no propeller meets the sheet.
+    Arguments and result are as for `_size_propulsion`. Raises _NoPropellerError if no propeller meets the sheet.
     """
     size_function = _size_engine if sheet.burns_fuel else _size_motor
     return size_function(stated_sheet, sheet, drag)
@@ -705,7 +704,7 @@ def _solve_motor(
 
 
 def _motor_with_typical_losses(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
-    """Return a motor whose losses, relative to the power in cruise, equal those of the Aerosonde's motor.
+    """Return a motor with the losses of the Aerosonde's motor, relative to the power in cruise.
 
     volts: battery voltage, V.
     emf: back-emf constant, V s/rad.

@@ -418,7 +418,7 @@ def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tu
 def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
     """Return the XML of the lift by angle of attack.
 
-    The lift is a straight line up to the stall, and that of a flat plate beyond it.
+    The lift is a straight line up to the stall. Beyond the stall it is the lift of a flat plate.
     """
     straight_line = add(
         f"<v> {number(aero.lift_0)} </v>",

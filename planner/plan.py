@@ -205,7 +205,7 @@ class Plan:
     def margins(self) -> tuple[float, ...]:
         """Margins of the plan, (9,); the plan is safe if all of them are 0 or more, and only then.
 
-        The first eight are those of the certificate, from `Certificate.turn` to `Certificate.headroom`, rad and m. The
+        The first eight are the certificate's margins, from `Certificate.turn` to `Certificate.headroom`, rad and m. The
         last is 0, or minus the number of the certificate's problems and of the violations at the paper's points. It is
         needed because some problems, such as a blocked approach, have no margin.
 
@@ -237,7 +237,7 @@ class Plan:
     def failures(self) -> tuple[str, ...]:
         """Problems that make every flight of the plan not flyable.
 
-        They are the problems of a searched path, and those of the departure and the approach.
+        They are the problems of a searched path, of the departure and of the approach.
         """
         return tuple(problem for problem in self._problems if problem not in self.unmet_margins)
 

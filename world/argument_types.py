@@ -31,6 +31,7 @@ def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Paramete
 
     @functools.wraps(function)
     def with_check(*args: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
+        """Call the function with checked arguments."""
         checked_args, checked_keywords = check_types(signature, args, keywords)
         return function(*checked_args, **checked_keywords)
 

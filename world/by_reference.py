@@ -151,6 +151,7 @@ class _Field(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]  # numba names no argument
+        """Return the numba type of a field; None if the named tuple has no such field."""
         return _find_field(kind, name)[1] if name in kind.tuple_type.fields else None
 
 

@@ -135,6 +135,7 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
 def _shift_pixels(
     pixels: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return pixel coordinates shifted by columns and rows."""
     return pixels[0] + cols, pixels[1] + rows
 
 

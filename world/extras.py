@@ -120,8 +120,11 @@ def requires_extra(name: str, needs: str = "") -> Callable[[Callable[Arguments, 
     """Return a decorator that makes a function call `require_extra` first."""
 
     def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+        """Return the function with the check before each call."""
+
         @functools.wraps(function)
         def call_checked(*args: Arguments.args, **keywords: Arguments.kwargs) -> Result:
+            """Check that the extra is installed, and call the function."""
             require_extra(name, needs)
             return function(*args, **keywords)
 

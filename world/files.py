@@ -41,6 +41,7 @@ class TextLine(NamedTuple):
     number: int
 
     def __str__(self) -> str:
+        """Return the position as text: file and line."""
         return f"{self.file}:{self.number}"
 
 
@@ -328,6 +329,7 @@ def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[st
 
 
 def _resolve_link(link: Path) -> Path:
+    """Return the target of a link. Raises OSError for a link that refers to itself."""
     try:
         return link.resolve()
     except RuntimeError:

@@ -51,6 +51,7 @@ class GeoOrigin:
 
 @lru_cache(maxsize=32)
 def _make_projection(origin: GeoOrigin) -> "Proj":
+    """Return the azimuthal equidistant projection about an origin."""
     # Imported here and below, as pyproj imports an HTTP client, and a scenario in metres needs neither.
     from pyproj import Proj
 
@@ -299,6 +300,7 @@ def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:
 
 @compiled
 def _evaluate_polymap(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:
+    """Return both components of a polynomial map at n points, (2, n)."""
     components = np.empty((2, x.size))
     for k in range(x.size):
         components[0, k], components[1, k] = polymap(record, x[k], y[k])

@@ -18,4 +18,5 @@ def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str]
 
 
 def _row_html(tag: str, values: Iterable[object]) -> str:
+    """Return a row of a table as HTML; its values are escaped."""
     return f"<tr>{''.join(f'<{tag}>{escape(str(value))}</{tag}>' for value in values)}</tr>"

@@ -182,6 +182,7 @@ def end_with_parent(detects_parent_end: threading.Event | None = None) -> None:
     parent = multiprocessing.parent_process()
 
     def end_after_parent() -> None:
+        """End this process once its parent has ended."""
         if parent is not None:
             parent.join()
             if detects_parent_end is None or not detects_parent_end.is_set():
@@ -191,6 +192,7 @@ def end_with_parent(detects_parent_end: threading.Event | None = None) -> None:
 
 
 def _end_process(number: int, _frame: FrameType | None = None) -> None:
+    """End this process at once for a signal, after its temporary files are removed."""
     remove_temporary_paths()
     os._exit(128 + number)
 

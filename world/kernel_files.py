@@ -49,9 +49,11 @@ class CheckedCacheFiles(IndexDataCacheFile):
         return forms if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict[Any, str]) -> None:
+        """Write the index of data files."""
         self._write(self._folder / self._index_name, "", (self._version, self._source_stamp, overloads))
 
     def _write(self, path: Path, label: str, data: Any) -> None:
+        """Write an object to a file, behind a digest of the object and a label."""
         content = dumps(data)  # type: ignore[no-untyped-call]
         with self._open_for_write(path) as file:
             file.write(_compute_digest(label, content) + content)
@@ -78,6 +80,7 @@ def _read_checked(path: Path, label: str) -> Any:
 
 
 def _compute_digest(label: str, content: bytes) -> bytes:
+    """Return the digest of a label and a content."""
     # BLAKE2 takes a third of the time of SHA-256 where the processor has no instructions for SHA-256.
     digest = hashlib.blake2b(label.encode() + b"\0", digest_size=_DIGEST_BYTES)
     digest.update(content)

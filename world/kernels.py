@@ -114,6 +114,7 @@ def inlined(kernel: _Kernel) -> _Kernel:
 
 
 def _make_dispatcher(kernel: Any, **options: bool) -> Any:
+    """Return numba's dispatcher of a function."""
     njit: Any = numba.njit
     # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
     dispatcher = njit(cache=_usable_folder is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
@@ -139,6 +140,7 @@ class _InnerKernel:
 
     @functools.cached_property
     def _wrapper(self) -> Any:
+        """Return a compiled function that Python can call, and that calls this kernel."""
         kernel = self
         return _make_dispatcher(lambda *arguments: kernel(*arguments))
 
@@ -168,6 +170,7 @@ register_model(_InnerType)(models.OpaqueModel)
 
 @typeof_impl.register(_InnerKernel)
 def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
+    """Return the numba type of an inner kernel."""
     return _InnerType(kernel.dispatcher)
 
 

@@ -71,13 +71,16 @@ def make_degree_raster(
     pixel_width, pixel_height = (east - west) / cols, (north - south) / rows
 
     def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        """Convert longitudes and latitudes (deg) to fractional columns and rows."""
         near = longitude_near(lon, (west + east) / 2)
         return (near - west) / pixel_width - 0.5, (north - lat) / pixel_height - 0.5
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        """Return the heights of a window of rows and columns."""
         return heights[top:bottom, left:right].astype(np.float32)
 
     def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+        """Convert fractional columns and rows to longitudes and latitudes (deg)."""
         return west + (col + 0.5) * pixel_width, north - (row + 0.5) * pixel_height
 
     corners = np.stack(to_lon_lat(*outline(cols, rows)), axis=1)
@@ -230,6 +233,7 @@ def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatu
 
 
 def _determine_datum(raster: RasterFile, stated_datum: StatedDatum | None) -> HeightDatum:
+    """Return the vertical datum of a raster. Raises TerrainError if it is not usable."""
     try:
         return height_datum(raster.crs, stated_datum)
     except ValueError as error:
@@ -243,6 +247,7 @@ def _determine_datum(raster: RasterFile, stated_datum: StatedDatum | None) -> He
 
 
 def _or_list(names: Sequence[str]) -> str:
+    """Return names joined by commas and a final "or"."""
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
@@ -307,6 +312,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
 
 
 def _no_data_error(raster: RasterFile) -> TerrainError:
+    """Return the error for a raster without data in the area."""
     return TerrainError(f"{raster.name}: no data in the area; the file covers {cover_text(raster)}", file=raster.name)
 
 
@@ -470,5 +476,6 @@ def cover_text(raster: RasterFile) -> str:
 
 
 def _tile_extent_text(raster: RasterFile, origin: GeoOrigin) -> str:
+    """Return the extent of a raster on the map, as text."""
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
     return f"east {east.min():.0f}..{east.max():.0f} m, north {north.min():.0f}..{north.max():.0f} m"

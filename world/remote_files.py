@@ -188,6 +188,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
 
 
 def _open_url(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
+    """Open an address with some headers, and return the server's answer."""
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
     return _make_opener().open(request, timeout=_ANSWER_TIMEOUT_S)
 
@@ -200,6 +201,7 @@ class _TimedHead(http.client.HTTPConnection):
         is_late = threading.Event()
 
         def shut_down_connection() -> None:
+            """Shut down the connection, because the head of the answer is late."""
             is_late.set()
             with contextlib.suppress(OSError):
                 self.sock.shutdown(socket.SHUT_RDWR)
@@ -228,11 +230,13 @@ class _TimedHeadOverTls(_TimedHead, http.client.HTTPSConnection):
 
 class _HttpHandler(urllib.request.HTTPHandler):
     def http_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
+        """Open an http address with a time limit for the head of the answer."""
         return self.do_open(_TimedHead, req)
 
 
 class _HttpsHandler(urllib.request.HTTPSHandler):
     def https_open(self, req: urllib.request.Request) -> http.client.HTTPResponse:
+        """Open an https address with a time limit for the head of the answer."""
         return self.do_open(_TimedHeadOverTls, req)
 
 
@@ -270,21 +274,25 @@ def is_address(text: str) -> bool:
 
 
 def _content_length(answer: http.client.HTTPResponse) -> int:
+    """Return the number of bytes that an answer announces; 0 if it announces none."""
     length_text = answer.headers.get("Content-Length", "")
     return int(length_text) if length_text.isdecimal() else 0
 
 
 def _file_version(answer: http.client.HTTPResponse) -> str:
+    """Return the strong ETag of an answer, or else its date of the last change; "" without both."""
     tag = str(answer.headers.get("ETag") or "")
     # A weak ETag may match different bytes, and is not allowed in range requests.
     return tag if tag and not tag.startswith("W/") else str(answer.headers.get("Last-Modified") or "")
 
 
 def _is_temporary(error: Exception) -> bool:
+    """Return True for an error after which another attempt may succeed."""
     return not isinstance(error, urllib.error.HTTPError) or error.code in _TEMPORARY_STATUSES
 
 
 def _error_text(error: Exception) -> str:
+    """Return the reason of a failed request as text."""
     if isinstance(error, urllib.error.HTTPError):
         return f"the server answers {error.code} {error.reason}"
     reason = getattr(error, "reason", None) or error
@@ -292,6 +300,7 @@ def _error_text(error: Exception) -> str:
 
 
 def _notes_path(copy: Path) -> Path:
+    """Return the file with the notes on a local copy."""
     return copy.with_name(copy.name + ".held")
 
 
@@ -305,6 +314,7 @@ def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
     with copy.open("rb") as file:
 
         def is_intact(part_begin: int, part_end: int, digest: str) -> bool:
+            """Return True if a part of the copy has a digest."""
             if not 0 <= part_begin < part_end <= size:
                 return False
             file.seek(part_begin)

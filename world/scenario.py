@@ -82,6 +82,7 @@ def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
 
     @wraps(initialise)
     def initialise_or_refuse(self: _Class, *args: object, **values: object) -> None:
+        """Initialise an instance; raise an ArgumentError for wrong arguments."""
         try:
             initialise(self, *args, **values)
         except (TypeError, ValueError) as error:
@@ -249,6 +250,7 @@ class Scenario:
         return [f"{small_radii[0]}{others}: radii are in metres, not kilometres"]
 
     def __repr__(self) -> str:
+        """Return a short text: name, distance, and numbers of threats and zones."""
         distance = math.dist(self.start, self.destination) / 1000.0
         counts = f"{count_text(len(self.threats), 'threat')}, {count_text(len(self.zones), 'zone')}"
         return f"<Scenario {self.name}: {distance:.1f} km, {counts}>"
@@ -446,7 +448,7 @@ def scenario_from_spec(
 def _with_absolute_paths(spec: ScenarioFile, base: Path | None) -> ScenarioFile:
     """Return a scenario file's data with absolute paths.
 
-    The paths are those of the aircraft's folder, the parameter file and the forecast.
+    The paths lead to the aircraft's folder, the parameter file and the forecast.
 
     base: folder of relative paths.
     """

@@ -169,6 +169,7 @@ def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
 
 
 def _position_text(position: GeoPosition, distance: float | None = None) -> str:
+    """Return a position as text, in degrees, with a distance if one is given."""
     text = f"{position.lat:g},{position.lon:g}"
     return text if distance is None else f"{text}, {distance / 1000.0:,.3g} km away"
 
@@ -225,6 +226,7 @@ def _quote(value: str) -> str:
 
 
 def _number_text(value: float) -> str:
+    """Return a number with up to eight significant digits."""
     return f"{value:.8g}"
 
 
@@ -234,6 +236,7 @@ def _entry_line(key: str, value: str, comment: str = "") -> str:
 
 
 def _head_text(draft: Draft) -> str:
+    """Return the head of a scenario file, with name and origin."""
     start, destination = (
         f"{_number_text(place.lat)}, {_number_text(place.lon)}" for place in (draft.start, draft.destination)
     )
@@ -249,6 +252,7 @@ lon_deg = {_number_text(draft.origin.lon_deg)}
 
 
 def _terrain_text(draft: Draft) -> str:
+    """Return the [terrain] table of a scenario file, with comments."""
     if draft.terrain is None:
         return f"""\
 [terrain]
@@ -268,6 +272,7 @@ kind = "dem"
 
 
 def _area_and_ends_text(draft: Draft) -> str:
+    """Return the tables of area, start and destination of a scenario file."""
     (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in span) for span in draft.box)
     ends = []
     for key, place, course in (
@@ -291,6 +296,7 @@ north_m = [{north0}, {north1}]
 
 
 def _limits_text(draft: Draft) -> str:
+    """Return the [limits] table of a scenario file, with comments."""
     return f"""\
 [limits]                      # turns and slopes: what the aircraft can do, unless a number is given
 {_entry_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
@@ -301,6 +307,7 @@ def _limits_text(draft: Draft) -> str:
 
 
 def _flight_text(draft: Draft) -> str:
+    """Return the [flight] table of a scenario file, with comments."""
     autopilots = """"ardupilot", "px4", or "planfly": planfly's own guidance"""
     airspeed = _number_text(draft.airspeed)
     key = "px4_version" if draft.autopilot == "px4" else "arduplane_version"

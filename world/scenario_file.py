@@ -201,4 +201,5 @@ def _value_text(value: Any) -> str:
 
 
 def _first_line(error: BaseException) -> str:
+    """Return the first line of an error's text."""
     return str(error).splitlines()[0]

@@ -165,6 +165,7 @@ class ZoneTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_shape(self) -> "ZoneTable":
+        """Raise ValueError unless exactly one shape is stated."""
         shapes = ("polygon_m", "polygon_deg", "rings_m", "rings_deg", "radius_m")
         stated_keys = [key for key in shapes if getattr(self, key) is not None]
         if len(stated_keys) != 1:
@@ -180,6 +181,7 @@ class ZoneTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_band(self) -> "ZoneTable":
+        """Raise ValueError if a floor or ceiling is stated twice, or if the band is empty."""
         for limit_name in ("floor", "ceiling"):
             if getattr(self, f"{limit_name}_amsl_m") is not None and getattr(self, f"{limit_name}_agl_m") is not None:
                 raise ValueError(f"{limit_name}_agl_m: give {limit_name}_amsl_m or {limit_name}_agl_m, not both")
@@ -249,6 +251,7 @@ class TerrainTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_kind_keys(self) -> "TerrainTable":
+        """Raise ValueError for a key that does not belong to the kind of terrain, or is missing for it."""
         needed_key = {"dem": "path", "peaks": "peak", "flat": "amsl_m", "none": ""}[self.kind]
         for key in ("path", "peak", "amsl_m"):
             is_given = getattr(self, key) is not None
@@ -271,6 +274,7 @@ class AreaTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_order(self) -> "AreaTable":
+        """Raise ValueError for an area that is too narrow or whose limits are in the wrong order."""
         for key in ("east_m", "north_m"):
             min_value, max_value = getattr(self, key)
             if not max_value - min_value >= 100.0:
@@ -305,6 +309,7 @@ class PointTable(PositionTable):
 
     @model_validator(mode="after")
     def _check_form(self) -> "PointTable":
+        """Raise ValueError unless position and height are each stated in one form."""
         _check_one_position(self)
         if self.amsl_m is not None and self.height_m is not None:
             raise ValueError("height_m: give amsl_m or height_m, not both")
@@ -318,6 +323,7 @@ class EndTable(PointTable):
 
     @model_validator(mode="after")
     def _check_height(self) -> "EndTable":
+        """Raise ValueError unless an altitude or a height is stated."""
         if self.amsl_m is None and self.height_m is None:
             raise ValueError("amsl_m: missing; give amsl_m or height_m")
         return self
@@ -342,6 +348,7 @@ class ThreatTable(PointTable):
     @model_validator(mode="before")
     @classmethod
     def _fill_scales(cls, data: Any) -> Any:
+        """Return the data with the default scale for each radius whose scale is missing."""
         if not isinstance(data, dict):
             return data
         values = dict(data)
@@ -353,6 +360,7 @@ class ThreatTable(PointTable):
 
     @model_validator(mode="after")
     def _check_pairs(self) -> "ThreatTable":
+        """Raise ValueError for a radius without a scale or a scale without a radius."""
         for kind in ("kill", "detection"):
             radius, scale = getattr(self, f"{kind}_radius_m"), getattr(self, f"{kind}_scale_m")
             if (radius is None) != (scale is None):
@@ -383,6 +391,7 @@ class LimitsTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_height_band(self) -> "LimitsTable":
+        """Raise ValueError if the maximum height is not above the clearance."""
         if self.max_height_m is not None and self.max_height_m <= self.min_clearance_m:
             raise ValueError(
                 f"max_height_m: {self.max_height_m:g}: must be above min_clearance_m {self.min_clearance_m:g}"
@@ -483,6 +492,7 @@ class FlightTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_autopilot(self) -> "FlightTable":
+        """Raise ValueError for entries that do not belong to the autopilot."""
         autopilot = self.steering.autopilot
         if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not allowed with autopilot = "{autopilot}", only with "planfly"')
@@ -550,6 +560,7 @@ class HomeTable(PositionTable):
     @model_validator(mode="before")
     @classmethod
     def _check_on_ground(cls, data: Any) -> Any:
+        """Raise ValueError for an altitude or a height, because home is on the ground."""
         for key in ("amsl_m", "height_m"):
             if isinstance(data, dict) and key in data:
                 raise ValueError(f"{key}: home is on the scenario's ground: give only its position")
@@ -557,6 +568,7 @@ class HomeTable(PositionTable):
 
     @model_validator(mode="after")
     def _check_place(self) -> "HomeTable":
+        """Raise ValueError unless home is stated by a place or by a position."""
         coordinates = (self.east_m, self.north_m, self.lat_deg, self.lon_deg)
         if self.place is None and all(value is None for value in coordinates):
             raise ValueError('position: missing; give place = "start", east_m and north_m, or lat_deg and lon_deg')
@@ -590,12 +602,14 @@ class LaunchTable(ScenarioTable):
     @model_validator(mode="before")
     @classmethod
     def _check_method(cls, data: Any) -> Any:
+        """Raise ValueError if the method is missing."""
         if isinstance(data, dict) and "method" not in data:
             raise ValueError('method: missing; give "catapult", "hand" or "runway"')
         return data
 
     @model_validator(mode="after")
     def _check_launch_values(self) -> "LaunchTable":
+        """Raise ValueError for values that do not suit the launch method."""
         if self.method == "runway" and self.speed_mps is not None:
             raise ValueError(
                 f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the motor accelerates the aircraft"
@@ -638,6 +652,7 @@ class LandingTable(PositionTable):
 
     @model_validator(mode="after")
     def _check_position(self) -> "LandingTable":
+        """Raise ValueError unless the position is stated exactly once."""
         _check_one_position(self)
         return self
 
@@ -647,6 +662,7 @@ class RallyTable(PointTable):
 
     @model_validator(mode="after")
     def _check_height(self) -> "RallyTable":
+        """Raise ValueError unless an altitude or a height is stated."""
         if self.amsl_m is None and self.height_m is None:
             raise ValueError("amsl_m: missing; give amsl_m or height_m")
         return self
@@ -685,6 +701,7 @@ class ReturnsTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_contents(self) -> "ReturnsTable":
+        """Raise ValueError for an empty table, and for a requirement that is named twice."""
         if not self.require and all(value is None for value in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
             raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
@@ -722,6 +739,7 @@ class LinkTable(PositionTable):
 
     @model_validator(mode="after")
     def _check_position(self) -> "LinkTable":
+        """Raise ValueError for a position that is stated incompletely or twice."""
         if any(value is not None for value in (self.east_m, self.north_m, self.lat_deg, self.lon_deg)):
             _check_one_position(self)
         return self
@@ -763,12 +781,14 @@ class ScenarioFile(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_area(self) -> "ScenarioFile":
+        """Raise ValueError if the area is missing and there is no elevation file to take it from."""
         if self.area is None and self.terrain.kind != "dem":
             raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" has no tile to take it from')
         return self
 
     @model_validator(mode="after")
     def _check_home(self) -> "ScenarioFile":
+        """Raise ValueError if home is missing, but a launch or a landing requires it."""
         if self.home is None:
             for key in ("launch", "landing"):
                 if getattr(self, key) is not None:

@@ -18,11 +18,11 @@ _SILENCE_LOCK = threading.RLock()
 
 @contextmanager
 def silence() -> Iterator[Callable[[], str]]:
-    """Suppress standard output of a library that prints unasked, as JSBSim and pyulog do.
+    """Suppress standard output in this context, for libraries that print unasked, such as JSBSim and pyulog.
 
-    A library's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. Yield a function that returns
-    the output of both.  Both belong to the process, so one thread at a time suppresses them; what other threads print
-    meanwhile is not suppressed.
+    A library's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. The context yields a function
+    that returns the output of both. Both outputs belong to the process, so only one thread at a time suppresses them.
+    What other threads print meanwhile is not suppressed.
     """
     with _SILENCE_LOCK:
         yield from _suppressed_output()
@@ -41,6 +41,7 @@ def _suppressed_output() -> Iterator[Callable[[], str]]:
             os.dup2(cpp_file.fileno(), 1)
 
             def text() -> str:
+                """Return what has been printed so far."""
                 cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
                 return cpp_output + python_output.getvalue()
 
@@ -62,7 +63,7 @@ class _ThreadOutput(io.StringIO):
         self._thread, self._others, self._stdout = threading.get_ident(), others, stdout
 
     def write(self, text: str) -> int:
-        """Keep the text of the own thread, and pass on any other."""
+        """Keep the text of this thread, and pass on the text of any other thread."""
         if threading.get_ident() == self._thread:
             return super().write(text)
         try:
@@ -76,9 +77,9 @@ class _ThreadOutput(io.StringIO):
 
 @contextmanager
 def _stream_to(saved_descriptor: int, stdout: TextIO) -> Iterator[TextIO]:
-    """Yield a stream of standard output that does not write to file descriptor 1.
+    """Yield a stream that writes to standard output without file descriptor 1.
 
-    saved_descriptor: another descriptor of the file of descriptor 1.
+    saved_descriptor: another descriptor for the file to which descriptor 1 belonged.
     stdout: standard output, which is yielded if it does not write to descriptor 1, as in a notebook.
     """
     try:

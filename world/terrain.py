@@ -143,6 +143,7 @@ def ground_height(heights: Heights, to_pixel: PolyMapRecord, east: float, north:
 def _ground_heights(
     heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats
 ) -> Floats:  # pragma: no cover
+    """Return the ground height at n positions, m AMSL, (n,)."""
     ground_heights = np.empty(east.size)
     for k in range(east.size):
         ground_heights[k] = ground_height(heights, to_pixel, east[k], north[k])
@@ -238,6 +239,7 @@ def _piece_clearance(
     min_clearance, min_fraction = start_clearance, 0.0
     if math.isnan(start_clearance):
         return math.nan, 0.0
+    # Go from one pixel boundary to the next.
     while start_fraction < 1.0:
         end_fraction = min(
             1.0, _next_crossing(col0, delta_col, start_fraction), _next_crossing(row0, delta_row, start_fraction)

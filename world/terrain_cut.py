@@ -114,6 +114,7 @@ def _box_outline(box: Box) -> tuple[Floats, Floats]:
 
 
 def _count_empty(heights: Heights) -> int:
+    """Return the number of heights without data."""
     return int(heights.size - is_ground(heights).sum())
 
 
@@ -192,6 +193,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
     for index, (degree, remote) in enumerate(remotes.items()):
 
         def count_bytes(byte_count: int, tile_index: int = index, name: str = remote.copy.name) -> None:
+            """Count the bytes of a tile that have arrived, and report the progress."""
             nonlocal fetched_bytes
             fetched_bytes += byte_count
             progress(len(remotes) + 9.0 * tile_index, 10.0 * len(remotes), f"{name}: {fetched_bytes / 1e6:.1f} MB")
@@ -250,6 +252,7 @@ def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Se
             continue
 
         def read(*window: int, tile: RasterFile = tile) -> Heights:
+            """Return the heights of the window. Raises _UnreadableError if the copy cannot be read."""
             try:
                 return tile.read(*window)
             except TerrainError as error:
@@ -293,7 +296,7 @@ class _PlacedTile(NamedTuple):
 
 
 def _georeference_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Return the grid of a one-degree tile, with longitudes that match those of an area.
+    """Return the grid of a one-degree tile, with longitudes that match the longitudes of an area.
 
     Longitudes are shifted by multiples of 360 degrees.
 
@@ -372,6 +375,7 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
     row_fractions, col_fractions = (row - r0)[:, None], (col - c0)[None, :]
 
     def blend(first: Heights, second: Heights, fraction: Floats) -> Floats:
+        """Return the mean of two arrays, weighted by a fraction of the second."""
         return np.where(fraction == 0.0, first, (1.0 - fraction) * first + fraction * second)
 
     upper = blend(tile_heights[np.ix_(r0, c0)], tile_heights[np.ix_(r0, c1)], col_fractions)

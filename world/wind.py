@@ -27,6 +27,7 @@ def mean_wind_speed(speed: float, gradient: float, reference_amsl: float, amsl: 
 
 @compiled
 def _mean_wind_speeds(speed: float, gradient: float, reference_amsl: float, amsl: Floats) -> Floats:
+    """Return the mean wind speed at n altitudes, m/s, (n,)."""
     speeds = np.empty(amsl.size)
     for k in range(amsl.size):
         speeds[k] = mean_wind_speed(speed, gradient, reference_amsl, amsl[k])

@@ -111,7 +111,7 @@ class Band:
 
     @property
     def is_informative(self) -> bool:
-        """True if the band is narrower than that of a quantity that keeps its value at the start of each window."""
+        """True if the band is narrower than for a quantity that keeps its value at the start of each window."""
         return not self.half_width >= self.unchanged
 
     @property

@@ -56,6 +56,7 @@ def _coefficient_change(name: str, relative_sd: float, min_sd: float = 0.0) -> C
     """Return a function that changes a coefficient by one standard deviation, as `_move_one_sd` does."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
+        """Return the signals, and the model with the changed coefficient."""
         value = _move_one_sd(getattr(base.coefficients, name), relative_sd, min_sd)
         return signals, replace(base, coefficients=replace(base.coefficients, **{name: value}))
 
@@ -70,6 +71,7 @@ def _product_of_inertia_change(relative_sd: float, min_sd_ratio: float) -> Calla
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
+        """Return the signals, and the model with the changed product of inertia."""
         ixx, iyy, izz, ixz = base.inertia
         new_ixz = _move_one_sd(ixz, relative_sd, min_sd_ratio * float(np.sqrt(ixx * izz)))
         return signals, replace(base, inertia=(ixx, iyy, izz, new_ixz))
@@ -89,6 +91,7 @@ def _acceleration_bias(axis: int, bias: float) -> Callable[[Signals, BaseModel],
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
+        """Return the signals with the bias, and the model."""
         return replace(signals, acceleration=signals.acceleration + bias * np.eye(3)[axis]), base
 
     return change
@@ -102,6 +105,7 @@ def _noise_doubling(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Cha
     """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
+        """Return the signals with additional noise, and the model."""
         noisy, generator = signals.acceleration.copy(), np.random.default_rng(1)
 
         def noise_level(values: Floats) -> float:
@@ -133,6 +137,7 @@ def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     """Return a function that increases the lag of the servos, and shortens their delay by the same time."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
+        """Return the signals with the changed lag and delay of the surfaces, and the model."""
         surfaces = np.empty_like(signals.surfaces)
         for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
             commands = invert_first_order_lag(signals.surfaces[first:last], base.servo_lag, signals.hertz)

@@ -46,7 +46,7 @@ def make_motor(base: BaseModel, values: Floats) -> Motor:
 
 
 def battery_voltage(signals: Signals, base: BaseModel) -> Floats | float:
-    """Return the battery voltage, V: as logged (n,), or that of the base model if the log lacks it in a row."""
+    """Return the battery voltage, V: as logged (n,), or as in the base model if a row lacks it."""
     return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
 
 

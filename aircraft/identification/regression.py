@@ -28,8 +28,8 @@ class Fit:
 def correlation_samples(residual: Floats, max_lag: int = 500) -> float:
     """Return the correlation length of a series (n,), in samples.
 
-    It is the two-sided sum of the autocorrelation up to its first zero. So many samples contain as much information as
-    one independent sample.
+    It is the two-sided sum of the autocorrelation up to its first zero. This number of samples contains as much
+    information as one independent sample.
 
     >>> round(correlation_samples(np.random.default_rng(1).normal(size=4000)))
     1

@@ -85,6 +85,7 @@ class Guard:
         self._write_line(f"group {group}")
 
     def _write_line(self, line: str) -> None:
+        """Send a line to the guard process; ignore it if the process has ended."""
         with contextlib.suppress(BrokenPipeError):
             self._pipe.write(f"{line}\n".encode())
 

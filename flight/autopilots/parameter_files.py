@@ -70,9 +70,9 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
     source: name of the file in messages.
 
-    Raises ParameterError with file, line, field, value and allowed values if a line has no known format, a value is not
-    a finite number, a name occurs twice, or the file has no parameter.  If several components of a vehicle have the
-    same name, the autopilot's value is taken.  A name that is too long is read like any unknown name.
+    Raises ParameterError with file, line, field, value and allowed values. The reason is a line of unknown format, a
+    value that is not a finite number, a name that occurs twice, or a file without parameters. If several components of
+    a vehicle have the same name, the autopilot's value is taken. A name that is too long is read like any unknown name.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
     >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
@@ -139,4 +139,5 @@ def _parse_entry(line: str, where: TextLine) -> Entry:
 
 
 def _shorten(text: str) -> str:
+    """Return a text in quotes, at most 40 characters long."""
     return repr(text if len(text) <= 40 else text[:37] + "...")

@@ -174,10 +174,12 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
 
 
 def _select_names(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
+    """Return the names that match."""
     return [name for name in names if matches(name)]
 
 
 def _is_ardupilot_name(name: str) -> bool:
+    """Return True if a name looks like a parameter of ArduPilot, for any vehicle."""
     patterns = (_ARDUPLANE_NAMES, _ARDUPILOT_NAMES, *_ARDUPILOT_VEHICLES.values())
     return not _PX4_NAMES.fullmatch(name) and any(pattern.fullmatch(name) for pattern in patterns)
 
@@ -285,5 +287,6 @@ def other_autopilot_error(where: str, written_for: str, evidence: str, flying: s
 
 
 def _read_text(path: Path) -> str:
+    """Return the text of a parameter file. Raises ParameterError if it cannot be read."""
     data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
     return utf8_text(data, path, ParameterError)

@@ -43,10 +43,12 @@ Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int],
 
 
 def _initialise_nothing(guidance: Record, record: Record) -> None:
+    """Do nothing: the control law has no record to initialise."""
     return
 
 
 def _transfer_nothing(previous_record: Record, record: Record, start: Floats) -> None:
+    """Do nothing: the control law has no state to keep."""
     return
 
 
@@ -80,6 +82,7 @@ class ControlLaw:
 
 
 def _turn_at_waypoint(turn: float, amsl: float) -> float:
+    """Return 0: the autopilot turns at the waypoint itself."""
     return 0.0
 
 
@@ -225,6 +228,7 @@ class RtlSettings(NamedTuple):
 
 
 def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
+    """Return no parameters: RTL settings do not affect the autopilot."""
     return {}
 
 
@@ -265,6 +269,7 @@ class LinkLossReaction(NamedTuple):
 
 
 def _continue_mission(use: LinkUse) -> tuple[LinkLossReaction, ...]:
+    """Return no reaction: the mission continues after the loss of a link."""
     return ()
 
 
@@ -343,14 +348,17 @@ NO_TRIALS = ReturnTrials()
 
 
 def _no_causes(mission: ReturnMission) -> tuple[Cause, ...]:
+    """Return no events: no event ends the mission."""
     return ()
 
 
 def _no_text(mission: ReturnMission) -> str:
+    """Return "": all RTLs are simulated."""
     return ""
 
 
 def _no_texts(mission: ReturnMission) -> tuple[str, ...]:
+    """Return no texts: all parts of an RTL are simulated."""
     return ()
 
 
@@ -414,10 +422,12 @@ def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> 
 
 
 def _cruise_to_landing(cruise: float, tail_wind: float, amsl: float) -> float:
+    """Return the cruise airspeed: the landing is flown at it."""
     return cruise
 
 
 def _unknown_height(stated_height: float, takeoff_height: float) -> None:
+    """Return None: the height of a go-around is unknown."""
     return None
 
 
@@ -643,14 +653,17 @@ class TrackingErrorFunction(Protocol):
 def _no_tracking_error(
     airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
 ) -> TrackingError | None:
+    """Return None: the autopilot follows its path exactly."""
     return None
 
 
 def _no_altitude_miss(climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
+    """Return 0: gusts never carry the aircraft out of an altitude tolerance."""
     return 0.0
 
 
 def _no_displacement(reserve: float, turbulence: Turbulence) -> float:
+    """Return 0: gusts do not displace the aircraft."""
     return 0.0
 
 

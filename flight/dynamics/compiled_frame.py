@@ -440,7 +440,7 @@ def step_repeatedly(
 
 @compiled
 def initialise_attitude(frames: Records, angles: Floats) -> None:
-    """Set the attitude of the frame to that of JSBSim's initial conditions, to the last bit.
+    """Set the attitude of the frame to the attitude of JSBSim's initial conditions, to the last bit.
 
     JSBSim's FGInitialCondition stores a quaternion that cannot be read. Setting an angle changes one Euler angle of
     this quaternion, so its last bits depend on all angles that have ever been set.

@@ -82,8 +82,8 @@ def _stated_min_speeds(tables: Mapping[str, Floats], stall_speed: float) -> Floa
     """Return the lowest airspeeds of level flight by altitude, m/s.
 
     At sea level the lowest airspeed is at least the stated stall speed (m/s). The model of a data sheet would fly a few
-    per cent slower than this, because it reaches the stated stall speed before the elevator reaches its stop, and
-    without the lift of the propeller.
+    per cent slower than this. It reaches the stated stall speed before the elevator reaches its stop, and without the
+    lift of the propeller.
     """
     model_speeds = tables["level_speed_min"]
     factor = max(1.0, stall_speed / float(model_speeds[0])) if model_speeds[0] > 0.0 else 1.0

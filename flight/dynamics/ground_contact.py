@@ -277,6 +277,7 @@ def friction_accelerations(
     acceleration, angular_acceleration: accelerations without friction, relative to the earth.
     """
     inverse_mass, inverse_inertia = 1.0 / frame.mass, matrix_of(frame.inverse_inertia)
+    # Entry j of row i: acceleration at contact j along direction j for a unit friction force i (symmetric).
     for i in range(count):
         friction = frictions[i]
         direction = vector_of(friction.direction)
@@ -290,6 +291,7 @@ def friction_accelerations(
                 vector_of(other_friction.direction),
                 add(unit_acceleration, cross(unit_angular_acceleration, vector_of(other_friction.arm))),
             )
+    # Friction has to cancel the acceleration at each contact, and its velocity within one time step.
     rate = 1.0 / frame.dt
     acceleration = add(acceleration, scale(rate, vector_of(frame.body_velocity)))
     angular_acceleration = add(angular_acceleration, scale(rate, vector_of(frame.rates)))

@@ -192,6 +192,7 @@ def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
 
 @lru_cache(maxsize=16)
 def _read_stamped_model(file: Path, _stamp: tuple[int, ...] | None, main: bool, remove_channels: bool) -> _Reader:
+    """Return the reader of a file after it has read the file; the stamp is a part of the cache's key."""
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader

@@ -352,6 +352,7 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     commands = np.array(trim_point.commands())
 
     def difference_quotient(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
+        """Return the central difference quotient of a rate for one element of a vector."""
         lower, upper = vector.copy(), vector.copy()
         lower[index] -= 1e-4
         upper[index] += 1e-4

@@ -56,7 +56,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
     """Project a position onto a piece of the path; return distance, cross-track error and course.
 
     The distance is measured along the piece, m; it may be negative (before the start) or exceed the length of the
-    piece. The cross-track error is in m, positive to the right. The course is that of the path at the projected point,
+    piece. The cross-track error is in m, positive to the right. The course is the path's course at the projected point,
     rad.
     """
     course, curvature = piece.course, piece.curvature
@@ -517,7 +517,7 @@ def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionIte
 def _set_landing(waypoints: Records, mission: Mission | None) -> None:
     """Mark the waypoint before a landing, and the waypoints of a landing sequence.
 
-    Landing sequences are those of `MissionBase::isLanding` of PX4.
+    A landing sequence is defined by `MissionBase::isLanding` of PX4.
     """
     if mission is None:
         return

@@ -125,7 +125,7 @@ def from_message(message: Any, source: str) -> MissionItem:
 
 
 def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
-    """Return the mission in uploaded lists, and the offset between its item numbers and those of stations.
+    """Return the mission in uploaded lists, and the offset between its item numbers and the stations' numbers.
 
     As in ArduPilot, item 0 is home if it is a waypoint with an altitude above mean sea level or without parameters. The
     `mission` plugin of MAVSDK sends no home, and its waypoints are relative and have a radius.
@@ -479,6 +479,7 @@ class MissionServer:
         return [MissionReply(station, item)]
 
     def _on_clear_request(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+        """Clear the list that MISSION_CLEAR_ALL names."""
         return self._clear_lists(station, (kind,), kind, now)
 
     def _clear_lists(
@@ -544,6 +545,7 @@ class MissionServer:
         return self._ack(upload.station, result, kind, f"{text}; nothing changed")
 
     def _ack(self, station: Station, result: int, kind: int, text: str = "") -> MissionReply:
+        """Return a MISSION_ACK for a station, with a text for all stations."""
         message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(kind))
         return MissionReply(station, message, text)
 
@@ -551,6 +553,7 @@ class MissionServer:
 def _item_request(
     station: Station, seq: int, kind: MissionType, message_class: Any = mavlink.MAVLink_mission_request_int_message
 ) -> MissionReply:
+    """Return the request for an item of an upload."""
     return MissionReply(station, message_class(station.system, station.component, seq, int(kind)))
 
 

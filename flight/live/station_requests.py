@@ -54,6 +54,7 @@ class Parameter:
 
 
 def _empty_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
+    """Return no parameters."""
     return {}
 
 
@@ -361,6 +362,7 @@ class Requests:
         return []
 
     def _set_mode(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+        """Set the mode that SET_MODE states, and acknowledge it."""
         reply = self.arming.set_mode(int(message.custom_mode))
         # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
         number = mavlink.MAVLINK_MSG_ID_SET_MODE
@@ -378,17 +380,21 @@ class Requests:
         return [StatusText(reply.text, WARNING)]
 
     def _refuse_guided_item(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
+        """Refuse a target for GUIDED that is sent as a message."""
         return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
 
     def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
+        """Start to send all parameters to a station."""
         peer.next_parameter = 0.0
         return []
 
     def _read_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+        """Return the parameter that a station requests."""
         number = self.parameters.find(message.param_id, int(message.param_index))
         return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
 
     def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+        """Set a parameter for a station; answer with its value, and with the reason if it is refused."""
         number, problem = self.parameters.set(
             message.param_id, float(message.param_value), in_flight=self.arming.flying
         )
@@ -415,6 +421,7 @@ class Requests:
 
     @staticmethod
     def _acknowledge(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
+        """Return the COMMAND_ACK for a station, and the text of the reply, if any."""
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
         replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:

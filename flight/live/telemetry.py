@@ -359,6 +359,7 @@ def _boot_ms(status: Status) -> int:
 
 
 def _attitude_message(status: Status) -> Any:
+    """Return ATTITUDE for a status."""
     snapshot = status.snapshot
     return mavlink.MAVLink_attitude_message(
         _boot_ms(status), snapshot.roll, snapshot.pitch, snapshot.yaw, snapshot.p, snapshot.q, snapshot.r
@@ -366,6 +367,7 @@ def _attitude_message(status: Status) -> Any:
 
 
 def _position_message(status: Status) -> Any:
+    """Return GLOBAL_POSITION_INT for a status."""
     snapshot = status.snapshot
     return mavlink.MAVLink_global_position_int_message(
         _boot_ms(status),
@@ -381,6 +383,7 @@ def _position_message(status: Status) -> Any:
 
 
 def _hud_message(status: Status) -> Any:
+    """Return VFR_HUD for a status."""
     snapshot = status.snapshot
     return mavlink.MAVLink_vfr_hud_message(
         snapshot.airspeed,
@@ -393,10 +396,12 @@ def _hud_message(status: Status) -> Any:
 
 
 def _mission_current_message(status: Status) -> Any:
+    """Return MISSION_CURRENT for a status."""
     return mavlink.MAVLink_mission_current_message(status.current, status.total, status.mission_state, 0)
 
 
 def _sys_status_message(status: Status) -> Any:
+    """Return SYS_STATUS for a status."""
     healthy_sensors = _SENSORS | (_PREARM if status.ready else 0)
     remaining_fraction = max(0.0, 1.0 - status.snapshot.energy / status.battery)
     present_sensors = _SENSORS | _PREARM
@@ -419,6 +424,7 @@ def _sys_status_message(status: Status) -> Any:
 
 
 def _gps_message(status: Status) -> Any:
+    """Return GPS_RAW_INT for a status."""
     snapshot = status.snapshot
     return mavlink.MAVLink_gps_raw_int_message(
         int(status.boot * 1e6),
@@ -435,6 +441,7 @@ def _gps_message(status: Status) -> Any:
 
 
 def _wind_message(status: Status) -> Any:
+    """Return WIND for a status."""
     snapshot = status.snapshot
     # Direction from which the wind blows.
     from_direction = math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north))
@@ -442,6 +449,7 @@ def _wind_message(status: Status) -> Any:
 
 
 def _wind_cov_message(status: Status) -> Any:
+    """Return WIND_COV for a status."""
     snapshot = status.snapshot
     unknown = math.nan
     return mavlink.MAVLink_wind_cov_message(
@@ -458,11 +466,13 @@ def _wind_cov_message(status: Status) -> Any:
 
 
 def _extended_state_message(status: Status) -> Any:
+    """Return EXTENDED_SYS_STATE for a status."""
     landed_state = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed_state)
 
 
 def _home_message(status: Status) -> Any:
+    """Return HOME_POSITION for a status."""
     home = status.home
     return mavlink.MAVLink_home_position_message(
         round(home.lat_deg * 1e7),
@@ -480,12 +490,14 @@ def _home_message(status: Status) -> Any:
 
 
 def _autopilot_version_message(_status: Status) -> Any:
+    """Return AUTOPILOT_VERSION, which is the same for every status."""
     return mavlink.MAVLink_autopilot_version_message(
         _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E
     )
 
 
 def _system_time_message(status: Status) -> Any:
+    """Return SYSTEM_TIME for a status."""
     return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _boot_ms(status))
 
 

@@ -386,6 +386,7 @@ class Vehicle:
             self._last_text, self._last_text_time = response.text, now
 
     def _send_texts(self, texts: tuple[StatusText, ...]) -> None:
+        """Send texts with their severities to all stations."""
         for text in texts:
             self.downlink.send_text(*text)
 

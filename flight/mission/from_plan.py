@@ -35,9 +35,9 @@ def plan_mission(
     airspeed: m/s.
     max_bank: rad.
 
-    Home is the scenario's home, or the ground below the start. A plan with a departure and an approach starts with
-    NAV_TAKEOFF at home and ends with DO_LAND_START, two waypoints of the final approach and NAV_LAND, whose first
-    parameter is the go-around height above home. The scenario's rally points are included.
+    Home is the scenario's home, or the ground below the start. The mission of a plan with a departure and an approach
+    starts with NAV_TAKEOFF at home. It ends with DO_LAND_START, two waypoints of the final approach, and NAV_LAND. The
+    first parameter of NAV_LAND is the go-around height above home. The scenario's rally points are included.
 
     Positions are rounded to the 1e-7 degree grid of MISSION_ITEM_INT, and altitudes to whole millimeters. Therefore
     every file format states the same numbers. The rounding moves a waypoint by less than 8 mm on the map.

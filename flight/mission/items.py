@@ -349,6 +349,7 @@ class ItemProblem(NamedTuple):
     allowed: str
 
     def __str__(self) -> str:
+        """Return the problem as text: field, value and allowed values."""
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
     def at(self, file: str, location: object) -> dict[str, Any]:

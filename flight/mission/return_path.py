@@ -685,4 +685,5 @@ def _distance(a: Position, b: Position | ReturnPoint) -> float:
 
 
 def _distance_text(distance: float) -> str:
+    """Return a distance as text, in km from 1 km on, else in m."""
     return f"{distance / 1000.0:.1f} km" if distance >= 1000.0 else f"{distance:.0f} m"

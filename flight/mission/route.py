@@ -810,6 +810,7 @@ def _default_radius_function(limits: Limits | None) -> DefaultRadius:
     """
 
     def radius(airspeed: float, up: float) -> float:
+        """Return the default loiter radius at an airspeed (m/s) and an altitude (m AMSL), m."""
         min_radius = _tightest_circle_radius(limits, airspeed, up) or 0.0
         return max(DEFAULT_LOITER_RADIUS_M, math.ceil(LOITER_RADIUS_MARGIN * min_radius / 10.0) * 10.0)
 
@@ -834,6 +835,7 @@ def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:
+        """Return the steepest climb and descent of a spiral at an airspeed and an altitude, as tangents."""
         if limits is None:
             return DEFAULT_SPIRAL_SLOPE, DEFAULT_SPIRAL_SLOPE
         spiral_slopes = []

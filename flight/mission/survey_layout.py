@@ -174,6 +174,7 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
     seqs, flown = [int(seq) for seq in route.items], _flown_items(route)
 
     def index(waypoint: int) -> int:
+        """Return the list index of a waypoint's item; the number of items without such an item."""
         return index_by_seq.get(seqs[waypoint], item_count) if 0 <= waypoint < len(seqs) else item_count
 
     lines = []
@@ -220,6 +221,7 @@ def _without_lead_waypoints(
     points, waypoint_of = route.positions[:, :2], _waypoint_of_item(mission, route)
 
     def is_lead(item: MissionItem) -> bool:
+        """Return True if an item is a waypoint near the end of the survey."""
         is_near = item.seq in waypoint_of and math.dist(points[waypoint_of[item.seq]], points[end]) <= max_lead_length
         return is_near and item.command == Command.NAV_WAYPOINT
 

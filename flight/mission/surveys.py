@@ -256,6 +256,7 @@ def with_photo_spacing(mission: Mission, survey: Survey, spacing: float) -> Miss
     """Return the mission with another distance between the photos of a survey, m, in its items and its settings."""
 
     def has_spacing(value: float | None) -> bool:
+        """Return True if a value is the distance between photos of the survey."""
         return value is not None and abs(value - survey.lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M
 
     return replace(
@@ -621,6 +622,7 @@ def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLi
     tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
 
     def points_at_lead_distance(end: int) -> list[int]:
+        """Return the waypoints at the length of a lead from an end of the run."""
         return [i for i in inner_waypoints if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
 
     start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)

@@ -507,6 +507,7 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
     fences: list[MissionItem] = []
 
     def add(command: Command, p1: float, point: list[float], location: str) -> None:
+        """Add a fence item. Raises MissionError for an invalid position."""
         item = MissionItem(
             len(fences),
             int(command),
@@ -651,12 +652,15 @@ def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
 
 
 def _nan_as_null(value: float) -> float | None:
+    """Return None (null in JSON) for NaN, and any other value unchanged."""
     return None if math.isnan(value) else value
 
 
 def _refuse_constant(name: str) -> float:
+    """Raise ValueError for NaN or Infinity, which Python's JSON reader accepts."""
     raise ValueError(f"{name} is not a number")
 
 
 def _first_line(error: BaseException) -> str:
+    """Return the first line of an error's text."""
     return str(error).splitlines()[0]

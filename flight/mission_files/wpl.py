@@ -167,12 +167,14 @@ def _parse_row(location: TextLine, line: str) -> _Row:
 
 
 def _value_error(location: TextLine, field: str, value: str | int, value_text: str, allowed: str) -> MissionError:
+    """Return the error for a value in a line of the file."""
     return MissionError(
         f"{location}: {field} {value_text}: {allowed}", file=location.file, field=field, value=value, allowed=allowed
     )
 
 
 def _parse_integer(location: TextLine, name: str, text: str) -> int:
+    """Return the integer in a column. Raises MissionError for any other text."""
     min_value, max_value = _ALLOWED_RANGES[name]
     if not _WHOLE_NUMBER.fullmatch(text) or not min_value <= int(text) <= max_value:
         raise _value_error(location, name, text, _short_repr(text), f"expected a whole number {min_value}..{max_value}")
@@ -180,6 +182,7 @@ def _parse_integer(location: TextLine, name: str, text: str) -> int:
 
 
 def _parse_number(location: TextLine, name: str, text: str) -> float:
+    """Return the number in a column. Raises MissionError for any other text."""
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
         raise _value_error(location, name, text, _short_repr(text), f"expected a finite number{hint}")
@@ -293,10 +296,12 @@ def rally_text(mission: Mission) -> str:
 
 
 def _file_without_home(items: tuple[MissionItem, ...]) -> str:
+    """Return the text of a WPL file without a home line."""
     return "\n".join([HEADER, *(_item_line(item, current=False) for item in items)]) + "\n"
 
 
 def _file_text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
+    """Return the text of a WPL file that starts with a home line."""
     position = home or Home(0.0, 0.0, 0.0)
     home_item = MissionItem(
         0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), position.lat_deg, position.lon_deg, position.alt

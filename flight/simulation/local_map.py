@@ -80,9 +80,11 @@ def _fit_local_map(
         raise FlightError(f"{source}: the area contains a pole", file=source)
 
     def position(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+        """Return the map position of a latitude and longitude (rad), m."""
         return to_map(origin, np.degrees(latitude), np.degrees(longitude))
 
     def angle(latitude: Floats, longitude: Floats) -> tuple[Floats, Floats]:
+        """Return the map course of true north at a latitude and longitude (rad), rad."""
         step = 1e-5
         east0, north0 = position(latitude - step, longitude)
         east1, north1 = position(latitude + step, longitude)
@@ -127,6 +129,7 @@ def _map_outside_raster() -> PolyMap:
     """Return a map that converts every position to a pixel outside any raster."""
 
     def outside_pixel(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Return a pixel outside any raster for each position."""
         return np.full_like(x, -9.0), np.full_like(y, -9.0)
 
     return fit_polymap(outside_pixel, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)

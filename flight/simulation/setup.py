@@ -338,7 +338,7 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: those of the scenario, and those of the aircraft where it states none.
+    """Return the limits of a path: the scenario's limits, or the aircraft's limits where it states none.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.
@@ -352,6 +352,7 @@ def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_ban
     """
 
     def limit_in_rad(value: float | str) -> float | None:
+        """Return an angle limit in rad; None for a limit that is a word."""
         return None if isinstance(value, str) else math.radians(value)
 
     scenario_limits = scenario.limits

@@ -254,6 +254,7 @@ def measure_zone_margin(
     for z in range(zones.required.shape[0]):
         required, zone = zones.required[z], records.zones[z]
         max_required = max(required.horizontal, required.vertical)
+        # A zone further away than this cannot change the margin.
         search_distance = max(max_required, min(max(margin.nearest, max_required + margin.excess), 1e9))
         if zone.exclusion and box_distance(records, z, west, east, south, north) >= search_distance:
             continue
@@ -265,6 +266,7 @@ def measure_zone_margin(
         vertical = vertical_distance(zone, band)
         if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
+        # The zone may be near: measure short pieces, whose heights and positions belong together.
         piece_count = max(1, math.ceil(horizontal_length / MAX_PIECE_LENGTH))
         for k in range(piece_count):
             for axis in range(3):

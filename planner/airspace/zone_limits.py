@@ -254,6 +254,7 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         first = min(first, along)
         last = max(last, along)
         if (across > 0.0) != (to_across > 0.0):
+            # The edge crosses the extended line; each crossing ahead of the line's start changes inside to outside.
             crossing = along + (to_along - along) * across / (across - to_across)
             is_inside = is_inside != (crossing > 0.0)
             if 0.0 <= crossing <= line.length:

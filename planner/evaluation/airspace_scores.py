@@ -154,8 +154,7 @@ def add_airspace_violations(
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
     a, b = np.empty(3), np.empty(3)
-    last_leg = legs.shape[0] - 1
-    across = float(data.tracking.across)
+    last_leg, across = legs.shape[0] - 1, float(data.tracking.across)
     for i in range(last_leg + 1):
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
@@ -165,6 +164,7 @@ def add_airspace_violations(
         if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
             first_fraction = min(1.0, END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == 0 else 0.0
             last_fraction = max(first_fraction, 1.0 - END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == last_leg else 1.0
+            # The tracking error does not apply near the fixed ends.
             for fraction, end_fraction, lateral in (
                 (0.0, first_fraction, 0.0),
                 (first_fraction, last_fraction, across),

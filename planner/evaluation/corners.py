@@ -201,8 +201,7 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
     The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
     points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
     slope decreases, the flight cuts the crest by (slope change) x (half length of the blend) / 4, and the vertices are
-    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the waypoint itself replaces the
-    arc.
+    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the arc is the waypoint.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
@@ -218,8 +217,10 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
     slope_out = (next_waypoint[2] - waypoint[2]) / length_after
     chord_count = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
     arc_length = radius * turn if chord_count > 0 else 0.0
+    # Heights at the tangent points, and the slope between them: along the arc, or of the next leg without an arc.
     start_height, end_height = waypoint[2] - tangent * slope_in, waypoint[2] + tangent * slope_out
     slope = (end_height - start_height) / arc_length if chord_count > 0 else slope_out
+    # A blend takes up at most half of the straight part of its leg, and half of the arc.
     available_in, available_out = 0.5 * (length_before - tangent), 0.5 * (length_after - tangent)
     half_limit = 0.5 * arc_length if chord_count > 0 else min(available_in, available_out)
     available_in, available_out = min(available_in, half_limit), min(available_out, half_limit)

@@ -135,8 +135,8 @@ def _evaluate_polynomials(
 ) -> None:
     """Fill `out` with the sum of coefficients[i, j] x^i y^j for each path, by Horner's method.
 
-    terms: number of terms; i + j is below it.
-    inner: scratch.
+    terms: upper limit of i + j, which stays below it.
+    inner: scratch memory.
     """
     for b in range(size):
         out[b] = 0.0

@@ -283,6 +283,7 @@ def sample_terrain(
                 dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
                 required_height = clearance_at(required, path[k, 0] + fraction * dx, path[k, 1] + fraction * dy)
             x, y = leg.column + fraction * leg.column_step, leg.row + fraction * leg.row_step
+            # The flight may be below the leg by the altitude lag.
             below, further_height = 0.0, 0.0
             if lags[k].max_below > 0.0:
                 below = max(0.0, lag_at(lags[k], fraction))

@@ -280,17 +280,17 @@ def kill_density(
                     z = _shift_towards_missile(
                         z, dz * min(1.0, max(0.0, -(dx * x + dy * y + dz * z) * inverse)), below, above
                     )
-                along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
-                closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
+                dot, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
+                closest2 = _closest2(-dot * inverse, 0.0, 1.0, dot, start2, length2)
                 if closest2 < (grown_radius + max_distance) * (grown_radius + max_distance):
                     length = math.sqrt(length2)
                     end_a, begin_b = length_a / max(length, length_a), 1.0 - length_b / max(length, length_b)
-                    distance2_a = _closest2(-along * inverse, 0.0, end_a, along, start2, length2)
-                    distance2_b = _closest2(-along * inverse, begin_b, 1.0, along, start2, length2)
+                    distance2_a = _closest2(-dot * inverse, 0.0, end_a, dot, start2, length2)
+                    distance2_b = _closest2(-dot * inverse, begin_b, 1.0, dot, start2, length2)
                     distance_a = min(distance_a, math.sqrt(distance2_a) - grown_radius)
                     distance_b = min(distance_b, math.sqrt(distance2_b) - grown_radius)
                     if closest2 < grown_radius * grown_radius:
-                        density += _sphere_density(along, start2, length2, grown_radius, missile.scale)
+                        density += _sphere_density(dot, start2, length2, grown_radius, missile.scale)
     return density, distance_a, distance_b
 
 
@@ -307,16 +307,18 @@ def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, 
 
 
 @inlined
-def _shift_towards_missile(z: float, altitude_change: float, below: float, above: float) -> float:
+def _shift_towards_missile(start_height: float, altitude_change: float, below: float, above: float) -> float:
     """Return the height of a segment's start above a missile, reduced by the tracking error, m.
 
     The segment is shifted towards the missile by up to the tracking error.
 
+    start_height: height of the segment's start above the missile, m.
     altitude_change: altitude change of the segment up to its closest point, m.
+    below, above: vertical tracking error, m.
     """
-    height = z + altitude_change
-    shift = min(height, below) if height > 0.0 else max(height, -above)
-    return z - shift
+    closest_height = start_height + altitude_change
+    shift = min(closest_height, below) if closest_height > 0.0 else max(closest_height, -above)
+    return start_height - shift
 
 
 @inlined
@@ -331,30 +333,30 @@ def _cell_index(position: float, count: int) -> int:
 
 @inlined
 def _closest2(
-    closest_fraction: float, begin_fraction: float, end_fraction: float, along: float, start2: float, length2: float
+    closest_fraction: float, begin_fraction: float, end_fraction: float, dot: float, start2: float, length2: float
 ) -> float:
     """Return the squared distance from a point to the part of a segment between two fractions, m^2.
 
     closest_fraction: fraction of the infinite line that is closest to the point.
-    along, start2, length2: see `window_exposure`.
+    dot, start2, length2: see `window_exposure`; the point is the centre.
     """
     fraction = closest_fraction if closest_fraction < end_fraction else end_fraction
     fraction = fraction if fraction > begin_fraction else begin_fraction
-    return max(0.0, start2 + fraction * (2.0 * along + fraction * length2))
+    return max(0.0, start2 + fraction * (2.0 * dot + fraction * length2))
 
 
 @inlined
 def _sphere_density(
-    along: float, start2: float, length2: float, radius: float, scale: float
+    dot: float, start2: float, length2: float, radius: float, scale: float
 ) -> float:  # pragma: no cover
     """Return the mean kill density of a segment that enters a sphere; see `window_exposure`."""
     if length2 < 1e-12:
-        return window_exposure(0.0, 1.0, length2, along, start2, scale)
-    mid_fraction = -along / length2
+        return window_exposure(0.0, 1.0, length2, dot, start2, scale)
+    mid_fraction = -dot / length2
     half_fraction = math.sqrt(max(0.0, mid_fraction * mid_fraction - (start2 - radius * radius) / length2))
     begin_fraction, end_fraction = max(0.0, mid_fraction - half_fraction), min(1.0, mid_fraction + half_fraction)
     return (
-        window_exposure(begin_fraction, end_fraction, length2, along, start2, scale)
+        window_exposure(begin_fraction, end_fraction, length2, dot, start2, scale)
         if end_fraction > begin_fraction
         else 0.0
     )

@@ -264,6 +264,7 @@ def _conditions_at(travel: TravelCost, table: PerformanceTable, x: float, y: flo
         wind_east, wind_north = _interpolate_wind(travel.winds, x, y, amsl)
     if travel.energy == 0.0:
         return _FlightConditions(airspeed, wind_east, wind_north, 0.0, 0.0, 0.0, -1.0, 1.0)
+    # Interpolate the power coefficients between the altitudes of the table.
     count, row = table.amsl.size, 0
     while row + 2 < count and table.amsl[row + 1] <= amsl:
         row += 1

@@ -40,9 +40,10 @@ class Level:
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     """Return the rank of each row of scores (n, c): the number of rows that are preferred to it, (n,).
 
-    With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
-    Pareto dominance on the level, and only rows equal on it proceed to the next: a component outside U is at its goal,
-    and no row is below it. Each level is therefore one dominance count within groups of ties.
+    Every component is first raised to its goal, so that no row is below a goal. The rule "u dominates v on U, or is
+    equal there and v violates a goal outside U" then becomes Pareto dominance on the level, because a component outside
+    U is at its goal. Only rows that are equal on a level are compared on the next level. Each level is therefore one
+    dominance count within groups of ties.
 
     >>> levels = Level((0,), (0.0,)), Level((1,), (NO_GOAL,))
     >>> ranks(np.array([[0.0, 9.0], [1.0, 2.0], [0.0, 3.0]]), levels).tolist()  # those that meet the goal come first

@@ -164,7 +164,7 @@ def _close_cells(
 def closed_bands(problem: Problem) -> list[str]:
     """Return a line about each altitude band that the required margins leave empty.
 
-    One band lies between the clearance and the maximum height above ground, the others are those of inclusions.
+    One band lies between the clearance and the maximum height above ground. Each inclusion has a band, too.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -70,7 +70,7 @@ def highest_level_flight(data: ProblemArrays) -> float:
     """Return the highest altitude at which the aircraft can fly level, m; no waypoint may be above it.
 
     Return inf if no such altitude exists, or if the wind is too strong to hold a course. The limit applies only if both
-    slope limits are those of the aircraft, as in `planner.evaluation.leg_constraints`.
+    slope limits are the aircraft's limits, as in `planner.evaluation.leg_constraints`.
     """
     table = data.aircraft
     if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
@@ -266,6 +266,7 @@ def _reaches_destination(
         while range_index + 1 < range_counts[i, j] and range_bottoms[i, j, range_index + 1] < point[2]:
             range_index += 1
         ends[k] = (i * rows + j) * range_limit + range_index
+    # Depth-first search over open ranges; ranges of neighbouring columns are connected if they overlap.
     is_visited = np.zeros(range_bottoms.size, dtype=np.bool_)
     stack = np.empty(range_bottoms.size, dtype=np.int64)
     stack[0], stack_size = ends[0], 1

@@ -68,7 +68,7 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
 
 
 def _call_scores(task: _Task) -> None:
-    """Call the kernels that score and rank paths, and those of a pattern search."""
+    """Call the kernels that score and rank paths, and the kernels of a pattern search."""
     scores = score_table(*graded_scores(task.problem.search, np.stack([task.path, task.path])))
     best_first(scores)
     vector = rotated_vectors(task.problem.space, task.encoding, task.path[None])[0]

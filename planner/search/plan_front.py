@@ -285,7 +285,7 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
 
 
 def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
-    """Return the problem with margins between those of the certificate and those of a search.
+    """Return the problem with margins between the certificate's margins and a search's margins.
 
     fraction: 0 for the margins of the certificate, 1 for the margins of the search.
     """
@@ -298,7 +298,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce the margins of a task to those of the default path (w, 3), so that other paths may be as tight."""
+    """Reduce a task's margins to the margins of the default path (w, 3), so that other paths may be as tight."""
     for fraction in MARGIN_FRACTIONS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():

@@ -206,7 +206,7 @@ def corner_point(
     radius: radius of the turn, m.
     sample: number of the sample.
 
-    The height of a sample is that of the leg, or of the arc between its tangent points.
+    A sample has the height of the leg, or of the arc between its tangent points.
     """
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in
@@ -216,6 +216,7 @@ def corner_point(
     cross = ux * vy - uy * vx
     turn = min(MAX_TURN_RAD, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:
+        # With a tracking error, samples alternate between both sides of the leg, at the largest deviation.
         speed = math.sqrt(radius * GRAVITY * data.aircraft.tan_max_bank)
         offset, length_before, length_after = corner_deviation(data.tracking, turn, speed)
         tangent = radius * math.tan(0.5 * turn)
@@ -230,6 +231,7 @@ def corner_point(
             out[0], out[1] = waypoint[0] + vx * along - vy * side, waypoint[1] + vy * along + vx * side
             out[2] = waypoint[2] + along * slope_out
         return
+    # Without a tracking error, samples are on the arc.
     fraction = (sample + 1.0) / (SAMPLES_PER_CORNER + 1.0)
     tangent, side = radius * math.tan(0.5 * turn), 1.0 if cross >= 0.0 else -1.0
     # The middles of the chords are this far from the centre; the arc is further.

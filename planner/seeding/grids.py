@@ -272,7 +272,7 @@ def relax_cells(
     count: int,
     length: float,
 ) -> None:
-    """Offer routes through successive cells to as many cells of the next stage; keep the cheaper routes.
+    """Extend the routes of successive cells to cells of the next stage; keep the cheaper route of each cell.
 
     cost, next_cost: costs of the routes to the cells of this stage and of the next stage.
     cell_costs: cost per m of the cells.

@@ -353,6 +353,7 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
     min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     stages = max(1, math.ceil(frame.length / step))
+    # Enlarge the spacing until the lattice is small enough.
     while True:
         step = frame.length / stages
         layer_spacing = gentler_slope * step / LAYERS_PER_STEP

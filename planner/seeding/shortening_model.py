@@ -182,6 +182,7 @@ def _find_near_missiles(
             if distance > missile.radius + data.kill_margin + NEARBY_DISTANCE_M:
                 continue
             length = math.sqrt(length2)
+            # A missile near a corner also needs the excursion of the flight there.
             excursion = 0.0
             if fraction * length < corners[i].after:
                 excursion = corners[i].excursion
@@ -294,6 +295,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:
             length += unit[axis] * unit[axis]
         length = max(1e-3, math.sqrt(length))
         total += length
+        # Rows of the leg's two ends among the inner waypoints; a fixed end has no row.
         first_row, second_row = 3 * (i - 1), 3 * i
         for axis in range(3):
             unit[axis] /= length
@@ -342,7 +344,7 @@ def _add_missiles(
 ) -> float:
     """Add the distances between legs and missiles to the model; return their contribution to the merit.
 
-    These are the first constraints. The parameters are those of `lagrangian`.
+    These are the first constraints. See `lagrangian` for the parameters.
     """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
@@ -476,6 +478,7 @@ def _add_slopes(
     for i in range(path.shape[0] - 1):
         dx, dy, altitude_change = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
         horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        # Kind 0 is the climb limit, kind 1 the dive limit, and kind 2 the minimum length.
         for kind in range(3):
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
@@ -511,6 +514,7 @@ def _add_turns(
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)
     before_derivatives, after_derivatives = np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
+    # One constraint per waypoint: the margin of its turn.
     for i in range(count + 1):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
         vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
@@ -531,6 +535,7 @@ def _add_turns(
         merit += _add_constraint(values[first_number + i], i - 1, 3, multipliers[first_number + i], penalty, model)
     if not active.turns_in_legs:
         return merit
+    # One constraint per leg: the length that remains after the turns at its ends, the roll and settling.
     for i in range(count):
         number = first_number + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]

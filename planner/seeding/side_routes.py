@@ -73,7 +73,7 @@ def _relax_stage_back(
     layer_spacing: float,
     ratio: float,
 ) -> None:
-    """Compute the costs from the cells of a stage to the destination, from those of the next stage.
+    """Compute the costs from the cells of a stage to the destination, from the costs of the next stage.
 
     goal_costs, previous_goal_costs: (layers, across) costs to the destination from the cells of the next stage, and of
         this stage.

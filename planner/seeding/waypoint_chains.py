@@ -105,6 +105,9 @@ def _advance_sweeps(
 ) -> bool:
     """Continue both sweeps until `max_legs` legs are evaluated; return True if both are complete.
 
+    The forward sweep extends partial paths from the start. Then the backward sweep extends partial paths from the
+    destination.
+
     legs: (w - 1, k, k) costs of legs, filled when needed; a negative number is minus a lower bound.
     cursor: a `_CURSOR` record (1,), at which the sweeps continue.
     """

@@ -101,6 +101,7 @@ def _tuples_to_lists(geometry: dict[str, Any]) -> dict[str, Any]:
     """Convert the tuples in a geometry of shapely to lists, as JSON has them."""
 
     def to_lists(value: Any) -> Any:
+        """Return a value in which all tuples, at any depth, are lists."""
         return [to_lists(element) for element in value] if isinstance(value, tuple | list) else value
 
     return {"type": geometry["type"], "coordinates": to_lists(geometry.get("coordinates", []))}

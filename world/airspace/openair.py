@@ -180,6 +180,7 @@ def _limit_reader(key: str) -> Callable[[_Block, str], None]:
     """Return the function that reads AL or AH and stores the limit under a key, in openAIP's form."""
 
     def read(block: _Block, text: str) -> None:
+        """Store the limit under the key. Raises ValueError if it is already stored."""
         if key in block.limits:
             raise ValueError("an airspace has one lower limit (AL) and one upper limit (AH)")
         if (limit := _parse_limit(text, key)) is not None:
@@ -221,10 +222,12 @@ def _read_variable(block: _Block, text: str) -> None:
 
 
 def _read_corner(block: _Block, text: str) -> None:
+    """Add a corner of a polygon (DP)."""
     _add_corners(block.corners, [_parse_position(text)])
 
 
 def _read_circle(block: _Block, text: str) -> None:
+    """Store a circle about the block's centre (DC)."""
     if block.circle is not None:
         raise ValueError("an airspace has one circle")
     block.circle = _required_centre(block), _parse_length(text)
@@ -257,10 +260,12 @@ def _read_arc_by_points(block: _Block, text: str) -> None:
 
 
 def _read_airway(block: _Block, text: str) -> None:
+    """Add a corner of an airway (DY)."""
     _add_corners(block.airway, [_parse_position(text)])
 
 
 def _add_corners(corners: list[_Position], added_corners: list[_Position]) -> None:
+    """Append corners. Raises ValueError for more corners than a zone may have."""
     if len(corners) + len(added_corners) > MAX_CORNERS:
         raise ValueError(f"more corners than a zone may have: at most {MAX_CORNERS:,}")
     corners += added_corners
@@ -270,6 +275,7 @@ def _text_reader(name: str) -> Callable[[_Block, str], None]:
     """Return the function that reads AN or AY and stores the text in a field of the airspace."""
 
     def read(block: _Block, text: str) -> None:
+        """Store the text in the field of the airspace."""
         setattr(block, name, text if name == "name" else text.upper())
 
     return read
@@ -295,6 +301,7 @@ _COMMANDS: dict[str, Callable[[_Block, str], None]] = {
 
 
 def _parse_number(text: str) -> float:
+    """Return a number of at least 0. Raises ValueError for any other text."""
     try:
         value = float(text)
     except ValueError:

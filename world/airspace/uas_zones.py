@@ -82,6 +82,7 @@ def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
 
 
 def _feature_list(data: Mapping[str, Any]) -> Any:
+    """Return the list of features of an ED-269 file, under either of its two names."""
     return data.get("features") if "features" in data else data.get("UASZoneList")
 
 
@@ -216,6 +217,7 @@ def _parse_rings(coordinates: Any, source: str) -> list[list[list[float]]]:
 
 
 def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
+    """Return the [[zones]] entries of a circle. Raises ScenarioError for invalid values."""
     try:
         return {"lat_deg": float(centre[1]), "lon_deg": float(centre[0]), "radius_m": float(radius)}
     except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
@@ -238,6 +240,7 @@ def _one_line_name(value: Any) -> str:
 
 
 def _upper_word(value: Any) -> str:
+    """Return a word in capitals; "" for anything but text."""
     return value.strip().upper() if isinstance(value, str) else ""
 
 
@@ -316,5 +319,6 @@ def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
 
 
 def _value_error(source: str, location: str, field: str, allowed: str) -> ScenarioError:
+    """Return the error for a field at a location of a file."""
     label = f"{source}: {location}" if location else source
     return ScenarioError(f"{label}: {field}: {allowed}", file=source, field=field, allowed=allowed)

@@ -73,6 +73,7 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
 
 
 def _reject_constant(name: str) -> float:
+    """Raise ValueError for NaN or Infinity, which Python's JSON reader accepts."""
     raise ValueError(f"{name} is not a JSON number")
 
 
@@ -198,10 +199,12 @@ def kml_zones(text: str, source: str) -> Iterator[Found]:
 
 
 def _tag_name(element: _Element) -> str:
+    """Return the tag of an XML element without its namespace."""
     return element.tag.rpartition("}")[2]
 
 
 def _find_descendants(element: _Element, tag: str) -> list[_Element]:
+    """Return the descendants of an XML element that have a tag, in any namespace."""
     return [child for child in element.iter() if _tag_name(child) == tag]
 
 
@@ -454,6 +457,7 @@ def _read_format(path: Path, suffix: str, source: str) -> Iterator[Found]:
 
 
 def _check_size(path: Path, source: str) -> None:
+    """Raise ScenarioError for a file that is missing or too large."""
     if not path.is_file():
         raise ScenarioError(f"{source}: {missing_text(path)}", file=source)
     if path.stat().st_size > MAX_BYTES:
@@ -478,4 +482,5 @@ def _read_text(path: Path, source: str, *, openair: bool) -> str:
 
 
 def _zone_table(entries: dict[str, Any], source: str) -> ZoneTable:
+    """Return the checked [[zones]] table of some entries. Raises ScenarioError for an invalid entry."""
     return checked_table(lambda: ZoneTable.model_validate(entries), source)

@@ -86,8 +86,8 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     rings: corners (east, north) m of each ring.
 
     A point is inside if an odd number of rings contain it. A corner is omitted if it repeats the previous corner, or
-    the first corner at the end of a ring. Raises ValueError for a ring of fewer than three corners, for a ring that
-    crosses itself, for rings that cross each other, for a polygon of no area, and for too many corners or edges
+    the first corner at the end of a ring. Raises ValueError for a ring of fewer than three corners, and for rings that
+    cross themselves or each other. Also raises ValueError for a polygon of no area, and for too many corners or edges
     (`check_edges`).
 
     >>> make_polygon([[(0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (90.0, 0.0), (0.0, 0.0)]]).rings
@@ -115,6 +115,7 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
 
 
 def _check_area(area: float) -> None:
+    """Raise ValueError for an area below the minimum."""
     if not area >= MIN_AREA:
         raise ValueError(f"nothing inside: {area:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 

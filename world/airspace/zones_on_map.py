@@ -183,6 +183,7 @@ def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
 
 
 def _make_level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:
+    """Return the level that a zone's table states, AMSL or above ground; None without a level."""
     if amsl is not None:
         return ZoneLevel(amsl, "amsl")
     return None if above_ground is None else ZoneLevel(above_ground, "ground")
@@ -278,10 +279,12 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
 
 
 def _open_ring(ring: Floats) -> Ring:
+    """Return a closed ring without its last corner, which repeats the first."""
     return tuple((east, north) for east, north in ring[:-1].tolist())
 
 
 def _ring_area(ring: Floats) -> float:
+    """Return twice the area of a closed ring, m^2."""
     return abs(float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum()))
 
 

@@ -17,7 +17,7 @@ def _near_longitudes(longitudes: Floats, west: float, east: float) -> Floats:
 def regular_axes(latitudes: Floats, longitudes: Floats, box: Any) -> tuple[Floats, Floats] | None:
     """Return the latitudes and longitudes of a regular grid around a box.
 
-    The distance of its nodes is that of the given grid.
+    Its nodes have the same distance as the nodes of the given grid.
 
     latitudes, longitudes: nodes of the given grid, (r, c) deg.
     box: south, west, north and east.

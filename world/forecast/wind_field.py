@@ -94,7 +94,7 @@ class WindField:
     ) -> Floats:
         """Return the wind at n points, m/s, east and north, and the altitude at which it applies, (n, 3).
 
-        The altitude (m AMSL) is that of the point, limited to the levels of the field at the point.
+        The altitude (m AMSL) is the point's altitude, limited to the levels of the field at the point.
 
         seconds: (n,) s, or one value, as all arguments.
         latitudes, longitudes: deg.
@@ -226,6 +226,7 @@ def interpolate_field(
 def _interpolate_points(
     field: Floats, seconds: Floats, latitudes: Floats, longitudes: Floats, altitudes: Floats
 ) -> Floats:
+    """Return the wind and its altitude at n points, (n, 3), by `interpolate_field`."""
     found = np.empty((seconds.size, 3))
     for k in range(seconds.size):
         east, north, altitude = interpolate_field(field, seconds[k], latitudes[k], longitudes[k], altitudes[k])

@@ -287,6 +287,7 @@ class ArduPlane(Autopilot):
         )
 
     def _ground_law(self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]) -> ControlLaw:
+        """Return the control law of a flight that starts or ends on the ground."""
         return ArduPlaneFromGround(self, ground_phases, aircraft, tuple(contacts)).control_law
 
     def _landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:

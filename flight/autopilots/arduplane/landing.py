@@ -74,7 +74,7 @@ def landing_glide(height: float, distance: float, ground_speed: float, parameter
 def go_around_height(stated_height: float, takeoff_height: float) -> float:
     """Return the height of a go-around above home, m.
 
-    The landing item states the height. If it does not, the height is that of the take-off, or 30 m without a take-off.
+    The landing item states the height. Otherwise the height of the take-off applies, or 30 m without a take-off.
 
     stated_height: height that the landing item states, m; 0 if it states none.
     takeoff_height: height of the take-off item above home, m; 0 without a take-off.

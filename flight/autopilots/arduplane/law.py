@@ -172,8 +172,8 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
     """Return the altitude demand on a leg at the aircraft's position, m AMSL.
 
     Usually the demand follows the slope from the leg's start to its end; on a leg to a loiter the slope ends at the
-    loiter's center. The demand is the altitude of the leg's end if the altitude changes in a step or only a little, if
-    the aircraft is on a loiter, and in 4.7 in a climb at a low height above home. Follows
+    loiter's center. The demand is the altitude of the leg's end in three cases: the altitude changes in a step or only
+    a little; the aircraft is on a loiter; and, in 4.7, the aircraft climbs at a low height above home. Follows
     `Plane::set_target_altitude_proportion`.
     """
     end_altitude: float = target.up

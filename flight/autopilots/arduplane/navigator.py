@@ -133,7 +133,7 @@ def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north of a waypoint, m; for a waypoint on a loiter, those of the loiter's center."""
+    """Return east and north of a waypoint, m; for a waypoint on a loiter, of the loiter's center."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl

@@ -64,7 +64,7 @@ NAMES_SINCE_4_7 = frozenset({*RENAMED["4.7"].values(), "CLIMB_SLOPE_HGT"})
 def name_in_release(name: str, version: ArduPlaneVersion) -> str:
     """Return the name of a parameter in a given release.
 
-    The given name may be that of any release. It is returned unchanged if no release renamed the parameter.
+    The given name may be from any release. It is returned unchanged if no release renamed the parameter.
 
     >>> name_in_release("GLIDE_SLOPE_MIN", "4.7"), name_in_release("ALT_SLOPE_MIN", "4.6")
     ('ALT_SLOPE_MIN', 'GLIDE_SLOPE_MIN')

@@ -138,6 +138,7 @@ def fly_returns(
     min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
 
     def fly(k: int, positions: Floats, result: Record) -> None:
+        """Simulate the RTL from start k, and fill its positions and its result."""
         fly_stages(
             starts[k],
             stages[k],
@@ -166,7 +167,7 @@ def _make_stages(
 ) -> Records:
     """Return the successive targets of an RTL, as n `WAYPOINT` records.
 
-    The records are those of `flight.guidance.lateral_reference_laws`. The first target is the RTL loiter, if there is
+    `WAYPOINT` is defined in `flight.guidance.lateral_reference_laws`. The first target is the RTL loiter, if there is
     one. The other targets are the stops of the landing sequence, up to its first loiter.
     """
     stops = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))

@@ -362,11 +362,13 @@ def _update_throttle(
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     ste_rate_per_throttle = (ste_rate_max - ste_rate_min) / (throttle_max - throttle_min)
     memory.ste_rate_error += (ste_rate_demand - ste_rate - memory.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
+    # Additional drag in a bank needs more throttle.
     tilt = math.sin(state.roll) * math.cos(state.pitch)
     roll_compensation = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
     throttle = parameters.throttle_cruise + (ste_rate_demand + roll_compensation) / ste_rate_per_throttle
     throttle_per_ste = 1.0 / (parameters.tecs_time * ste_rate_per_throttle)
     throttle += throttle_per_ste * (ste_error + parameters.tecs_throttle_damping * memory.ste_rate_error)
+    # The integrator may exceed what saturates the throttle only by a small overshoot.
     integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
     integrator_max = min(
         integrator_limit, max(-integrator_limit, throttle_max - throttle + _THROTTLE_OVERSHOOT_FRACTION)
@@ -466,6 +468,7 @@ def _update_pitch(
     pitch_min = parameters.pitch_limit_min
     if parameters.tecs_pitch_min < 0.0:
         pitch_min = max(pitch_min, parameters.tecs_pitch_min)
+    # Demanded SEB rate: from the errors of potential and kinetic energy, within the climb and sink limits.
     seb_rate_per_pitch = memory.tas * GRAVITY
     seb_rate_demand = spe_weight * (spe_error / parameters.tecs_time + GRAVITY * memory.climb_rate_demand)
     seb_rate_demand -= ske_weight * ske_error / parameters.tecs_time

@@ -84,9 +84,11 @@ class AutopilotFlight(SitlFlight):
 
     @property
     def _ground_tick(self) -> Tick:
+        """Compiled function for one tick of a flight that starts on the ground."""
         return program_ground_tick
 
     def _prepare_program(self) -> None:
+        """Upload and start the mission, wait until the motor has thrust, and push the aircraft along the rail."""
         self._hold_during(self._preflight.prepare(self._mission))
         self._hold_during(self._wait_for_thrust())
         self._push()

@@ -172,6 +172,7 @@ class PhysicsPort:
         return data
 
     def _send(self, data: bytes) -> None:
+        """Send bytes to the program, if there are any."""
         if not data:
             return
         try:
@@ -206,7 +207,9 @@ class JsonLockstep(Lockstep):
         self._port, self._servos = port, servos
 
     def _receive_commands(self) -> Commands:
+        """Return the commands in the next servo packet of the program."""
         return self._servos.commands(self._port.receive().pulses)
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
+        """Send the motion of the aircraft to the program."""
         self._port.answer(encode_motion(motion, battery))

@@ -24,7 +24,7 @@ class Preflight(Conversation):
     """Conversation with one running ArduPlane."""
 
     def identify(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read those of the named parameters that it has.
+        """Identify the autopilot, and read the named parameters; skip parameters that it lacks.
 
         Raises FlightError if the vehicle is not a fixed wing.
         """
@@ -56,6 +56,7 @@ class Preflight(Conversation):
 
 
 def _home_item(home: Home) -> MissionItem:
+    """Return home as mission item 0."""
     return MissionItem(
         0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt
     )

@@ -32,6 +32,7 @@ def arduplane_launch(
     """
 
     def prepare(folder: Path) -> Launch:
+        """Write the program's defaults into a folder, and return its command line."""
         text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
         (folder / _DEFAULTS_FILE).write_text(text, encoding="ascii")
         start_position = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
@@ -146,7 +147,7 @@ def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
 
 
 def load_user_parameters(setup: FlightSetup) -> dict[str, float]:
-    """Return the user's parameters: those of the scenario's parameter file, and those of its RTL settings.
+    """Return the user's parameters from the scenario's parameter file and from its RTL settings.
 
     The result includes parameters that are assumed for a mission with a landing, because ArduPlane would otherwise not
     arm.

@@ -431,6 +431,7 @@ class Px4(Autopilot):
         )
 
     def _rate_limit(self, *names: str) -> RateLimit:
+        """Return the rate limit of the smallest of some parameters."""
         return RateLimit.of_parameters(**{name: self.parameters[name] for name in names})
 
     @property
@@ -611,4 +612,5 @@ def _transfer_state(previous_record: Record, record: Record, start: Floats) -> N
 
 
 def _rtl_parameters(settings: RtlSettings) -> dict[str, float]:
+    """Return the value of RTL_RETURN_ALT that a scenario's RTL settings require; none without an altitude."""
     return {} if settings.altitude is None else {"RTL_RETURN_ALT": settings.altitude}

@@ -94,6 +94,7 @@ def adapted_period(
     track_feasibility: feasibility of the track's course, 0..1; see `bearing_feasibility`.
     track_proximity: 0 far from the track, 1 on the track.
     """
+    # Without wind or curvature the period is that of a straight track.
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
     damping = parameters.npfg_damping
@@ -152,6 +153,16 @@ def heading_error_sine(air_east: float, air_north: float, reference_east: float,
 
 
 @inner
+def _look_ahead_angle(track_error: float, error_bound: float) -> float:
+    """Return the angle of the commanded bearing, rad: 0 at a right angle to the track, pi/2 along the track.
+
+    track_error: distance from the track, m.
+    error_bound: result of `track_error_bound`, m.
+    """
+    return 0.5 * math.pi * (1.0 - min(1.0, abs(track_error) / error_bound)) ** 2
+
+
+@inner
 def guide_to_path(
     estimated: Record,
     path_east: float,
@@ -184,13 +195,12 @@ def guide_to_path(
     wind_dot_track = wind_east * tangent_east + wind_north * tangent_north
     track_feasibility = bearing_feasibility(airspeed, wind_cross_track, wind_dot_track)
     damping = parameters.npfg_damping
-    error_bound = track_error_bound(ground_speed, straight_track_period(parameters) * damping)
-    look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(track_error) / error_bound)) ** 2
-    period = adapted_period(
-        airspeed, wind_speed, curvature, track_feasibility, math.sin(look_ahead_angle) ** 2, parameters
-    )
+    # The period depends on the proximity to the track, and the proximity on the period: begin with the straight period.
+    straight_error_bound = track_error_bound(ground_speed, straight_track_period(parameters) * damping)
+    straight_proximity = math.sin(_look_ahead_angle(track_error, straight_error_bound)) ** 2
+    period = adapted_period(airspeed, wind_speed, curvature, track_feasibility, straight_proximity, parameters)
     error_bound = track_error_bound(ground_speed, period * damping)
-    look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(track_error) / error_bound)) ** 2
+    look_ahead_angle = _look_ahead_angle(track_error, error_bound)
     proximity = math.sin(look_ahead_angle) ** 2
     # The bearing points to the track at a right angle far from it, and along the track on it.
     side = math.copysign(1.0, track_error)
@@ -199,6 +209,7 @@ def guide_to_path(
     wind_cross_bearing = wind_east * bearing_north - wind_north * bearing_east
     wind_dot_bearing = wind_east * bearing_east + wind_north * bearing_north
     course_feasibility = bearing_feasibility(airspeed, wind_cross_bearing, wind_dot_bearing)
+    # Airspeed at which the ground speed on the bearing is its minimum.
     min_airspeed = math.hypot(parameters.min_ground_speed - wind_dot_bearing, wind_cross_bearing)
     ground_speed_on_bearing = wind_dot_bearing + math.sqrt(
         max(0.0, target_airspeed * target_airspeed - wind_cross_bearing * wind_cross_bearing)
@@ -210,7 +221,7 @@ def guide_to_path(
     )
     error_sine = heading_error_sine(air_east, air_north, reference_east, reference_north)
     gain = 4.0 * math.pi * damping / period if parameters.uses_switch_distance else _HEADING_GAIN_PER_S
-    # Feed-forward for the curvature of the track.
+    # Feed-forward for the curvature of the track, at the aircraft's distance from the track.
     track_speed = max(0.0, estimated.velocity_east * tangent_east + estimated.velocity_north * tangent_north)
     local_curvature = curvature / max(1.0 - curvature * track_error, max(1e-6, 0.5 * abs(curvature)))
     speed_ratio = 1.0 + wind_dot_track / math.sqrt(max(1e-6, airspeed * airspeed - wind_cross_track * wind_cross_track))

@@ -101,6 +101,7 @@ def fly_returns(
     min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
 
     def fly(k: int, positions: Floats, result: Record) -> None:
+        """Simulate the RTL from start k, and fill its positions and its result."""
         limits = timeouts[k], float(min_clearances[k]), float(min_distances[k])
         transit_altitude = targets[k].transit_altitude
         _fly_one(starts[k], routes[k], transit_altitude, record, aircraft, environment, limits, positions, result)
@@ -297,7 +298,7 @@ def _steer(
 ) -> bool:
     """Set the setpoints of bank, pitch and throttle for one tick.
 
-    Return True once an RTL to a landing flies the landing sequence, and not the climb before it.
+    Return True once an RTL to a landing flies the landing sequence instead of the climb before it.
     """
     wind_east, wind_north = state.wind_east, state.wind_north
     eas_to_tas = eas_to_tas_ratio(estimated.up)

@@ -103,6 +103,7 @@ class Px4Flight(SitlFlight):
         return super().keep_log(target)
 
     def _prepare_program(self) -> None:
+        """Upload the mission, push the aircraft along the rail, and start the mission meanwhile."""
         self._hold_during(self._preflight.prepare(self._mission))
         self._push(end_fraction=_MODE_START_FRACTION)
         # PX4 confirms the mode while the aircraft moves on.
@@ -110,12 +111,14 @@ class Px4Flight(SitlFlight):
         self._push(start_fraction=_MODE_START_FRACTION)
 
     def _poll_link(self) -> None:
+        """Read the messages of PX4, and send the messages that PX4 expects."""
         super()._poll_link()
         self._preflight.send_periodic_messages()
         next(self._mode_start, None)
 
 
 def _has_started(process: AutopilotProcess) -> bool:
+    """Return True if the output of PX4 shows that its start-up script has ended."""
     return any(STARTED in line for line in process.lines())
 
 

@@ -358,6 +358,7 @@ class HilLockstep(Lockstep):
                 self.hold(rail)
 
     def _receive_commands(self) -> Commands:
+        """Return the commands in the last outputs of PX4."""
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
             servos.elevator.value_at_fraction(outputs[ELEVATOR]),
@@ -367,6 +368,7 @@ class HilLockstep(Lockstep):
         )
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
+        """Send sensor messages for the motion of the aircraft."""
         current = BodyMotion(*motion)
         previous = self._last_motion or current._replace(time=current.time - 1.0 / FRAME_HZ)
         self._last_motion = current

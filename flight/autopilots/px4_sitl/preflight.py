@@ -34,7 +34,7 @@ class Px4Preflight(Conversation):
     """Conversation with one running PX4."""
 
     def identify(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read those of the named parameters that it has.
+        """Identify the autopilot, and read the named parameters; skip parameters that it lacks.
 
         Raises FlightError if the autopilot is not PX4.
         """
@@ -82,6 +82,7 @@ class Px4Preflight(Conversation):
         self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
     def _set_mode(self, main_mode: int, sub_mode: int) -> None:
+        """Command a mode of PX4."""
         self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main_mode, sub_mode)
 
 

@@ -47,6 +47,7 @@ def px4_launch(
         raise FlightError(f"{binary}: {allowed}", file=binary, field=STARTUP, allowed=allowed)
 
     def prepare(folder: Path) -> Launch:
+        """Write the start-up scripts into a folder, and return the command line of PX4."""
         scripts = Path(shutil.copytree(source, folder / STARTUP)) / "init.d-posix"
         lines = [
             ". ${R}etc/init.d/rc.fw_defaults",

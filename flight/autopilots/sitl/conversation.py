@@ -147,9 +147,11 @@ class Conversation:
             yield
 
     def _start_stopwatch(self) -> _Stopwatch:
+        """Return a stopwatch that starts now."""
         return _Stopwatch(self._now, self._clock)
 
     def _last_status_text(self) -> str:
+        """Return the last status text of the autopilot as the end of a message; "" if there is none."""
         return f"; its last message: {self._reported.texts[-1]}" if self._reported.texts else ""
 
     def _send_heartbeat(self) -> None:
@@ -161,10 +163,12 @@ class Conversation:
         )
 
     def _send_command(self, command: int, *params: float) -> None:
+        """Send a command with up to seven parameters; missing parameters are 0."""
         numbers = [float(value) for value in (*params, *(0.0,) * (7 - len(params)))]
         self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
 
     def _set_home(self, home: Home) -> None:
+        """Send home as a command."""
         item = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
         self._link.send(
             mavlink.MAVLink_command_int_message(

@@ -341,6 +341,7 @@ class Lockstep(ABC):
         *_, set_north, set_east, set_down, set_ground = self._access.setters
 
         def fly(count: int) -> int:
+            """Fly up to ``count`` ticks, and return the end code, or 0."""
             for _ in range(count):
                 # Read while the autopilot computes its answer, which does not depend on these values.
                 pack(readings, 0, *[getter() for getter in getters])

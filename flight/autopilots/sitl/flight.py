@@ -409,6 +409,7 @@ class SitlFlight(ProgramFlight):
         return status
 
     def _fly_ticks(self, count: int) -> int:
+        """Fly up to ``count`` ticks; errors of the program name its file."""
         with self._errors_name_program(CrashError):
             return self._loop(count)
 

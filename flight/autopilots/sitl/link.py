@@ -120,6 +120,7 @@ class AutopilotLink(ABC):
         self._transmit(data)
 
     def _on_heartbeat(self, message: Any) -> None:
+        """Store the vehicle and the autopilot that a HEARTBEAT states."""
         if message.get_srcComponent() != mavlink.MAV_COMP_ID_AUTOPILOT1:
             return
         self.reported.vehicle, self.reported.autopilot = int(message.type), int(message.autopilot)
@@ -127,33 +128,42 @@ class AutopilotLink(ABC):
         self.reported.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
     def _on_text(self, message: Any) -> None:
+        """Store a status text."""
         self.reported.texts.append(str(message.text))
 
     def _on_ekf(self, message: Any) -> None:
+        """Store the flags of the estimator."""
         self.reported.ekf = int(message.flags)
 
     def _on_mission_current(self, message: Any) -> None:
+        """Store the number of the mission item to which the autopilot flies."""
         self.reported.mission_item = int(message.seq)
 
     def _on_mission_item_reached(self, message: Any) -> None:
+        """Store the number of the mission item that was reached."""
         self.reported.reached = int(message.seq)
 
     def _on_parameter(self, message: Any) -> None:
+        """Store the value of a parameter."""
         value, integer_format = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
         if integer_format is not None and self.reported.autopilot == mavlink.MAV_AUTOPILOT_PX4:
             (value,) = struct.unpack(integer_format, struct.pack("<f", value))
         self.reported.parameters[str(message.param_id)] = float(value)
 
     def _on_command_ack(self, message: Any) -> None:
+        """Store the result of a command."""
         self.reported.acknowledged[int(message.command)] = int(message.result)
 
     def _on_mission_request(self, message: Any) -> None:
+        """Store the number of the item that the autopilot requests in an upload."""
         self.reported.requested = int(message.seq)
 
     def _on_mission_ack(self, message: Any) -> None:
+        """Store the result of an upload."""
         self.reported.mission_result = int(message.type)
 
     def _on_version(self, message: Any) -> None:
+        """Store the version of the autopilot."""
         self.reported.version = int(message.flight_sw_version)
 
 
@@ -177,6 +187,7 @@ class TcpLink(AutopilotLink):
             self._stream = None
 
     def _receive(self) -> bytes:
+        """Return the bytes that have arrived on the TCP connection; accept the connection first."""
         if self._stream is None:
             try:
                 self._stream, _ = self._listener.accept()
@@ -191,6 +202,7 @@ class TcpLink(AutopilotLink):
             return b""
 
     def _transmit(self, data: bytes) -> None:
+        """Send bytes on the TCP connection; they are lost without a connection."""
         if self._stream is None:
             return
         try:
@@ -218,6 +230,7 @@ class UdpLink(AutopilotLink):
         self._socket.close()
 
     def _receive(self) -> bytes:
+        """Return the datagram that has arrived from the program; b"" if none has arrived."""
         try:
             data, sender = self._socket.recvfrom(_MAX_RECEIVE_BYTES)
         except (BlockingIOError, ConnectionRefusedError):
@@ -226,6 +239,7 @@ class UdpLink(AutopilotLink):
         return data if sender == (LOOPBACK, self.program_port) else b""
 
     def _transmit(self, data: bytes) -> None:
+        """Send a datagram to the program; it is lost if the program does not listen."""
         try:
             self._socket.sendto(data, (LOOPBACK, self.program_port))
         except OSError:

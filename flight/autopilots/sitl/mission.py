@@ -49,7 +49,7 @@ class UploadedMission:
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """Return the mission to upload for a setup; altitudes are AMSL, except those of rally points.
+    """Return the mission to upload for a setup; altitudes are AMSL, except at rally points.
 
     A mission that begins and ends on the ground is uploaded unchanged.
     """
@@ -139,6 +139,7 @@ def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
 
 
 def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> MissionItem:
+    """Return a plain waypoint with a number at a point of the route."""
     lat, lon = to_geo(origin, point[0], point[1])
     position = (round_to_grid(float(lat)), round_to_grid(float(lon)), float(point[2]))
     return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *position)

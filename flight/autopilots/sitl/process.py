@@ -190,6 +190,7 @@ class AutopilotProcess:
         return self._signal(0)
 
     def _kill(self) -> None:
+        """Kill the program if it is alive, and wait for its end."""
         if self._is_alive():
             self._signal(signal.SIGKILL)
         self._process.wait()
@@ -203,6 +204,7 @@ class AutopilotProcess:
         return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
 
     def _panic_text(self) -> str:
+        """Return the text with which the program panicked; "" if it has not panicked."""
         return next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
 
 

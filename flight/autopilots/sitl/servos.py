@@ -153,4 +153,5 @@ def _parse_output(name: str, entry: Any) -> ServoOutput:
 
 
 def _is_number(value: object) -> bool:
+    """Return True for a finite number that is not a bool."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
