@@ -25,10 +25,9 @@ from flight.simulation.track import Track
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, judging_conditions
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
-from logs.verdict.judge_geometry import track_findings
 from logs.verdict.places import FLIGHT, LevelAnswer, Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rules.registry import RULES, track_findings
 from logs.verdict.summary import headline, undecided_text
 from logs.verdict.tolerances import MAX_UNSEEN_TIME_S
 from logs.verdict.verdict import Verdict
