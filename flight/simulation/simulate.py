@@ -18,10 +18,9 @@ from flight.dynamics.trim import steady_flight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
 from flight.mission.ground_ways import GroundPhases
-from flight.simulation.airborne import Airborne
+from flight.simulation.airborne import Airborne, Start, default_gear, find_release, release
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
-from flight.simulation.start import Start, default_gear, find_release, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
