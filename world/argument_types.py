@@ -19,7 +19,7 @@ _Result = TypeVar("_Result")
 def checks_types(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """Decorate a function of the API without options: it raises the ArgumentError of `check_types`.
 
-    `takes_options` of planfly does the same for a function with options.
+    `planfly.runtime.first_start.api_function` does the same for a function with options.
 
     >>> @checks_types
     ... def read(log: str | Path) -> None: ...

@@ -48,8 +48,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, place_text
-from planfly.flight_options import MissionOptions, load_scenario_with_options
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import MissionOptions, load_scenario_with_options, read_named_fences
 from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
 from planfly.workflow.open_flight import make_setup, open_flight
 from planfly.workflow.reference_flights import judge_with_reference_flights
