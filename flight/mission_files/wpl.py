@@ -111,7 +111,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
     if not items:
         raise MissionError(f"{source}: no items after the header", file=source)
     has_current = any(int(line.split()[_COLUMNS.index("current")]) for _, line in lines[1:])
-    warnings = _collect_warnings(locations, items, *_split_home(items), has_current=has_current)
+    warnings = _collect_warnings(locations, items, has_current=has_current)
     home, body = _split_home(_renumbered_items(items))
     fences = number_items([item for item in body if item.command in FENCES])
     fence_shapes(fences, source)
@@ -204,20 +204,13 @@ def _split_home(items: list[MissionItem]) -> tuple[Home | None, list[MissionItem
     return Home(home_item.lat_deg, home_item.lon_deg, home_item.alt), items[1:]
 
 
-def _collect_warnings(
-    locations: list[TextLine],
-    items: list[MissionItem],
-    home: Home | None,
-    body: list[MissionItem],
-    *,
-    has_current: bool,
-) -> list[str]:
+def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, has_current: bool) -> list[str]:
     """Return warnings about home, numbers and positions of a file's items.
 
     locations: line of each item.
-    body: items without home.
     has_current: True if a line is marked as current.
     """
+    home, body = _split_home(items)
     warnings: list[str] = []
     if all(item.command in _COMMANDS_WITH_OWN_FILES for item in body):
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.

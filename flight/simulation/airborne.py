@@ -5,8 +5,7 @@ In a `flight.simulation.simulate.Flight` a simulated autopilot controls the airc
 """
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -67,7 +66,7 @@ class Start:
     ground: float
 
 
-class Airborne(ABC):
+class Airborne:
     """One flight in progress, advanced by `fly_block`.
 
     dt: duration of a tick, s.
@@ -79,9 +78,12 @@ class Airborne(ABC):
     max_ticks: time limit, ticks.
     engine: flight model in use, and the reason for it, as in "JSBSim, as chosen".
     _law: control law of a simulated autopilot; None for an external program that starts in the air.
+    _fly_ticks: flies up to a number of ticks, fills the workspace's rows, and returns the end code; 0 if the flight
+        continues.
     """
 
     _law: ControlLaw | None = None
+    _fly_ticks: Callable[[int], int]
     engine: str = "JSBSim, for a flight by a program"
 
     def __init__(
@@ -164,10 +166,6 @@ class Airborne(ABC):
         """Position of the aircraft at the start of the last tick, (3,) east, north and up, m."""
         true = self._work.true
         return np.array([true.east, true.north, true.up])
-
-    @abstractmethod
-    def _fly_ticks(self, count: int) -> int:
-        """Fly up to ``count`` ticks, fill the workspace's rows, and return the end code; 0 if the flight continues."""
 
     def _start_disturbances(self, setup: FlightSetup) -> None:
         """Set the mean wind, and initialise turbulence and navigation error from their random streams."""

@@ -154,8 +154,8 @@ def fly(
     ('completed', True, 4.0)
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
-    check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
-    check_arguments(engine=options["engine"])
+    stated = {name: options[name] for name in ("seed", "log_hz", "max_hours", "max_log", "engine")}
+    check_arguments(**stated)
     program = named_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)

@@ -21,6 +21,7 @@ from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from planfly.flight_options import (
     MissionOptions,
+    NamedFences,
     apply_options,
     load_scenario_with_options,
     read_named_fences,
@@ -58,13 +59,10 @@ def open_flight(
     >>> setup.name, setup.mission.source, setup.scenario.wind.speed
     ('paper-07', 'plan.json', 4.0)
     """
+    fences, named_world = read_named_fences(options.get("fence") or ()), options.get("scenario")
+    terrain = None if options.get("terrain") is None else str(options.get("terrain"))
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
-        return _open_plan(source, options, program, engine)
-    fences, named_world, terrain = (
-        read_named_fences(options.get("fence") or ()),
-        options.get("scenario"),
-        _terrain_option(options),
-    )
+        return _open_plan(source, options, program, engine, fences, terrain)
     mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
         scenario = load_scenario_with_options(named_world, options, program, mission)
@@ -95,14 +93,18 @@ def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
 
 
 def _open_plan(
-    source: Plan | str | Path, options: MissionOptions, program: Path | None, engine: EngineChoice
+    source: Plan | str | Path,
+    options: MissionOptions,
+    program: Path | None,
+    engine: EngineChoice,
+    fences: NamedFences,
+    terrain: str | None,
 ) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of its mission in a named scenario."""
-    fences, named_world, terrain = (
-        read_named_fences(options.get("fence") or ()),
-        options.get("scenario"),
-        _terrain_option(options),
-    )
+    """Make the setup of a plan in its own scenario, or of its mission in a named scenario.
+
+    terrain: elevation file that replaces the terrain of the plan; None keeps the terrain.
+    """
+    named_world = options.get("scenario")
     if not isinstance(source, Plan):
         plan, file = read_plan(check_mission_exists(Path(source)), terrain=terrain), str(source)
     else:
@@ -119,12 +121,6 @@ def _open_plan(
     # another scenario.
     scenario = fences.add_to_scenario(load_scenario_with_options(named_world, options, program))
     return make_setup(scenario, load_airframe(scenario), mission, chosen_seed, engine=engine)
-
-
-def _terrain_option(options: MissionOptions) -> str | None:
-    """Return the option `terrain` as text, or None if it is not given."""
-    terrain = options.get("terrain")
-    return None if terrain is None else str(terrain)
 
 
 def check_mission_exists(path: Path) -> Path:

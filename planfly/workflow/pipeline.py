@@ -26,7 +26,7 @@ from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
-from planfly.workflow.reference_flights import FlyReference, judge_with_reference_flights
+from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
 from planner.plan import Plan
 from world.errors import FlightError, StartError
@@ -176,8 +176,7 @@ def fly_and_judge(
     autopilot: the program of ArduPlane or PX4 that flies instead of planfly's simulated autopilot; its own log is kept
     next to the flight log.
     off_nominal: differences between the flight and the assumptions of plan and guidance; ignored if a program flies.
-    reference: cases in which reference flights are flown, see
-    `planfly.workflow.reference_flights.judge_with_reference_flights`.
+    reference: cases in which reference flights are flown, see `planfly.workflow.reference_flights.explain_verdict`.
     returns: True judges returns from a few points, and draws them in the log.  Without a log no returns are judged.
     findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
     limits: limits of the flight time and of the size of the log.
@@ -247,10 +246,7 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
 
 
 def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: Airborne) -> FlownMission:
-    """Fly to the end, record the flight if a log is named, and judge the recorded rows.
-
-    Reference flights are flown unless only findings are requested.
-    """
+    """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     with ExitStack() as open_logs:
         recorder = None
@@ -260,11 +256,13 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
         if recorder is not None:
             recorder.end_reason, track = end_reason, thin_track(track, task.every)
         reference_flights, summary = None, None
-        if task.findings_only:
-            verdict = judge_flight(requirements.setup, track, end_reason, requirements=requirements, findings_only=True)
-        else:
-            verdict, reference_flights = judge_with_reference_flights(
-                requirements, task.aircraft, track, end_reason, fly=task.reference
+        verdict = judge_flight(
+            requirements.setup, track, end_reason, requirements=requirements, findings_only=task.findings_only
+        )
+        is_requested = task.reference == "always"
+        if is_requested or (task.reference == "failed" and verdict.failed):
+            verdict, reference_flights = explain_verdict(
+                requirements, task.aircraft, verdict, is_requested=is_requested
             )
         end_time = float(track.time[-1]) if len(track) else 0.0
         events = (

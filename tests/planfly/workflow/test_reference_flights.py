@@ -19,19 +19,20 @@ from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import PITCH_LIMIT_TIME, Fact, Finding, make_finding
+from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Place, ReferenceFlights
-from logs.verdict.verdict import verdict_json
+from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
 from planfly.live.served_flights import ServedLog
 from planfly.workflow import reference_flights, suggestion_trials
 from planfly.workflow.pipeline import FlownMission, fly_and_judge
 from planfly.workflow.reference_flights import (
+    explain_verdict,
     find_deciding_parameter,
     find_passing_parameter,
     judge_airframe_flight,
-    judge_with_reference_flights,
     passes_with_margin,
 )
 from tests.setups import setup_maker
@@ -305,6 +306,10 @@ def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
     assert log.reference == ReferenceFlights(airframe, tried=())
 
 
+def unexplained(flown: FlownMission) -> Verdict:
+    return judge_flight(flown.setup, flown.track, flown.ended)
+
+
 @pytest.mark.parametrize(("affordable", "has_airframe", "has_deciding"), [(1, False, False), (2, True, False)])
 def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
     affordable: int,
@@ -316,9 +321,7 @@ def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
     judged, _ = flown
     for module in (reference_flights, suggestion_trials):
         monkeypatch.setattr(module, "max_explaining_flights", lambda _: affordable)
-    verdict, reference = judge_with_reference_flights(
-        route_requirements(judged.setup), AIRCRAFT, judged.track, judged.ended
-    )
+    verdict, reference = explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
     assert not verdict.flyable
     assert reference is not None
     assert (reference.airframe is not None, reference.deciding is not None) == (has_airframe, has_deciding)
@@ -331,7 +334,7 @@ def test_a_failed_flight_with_too_many_legs_has_no_reference_flight(
     """At the greatest number of legs there is one, and none with a leg more: each judges all legs."""
     judged, _ = flown
     monkeypatch.setattr(reference_flights, "MAX_TRIED_LEGS", route_requirements(judged.setup).legs + legs)
-    _, reference = judge_with_reference_flights(route_requirements(judged.setup), AIRCRAFT, judged.track, judged.ended)
+    _, reference = explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
     assert reference is not None
     assert (reference.airframe is not None) is has_airframe
 
@@ -362,11 +365,9 @@ def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
 
 def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[FlownMission, Path]) -> None:
     judged, _ = flown
-    alone, none = judge_with_reference_flights(
-        route_requirements(judged.setup), AIRCRAFT, judged.track, judged.ended, fly="never"
-    )
-    assert none is None
-    assert [(one.place, one.margin) for one in alone.failed] == [
+    alone = fly_and_judge(judged.setup, reference="never")
+    assert alone.reference is None
+    assert [(one.place, one.margin) for one in alone.verdict.failed] == [
         (one.place, one.margin) for one in judged.verdict.failed
     ]
 
