@@ -77,7 +77,6 @@ if TYPE_CHECKING:
     from planfly.api.exporting import ExportedFiles as ExportedFiles
     from planfly.api.exporting import export as export
     from planfly.api.finding_windows import window as window
-    from planfly.api.flying import FlownMission as FlownMission
     from planfly.api.flying import Judged as Judged
     from planfly.api.flying import check as check
     from planfly.api.flying import fly as fly
@@ -137,6 +136,7 @@ if TYPE_CHECKING:
     from planfly.runtime.stages import progress as progress
     from planfly.studio.open_studio import open_studio as open_studio
     from planfly.workflow.imported_flights import ImportedFlight as ImportedFlight
+    from planfly.workflow.pipeline import FlownMission as FlownMission
     from planfly.workflow.pipeline import PlanThenFly as PlanThenFly
     from planner.plan import Plan as Plan
     from planner.search.plan_front import Front as Front
@@ -194,7 +194,6 @@ _HOMES = {
         ),
         "planfly.api.finding_windows": ("window",),
         "planfly.api.flying": (
-            "FlownMission",
             "Judged",
             "check",
             "fly",
@@ -274,7 +273,10 @@ _HOMES = {
             "PaperTables",
             "paper_tables",
         ),
-        "planfly.workflow.pipeline": ("PlanThenFly",),
+        "planfly.workflow.pipeline": (
+            "FlownMission",
+            "PlanThenFly",
+        ),
         "planfly.runtime.stages": ("progress",),
         "planner.plan": ("Plan",),
         "planner.search.plan_front": (

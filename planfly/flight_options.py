@@ -1,20 +1,23 @@
 """Define the options of a flight, which have the same names in keywords, the command line and a scenario."""
 
-import functools
-import inspect
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_args, get_type_hints
+from typing import Annotated, Literal, TypedDict, cast, get_type_hints
 
 from aircraft.catalog import find_aircraft, model_hash
 from flight.autopilots.catalog import program_class_for
+from flight.autopilots.parameter_origin import ARDUPILOT, PX4, TITLES, other_autopilot_error, read_origin
+from flight.mission.fences import fence_zones, number_items
+from flight.mission.items import Mission, MissionItem
+from flight.mission_files.formats import read_fence
 from flight.simulation.setup import EngineChoice, VerticalDatum
 from planfly.arguments import check_arguments, is_valid_wind
-from planfly.workflow.file_autopilots import with_file_autopilot
-from world.argument_types import check_types
-from world.errors import ArgumentError, FlightError
-from world.files import absolute_path, did_you_mean
+from world.airspace.zone_files import FileZones, is_zone_file, read_zone_file
+from world.errors import ArgumentError, FlightError, MissionError, ParameterError
+from world.files import absolute_path
+from world.frames import GeoOrigin
 from world.scenario import (
     Scenario,
     load_scenario,
@@ -23,9 +26,11 @@ from world.scenario import (
     with_forecast,
     with_terrain,
     with_wind,
+    with_zones,
     without_forecast,
 )
-from world.scenario_tables import Guidance, LinkUse, Navigation
+from world.scenario_tables import OWN_GUIDANCE, Guidance, LinkUse, Navigation
+from world.wording import count_text
 
 # Wind speed, m/s, and the direction from which the wind blows, degrees.
 Wind = tuple[float, float]
@@ -243,53 +248,6 @@ class RunOptions(FlightOptions, SimulationOptions, total=False):
     """Options of `planfly.run`."""
 
 
-# ----------------------------------------------------------------------
-# Functions that take options as keywords.
-
-_Taken = ParamSpec("_Taken")
-_Given = TypeVar("_Given")
-
-
-def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Decorate a function to take the options of its ``Unpack[...]`` parameter as keywords.
-
-    The options are listed in its signature, with their defaults.
-
-    Raises the ArgumentError of `world.argument_types.check_types`.
-
-    >>> from typing import Unpack
-    >>> @takes_options
-    ... def fly(mission: str, **options: Unpack[MissionOptions]) -> object:
-    ...     return options["fence"], options["wind"]
-    >>> fly("a.waypoints", wind=(8, 270))
-    ((), (8, 270))
-    >>> fly("a.waypoints", winds=(8, 270))
-    Traceback (most recent call last):
-    TypeError: fly() got an unexpected keyword argument 'winds': did you mean 'wind'?
-    """
-    *parameters, options_parameter = inspect.signature(function).parameters.values()
-    (options,) = get_args(options_parameter.annotation)
-    defaults, annotations = option_defaults(options), get_type_hints(options)
-    option_parameters = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotations[name])
-        for name, default in defaults.items()
-    ]
-    signature = inspect.signature(function).replace(parameters=[*parameters, *option_parameters])
-
-    @functools.wraps(function)
-    def with_defaults(*args: _Taken.args, **keywords: _Taken.kwargs) -> _Given:
-        """Check the arguments, add the defaults of missing options, and call the function."""
-        for name in keywords:
-            if name not in signature.parameters:
-                hint = did_you_mean(name, signature.parameters)
-                raise TypeError(f"{function.__name__}() got an unexpected keyword argument {name!r}{hint}")
-        checked_args, checked_keywords = check_types(signature, args, keywords)
-        return function(*checked_args, **{**defaults, **checked_keywords})
-
-    with_defaults.__signature__ = signature  # type: ignore[attr-defined]
-    return with_defaults
-
-
 def option_defaults(options: type) -> dict[str, object]:
     """Return the default of each option of a group.
 
@@ -324,16 +282,84 @@ def fence_file_names(options: MissionOptions) -> list[str]:
 
 
 # ----------------------------------------------------------------------
+# Files of fences, zones and rally points, which the option `fence` names.
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFences:
+    """Content of the named files of fences, zones and rally points.
+
+    items: fence items.
+    rally: rally points.
+    zones: zones of each file, with the file's name.
+    """
+
+    items: tuple[MissionItem, ...] = ()
+    zones: tuple[tuple[str, FileZones], ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+
+    def add_to_mission(self, mission: Mission) -> Mission:
+        """Add fence and rally points to a mission; warnings state that those of the mission still apply."""
+        if not self.items and not self.rally:
+            return mission
+        warnings = mission.warnings
+        if mission.fences and self.items:
+            own_fence = f"the mission's own fence of {count_text(len(mission.fences), 'item')}"
+            warnings = (*warnings, f"{own_fence} applies in addition to the named fence")
+        if mission.rally and self.rally:
+            own_count = count_text(len(mission.rally), "rally point")
+            warnings = (*warnings, f"the mission's own {own_count} may be used in addition to the named ones")
+        fences = number_items([*mission.fences, *self.items])
+        rally = number_items([*mission.rally, *self.rally])
+        return replace(mission, fences=fences, rally=rally, warnings=warnings)
+
+    def add_to_scenario(self, scenario: Scenario) -> Scenario:
+        """Return the scenario with the zones of all files added.  Raises ScenarioError for an invalid zone."""
+        for source, file_zones in self.zones:
+            scenario = with_zones(scenario, file_zones.zones, source, file_zones.notes)
+        return scenario
+
+
+def read_named_fences(files: FencePaths) -> NamedFences:
+    """Read one or more files of fences, zones or rally points; the suffix of each file determines its format.
+
+    Raises MissionError or ScenarioError for a file that cannot be read, for a file without a fence or a rally point,
+    and for invalid shapes.
+
+    >>> read_named_fences([])
+    NamedFences(items=(), zones=(), rally=())
+    """
+    all_items: list[MissionItem] = []
+    rally: list[MissionItem] = []
+    zones = []
+    for file in [files] if isinstance(files, str | Path) else files:
+        path = Path(file)
+        if is_zone_file(path):
+            zones.append((str(file), read_zone_file(path, str(file))))
+            continue
+        contents = read_fence(path)
+        rally += contents.rally
+        # Check the shapes here, because the file they are from is known only here.
+        for first in contents.fences[:1]:
+            fence_zones(contents.fences, GeoOrigin(first.lat_deg, first.lon_deg), str(file))
+        all_items += contents.fences
+    return NamedFences(tuple(all_items), tuple(zones), tuple(rally))
+
+
+# ----------------------------------------------------------------------
 # Scenarios changed by options.
 
 
 def load_scenario_with_options(
-    scenario: Scenario | str | Path, options: FlightOptions, program: Path | None = None
+    scenario: Scenario | str | Path,
+    options: FlightOptions,
+    program: Path | None = None,
+    mission: Mission | None = None,
 ) -> Scenario:
     """Return a scenario, given as an object, a name or a TOML file, with options applied.
 
-    program: the autopilot program that flies, or None for a simulated autopilot.
-    Raises ScenarioError, TerrainError or ParameterError.
+    program, mission: see `apply_options`.
+    Raises ScenarioError, TerrainError, ParameterError or MissionError.
     """
     terrain = options.get("terrain")
     terrain_path = None if terrain is None else str(terrain)
@@ -341,14 +367,17 @@ def load_scenario_with_options(
         scenario = load_scenario(str(scenario), terrain_path)
     elif terrain_path is not None:
         scenario = with_terrain(scenario, terrain_path)
-    return apply_options(scenario, options, program)
+    return apply_options(scenario, options, program, mission)
 
 
-def apply_options(scenario: Scenario, options: FlightOptions, program: Path | None = None) -> Scenario:
+def apply_options(
+    scenario: Scenario, options: FlightOptions, program: Path | None = None, mission: Mission | None = None
+) -> Scenario:
     """Return a scenario with options of weather, time and flight applied; the terrain is not changed.
 
     program: the autopilot program that flies, or None for a simulated autopilot.
-    If no autopilot is named, the parameter file determines it.
+    mission: the mission that is flown, or None.
+    If no autopilot is named, the parameter file and the mission determine it, see `with_file_autopilot`.
     Raises ScenarioError for values that a scenario file must not have, ArgumentError for an aircraft that is unknown
     and an airspeed at which it does not fly, ParameterError for the file of another autopilot, and ForecastError for a
     forecast that cannot be used or that does not cover the flight.
@@ -373,7 +402,7 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
     new_scenario = with_flight(with_flight_time(scenario, options.get("at")), **flight_entries(options, program))
     if forecast is not None:
         new_scenario = with_forecast(new_scenario, str(forecast))
-    new_scenario = with_wind(with_file_autopilot(new_scenario), speed, from_course, options.get("turbulence"))
+    new_scenario = with_wind(with_file_autopilot(new_scenario, mission), speed, from_course, options.get("turbulence"))
     table = new_scenario.spec.wind
     if table.forecast is not None and new_scenario.spec.at is None:
         raise ArgumentError.of_argument(
@@ -455,3 +484,79 @@ def _wind_numbers(wind: Wind) -> Wind:
             "expected a speed, m/s, and the direction that the wind blows from, degrees from north, such as (8, 270)"
         )
         raise ArgumentError.of_argument("wind", wind, allowed, shown=repr(wind)) from None
+
+
+# ----------------------------------------------------------------------
+# The autopilot that a flight's files were written for.
+
+
+def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> Scenario:
+    """Return the scenario with the autopilot for which its parameter file or its mission was written.
+
+    An autopilot named by the user is kept, and so is planfly's own guidance.  If no file names an autopilot, the
+    scenario is not changed.  Raises ParameterError or MissionError if a file was not written for the named autopilot,
+    if two files were written for different autopilots, and if a parameter file has parameters of both autopilots.
+
+    >>> from world.scenario import load_scenario
+    >>> made = with_file_autopilot(load_scenario("paper-07"), Mission(None, (), autopilot="px4", source="field.plan"))
+    >>> made.flight.autopilot, made.flight.autopilot_from
+    ('px4', 'field.plan')
+    """
+    table = scenario.flight
+    steering = table.steering.autopilot
+    if steering == OWN_GUIDANCE:
+        return scenario
+    mission_autopilot = "" if mission is None else mission.autopilot
+    is_named_by_user = table.autopilot is not None and table.autopilot_from is None
+    if not is_named_by_user and table.params is not None and table.autopilot is None:
+        scenario = _with_autopilot_from_parameters(scenario, table.params)
+        table = scenario.flight
+    if mission is None or not mission_autopilot:
+        return scenario
+    if table.autopilot is None:
+        return _with_autopilot(scenario, mission_autopilot, mission.source)
+    if mission_autopilot != table.autopilot and table.autopilot in TITLES:
+        if table.autopilot_from is None:
+            raise MissionError.from_error(
+                other_autopilot_error(
+                    mission.source, mission_autopilot, _FIRMWARE_TEXTS[mission_autopilot], table.autopilot
+                )
+            )
+        other_file = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
+        allowed = "expected files of one autopilot"
+        message = (
+            f"{mission.source}: written for {TITLES[mission_autopilot]} ({_FIRMWARE_TEXTS[mission_autopilot]}),"
+            f" but {other_file}; {allowed}"
+        )
+        raise MissionError(message, file=mission.source, field="autopilot", value=mission_autopilot, allowed=allowed)
+    return scenario
+
+
+# Text by which a .plan file states its autopilot.
+_FIRMWARE_TEXTS = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
+
+
+def _with_autopilot_from_parameters(scenario: Scenario, params_path: str) -> Scenario:
+    """Return the scenario with the autopilot of its parameter file.
+
+    The scenario is unchanged if the file does not identify an autopilot.
+
+    Raises ParameterError for a file with parameters of both autopilots.
+    """
+    origin = read_origin(Path(params_path))
+    if origin.mixed:
+        remedy = "--autopilot names the autopilot that is to fly"
+        message = f"{params_path}: {origin.evidence}: {remedy}"
+        raise ParameterError(message, file=params_path, field="autopilot", value=origin.evidence, allowed=remedy)
+    return _with_autopilot(scenario, origin.autopilot, params_path) if origin.autopilot else scenario
+
+
+def _with_autopilot(scenario: Scenario, autopilot: str, file: str) -> Scenario:
+    """Return the scenario with `autopilot`, and record `file` as the file that names this autopilot.
+
+    The autopilot is set even if it is the default autopilot.
+    """
+    params = scenario.flight.params
+    new_scenario = with_flight(scenario, autopilot=autopilot, params=params)
+    table = new_scenario.flight.model_copy(update={"autopilot_from": file})
+    return replace(new_scenario, spec=new_scenario.spec.model_copy(update={"flight": table}), flight=table)

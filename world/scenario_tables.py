@@ -464,7 +464,7 @@ class FlightTable(ScenarioTable):
     """[flight].  None means not stated; `steering` gives the default.
 
     autopilot: name of the autopilot; if it is not stated, guidance implies "planfly", and params "ardupilot".
-    autopilot_from: file that the autopilot was inferred from, see `planfly.workflow.file_autopilots`.
+    autopilot_from: file that the autopilot was inferred from, see `planfly.flight_options.with_file_autopilot`.
     params: file with the autopilot's parameters.
     arduplane_version: release of autopilot = "ardupilot", as releases fly differently; None for the release of the
         parameter file, or otherwise for the newest.

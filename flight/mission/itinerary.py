@@ -205,7 +205,8 @@ class RoutePoint:
     home_up: altitude of home on that leg, m AMSL; NaN if the mission's home does not state it.
     stop: number of the stop in flying order; all points of a loiter have the same.
     position: east, north, up, m AMSL, or None.
-    arc_radius: radius of the turn there, m, 0 for the radius at the bank limit.
+    arc_radius: radius of the turn there, m, 0 for the radius at the bank limit; while a loiter is laid out, the radius
+        of its circle about the position, negative to the left.
     """
 
     item: int
@@ -235,6 +236,25 @@ class RoutePoint:
         if self.position is None:
             raise ValueError(f"item {self.item} is not placed on the map")
         return self.position
+
+    @property
+    def east(self) -> float:
+        """East of the origin of the map, m."""
+        return self.map_position[0]
+
+    @property
+    def north(self) -> float:
+        """North of the origin of the map, m."""
+        return self.map_position[1]
+
+    @property
+    def up(self) -> float:
+        """Altitude, m AMSL."""
+        return self.map_position[2]
+
+    def distance_to(self, other: "RoutePoint") -> float:
+        """Return the distance on the map to another point, m."""
+        return math.hypot(other.east - self.east, other.north - self.north)
 
 
 @dataclass(frozen=True, slots=True)

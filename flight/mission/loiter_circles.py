@@ -122,24 +122,6 @@ class UnjoinedStop(NamedTuple):
     is_circle: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
-    """A stop as a point, or as a circle about that point; east, north, up in m.
-
-    signed_radius: radius of the circle, m, positive to the right, 0 for a point.
-    """
-
-    stop: RoutePoint
-    east: float
-    north: float
-    up: float
-    signed_radius: float = 0.0
-
-    def distance_to(self, other: "Node") -> float:
-        """Return the distance between the centers, m."""
-        return math.hypot(other.east - self.east, other.north - self.north)
-
-
 def lay_out_waypoints(
     source: str,
     stops: list[RoutePoint],
@@ -164,27 +146,23 @@ def lay_out_waypoints(
     nodes = _make_nodes(source, stops, notes, default_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
-    up = stops[0].map_position[2]
+    up = stops[0].up
     for index, node in enumerate(nodes):
-        if node.signed_radius == 0.0:
+        if node.arc_radius == 0.0:
             up = node.up
-            points.append(node.stop.at((node.east, node.north, up)))
+            points.append(node)
             continue
         entry_course = courses[index - 1] if index else (courses[index] if index < len(courses) else 0.0)
         exit_course = courses[index] if index < len(courses) else None
-        leg_length = (
-            math.hypot(node.east - points[-1].map_position[0], node.north - points[-1].map_position[1])
-            if points
-            else 0.0
-        )
-        min_radius = default_radius(node.stop.airspeed, node.up) if rules.exits_on_heading else 0.0
+        leg_length = points[-1].distance_to(node) if points else 0.0
+        min_radius = default_radius(node.airspeed, node.up) if rules.exits_on_heading else 0.0
         corners = _corners_around(source, node, entry_course, exit_course, up, leg_length, min_radius, slopes, rules)
         if not index:
-            corners.insert(0, node.stop.at((*point_on_circle(node, entry_course), corners[0].map_position[2])))
-        up = corners[-1].map_position[2]
+            corners.insert(0, node.at((*point_on_circle(node, entry_course), corners[0].up)))
+        up = corners[-1].up
         points += corners
         if len(points) > MAX_STOPS:
-            item = f"item {node.stop.item}"
+            item = f"item {node.item}"
             message = f"{source}: {item}: with its circles laid out the route has more than {MAX_STOPS:,} waypoints"
             raise MissionError(message, file=source, field=item)
     return points, tuple(unjoined)
@@ -197,54 +175,54 @@ def _make_nodes(
     default_radius: DefaultRadius,
     rules: LoiterRules,
     unjoined: list[UnjoinedStop],
-) -> list[Node]:
+) -> list[RoutePoint]:
     """Return the points and loiter circles of a route in flying order, each joined to the next by a tangent.
 
     Stops that no tangent reaches are appended to ``unjoined``.
 
     If the take-off is inside the first circle, the flight starts on that circle, without the take-off.
     """
-    nodes: list[Node] = []
+    nodes: list[RoutePoint] = []
     for stop in stops:
-        node = Node(stop, *stop.map_position)
+        node = stop
         if stop.loiter is not None:
             node = replace(
-                node, signed_radius=_signed_radius(source, stop, stop.loiter, node.up, notes, default_radius, rules)
+                node, arc_radius=_signed_radius(source, stop, stop.loiter, node.up, notes, default_radius, rules)
             )
             while (
                 nodes
-                and nodes[-1].signed_radius == 0.0
-                and nodes[-1].distance_to(node) < abs(node.signed_radius) + _MIN_TANGENT_CLEARANCE_M
+                and nodes[-1].arc_radius == 0.0
+                and nodes[-1].distance_to(node) < abs(node.arc_radius) + _MIN_TANGENT_CLEARANCE_M
             ):
                 inner_node = nodes.pop()
-                _note_omitted_stop(inner_node.stop, node.stop, notes)
+                _note_omitted_stop(inner_node, node, notes)
                 # An autopilot that steers to the center passes a stop there, and a take-off there needs no leg.
                 is_passed_anyway = (
                     inner_node.distance_to(node) < _SAME_PLACE_M and abs(inner_node.up - node.up) <= _SAME_ALTITUDE_M
                 )
-                if inner_node.stop.item >= 0 and inner_node.stop.command not in TAKEOFFS and not is_passed_anyway:
-                    unjoined.append(UnjoinedStop(inner_node.stop.item, stop.item, is_circle=False))
+                if inner_node.item >= 0 and inner_node.command not in TAKEOFFS and not is_passed_anyway:
+                    unjoined.append(UnjoinedStop(inner_node.item, stop.item, is_circle=False))
         previous = nodes[-1] if nodes else None
-        if previous is not None and previous.signed_radius != 0.0 and not is_joined(previous, node):
-            if node.signed_radius == 0.0:
-                _note_omitted_stop(stop, previous.stop, notes)
-                unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=False))
+        if previous is not None and previous.arc_radius != 0.0 and not is_joined(previous, node):
+            if node.arc_radius == 0.0:
+                _note_omitted_stop(stop, previous, notes)
+                unjoined.append(UnjoinedStop(stop.item, previous.item, is_circle=False))
                 continue
             # Two loiters with the same stated radius and center may differ by the radius scale at their altitudes.
-            previous_stated_radius = abs(previous.signed_radius) / rules.radius_scale(previous.up)
-            stated_radius = abs(node.signed_radius) / rules.radius_scale(node.up)
-            is_same_direction = math.copysign(1.0, previous.signed_radius) == math.copysign(1.0, node.signed_radius)
+            previous_stated_radius = abs(previous.arc_radius) / rules.radius_scale(previous.up)
+            stated_radius = abs(node.arc_radius) / rules.radius_scale(node.up)
+            is_same_direction = math.copysign(1.0, previous.arc_radius) == math.copysign(1.0, node.arc_radius)
             if (
                 previous.distance_to(node) >= _SAME_PLACE_M
                 or abs(previous_stated_radius - stated_radius) >= _SAME_PLACE_M
                 or not is_same_direction
             ):
-                unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=True))
+                unjoined.append(UnjoinedStop(stop.item, previous.item, is_circle=True))
             notes.add(
-                f"no tangent joins its circle to the circle of item {previous.stop.item}: flown on that circle",
+                f"no tangent joins its circle to the circle of item {previous.item}: flown on that circle",
                 stop.item,
             )
-            node = replace(node, east=previous.east, north=previous.north, signed_radius=previous.signed_radius)
+            node = node.at((previous.east, previous.north, node.up), previous.arc_radius)
         nodes.append(node)
     return nodes
 
@@ -297,15 +275,15 @@ def _signed_radius(
     return math.copysign(radius * radius_scale, loiter.radius)
 
 
-def is_joined(a: Node, b: Node) -> bool:
+def is_joined(a: RoutePoint, b: RoutePoint) -> bool:
     """Return True if a tangent joins two circles or points, or if both are the same circle."""
     distance = a.distance_to(b)
-    return distance > abs(b.signed_radius - a.signed_radius) + _MIN_TANGENT_CLEARANCE_M or (
-        distance < 1.0 and abs(a.signed_radius - b.signed_radius) < 1.0
+    return distance > abs(b.arc_radius - a.arc_radius) + _MIN_TANGENT_CLEARANCE_M or (
+        distance < 1.0 and abs(a.arc_radius - b.arc_radius) < 1.0
     )
 
 
-def tangent_course(a: Node, b: Node) -> float:
+def tangent_course(a: RoutePoint, b: RoutePoint) -> float:
     """Return the course of the tangent from a circle or point to the next, rad.
 
     The result is 0 if both are the same circle.
@@ -315,32 +293,32 @@ def tangent_course(a: Node, b: Node) -> float:
         return 0.0
     bearing = math.atan2(b.east - a.east, b.north - a.north)
     # Across the tangent, the centers are b.turn - a.turn apart.
-    return bearing - math.asin(min(1.0, max(-1.0, (b.signed_radius - a.signed_radius) / distance)))
+    return bearing - math.asin(min(1.0, max(-1.0, (b.arc_radius - a.arc_radius) / distance)))
 
 
-def point_on_circle(node: Node, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
+def point_on_circle(node: RoutePoint, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
     """Return the point of a circle at which an aircraft has a course (rad): east and north, m.
 
     radius_ratio: distance of the point from the center, in radii; 1 for a point on the circle itself.
     """
     return (
-        node.east - node.signed_radius * radius_ratio * math.cos(course),
-        node.north + node.signed_radius * radius_ratio * math.sin(course),
+        node.east - node.arc_radius * radius_ratio * math.cos(course),
+        node.north + node.arc_radius * radius_ratio * math.sin(course),
     )
 
 
-def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[float, float]]:
+def circle_corners(node: RoutePoint, entry_course: float, sweep: float) -> list[tuple[float, float]]:
     """Return the corners (east, north, m) of the polygon around a part of a circle.
 
     entry_course: course at which the aircraft joins the circle, rad.
     sweep: angle that the aircraft flies around the circle, rad.
 
     >>> point = RoutePoint(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
-    >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
+    >>> [(round(e), round(n)) for e, n in circle_corners(point.at((100.0, 0.0, 0.0), 100.0), 0.0, math.pi / 2.0)]
     [(0, 41), (59, 100)]
     """
     count = max(1, math.ceil(sweep / MAX_CORNER_ANGLE_RAD - 1e-9))
-    step, turn_sign = sweep / count, math.copysign(1.0, node.signed_radius)
+    step, turn_sign = sweep / count, math.copysign(1.0, node.arc_radius)
     return [
         point_on_circle(node, entry_course + turn_sign * (index + 0.5) * step, 1.0 / math.cos(0.5 * step))
         for index in range(count)
@@ -349,7 +327,7 @@ def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[
 
 def _corners_around(
     source: str,
-    node: Node,
+    node: RoutePoint,
     entry_course: float,
     exit_course: float | None,
     previous_altitude: float,
@@ -370,13 +348,13 @@ def _corners_around(
     Some autopilots leave a loiter as soon as its time is over. For them the circle ends at the last exit tangent before
     that time.
     """
-    radius, turn_sign = abs(node.signed_radius), math.copysign(1.0, node.signed_radius)
+    radius, turn_sign = abs(node.arc_radius), math.copysign(1.0, node.arc_radius)
     entry_altitude, required_sweep = node.up, 0.0
-    loiter = node.stop.loiter
+    loiter = node.loiter
     if loiter is not None and loiter.to_altitude:
-        climb_slope, dive_slope = slopes(node.stop.airspeed, max(previous_altitude, node.up))
-        climb_slope = min(climb_slope, rules.max_climb_rate / node.stop.airspeed)
-        dive_slope = min(dive_slope, rules.max_sink_rate / node.stop.airspeed)
+        climb_slope, dive_slope = slopes(node.airspeed, max(previous_altitude, node.up))
+        climb_slope = min(climb_slope, rules.max_climb_rate / node.airspeed)
+        dive_slope = min(dive_slope, rules.max_sink_rate / node.airspeed)
         entry_altitude = previous_altitude
         if not rules.holds_height:
             max_descent, max_climb = dive_slope * leg_length, climb_slope * leg_length
@@ -387,7 +365,7 @@ def _corners_around(
             slope = climb_slope if node.up > entry_altitude else dive_slope
             required_sweep = altitude_change / slope / radius + MAX_CORNER_ANGLE_RAD
     elif loiter is not None:
-        required_sweep = loiter.min_sweep(node.stop.airspeed, max(radius, min_radius))
+        required_sweep = loiter.min_sweep(node.airspeed, max(radius, min_radius))
         if rules.exits_on_heading:
             required_sweep = max(0.0, required_sweep - _TURN_TO_TANGENT_RAD)
     sweep = required_sweep
@@ -402,13 +380,13 @@ def _corners_around(
         sweep = sweep_to_exit + 2.0 * math.pi * max(0, extra_turns)
     if sweep > MAX_STOPS * MAX_CORNER_ANGLE_RAD:
         turns, max_turns = (angle / (2.0 * math.pi) for angle in (sweep, MAX_STOPS * MAX_CORNER_ANGLE_RAD))
-        item, allowed = f"item {node.stop.item}", f"at most {max_turns:,.0f} are flown"
+        item, allowed = f"item {node.item}", f"at most {max_turns:,.0f} are flown"
         raise MissionError.at(source, item, turns, allowed, shown=f"{turns:,.0f} turns to loiter")
     corners = circle_corners(node, entry_course, sweep)
     points = []
     for index, (east, north) in enumerate(corners):
         fraction = 1.0 if len(corners) == 1 else index / (len(corners) - 1)
-        points.append(node.stop.at((east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius))
+        points.append(node.at((east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius))
     if exit_course is None and sweep > 0.0:
-        points.append(node.stop.at((*point_on_circle(node, entry_course + turn_sign * sweep), node.up)))
+        points.append(node.at((*point_on_circle(node, entry_course + turn_sign * sweep), node.up)))
     return points

@@ -11,13 +11,12 @@ ArduPlane/altitude.cpp), and messages use ArduPlane's parameter names.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S, Position, RoutePoint
 from flight.mission.loiter_circles import (
     MAX_CORNER_ANGLE_RAD,
-    Node,
     circle_corners,
     is_joined,
     point_on_circle,
@@ -405,8 +404,10 @@ def rtl_waypoints(
     )
     stated_radius = ability.loiter_radius_scale * abs(rules.radius)
     radius = math.copysign(max(stated_radius, ability.min_loiter_radius), rules.radius)
-    circle = Node(stop, *target.position, radius)
-    transit_circle = replace(circle, up=target.transit_altitude) if rules.holds_height else circle
+    circle = stop.at(target.position, radius)
+    transit_circle = (
+        circle.at((circle.east, circle.north, target.transit_altitude), radius) if rules.holds_height else circle
+    )
     dive = min(ability.dive_slope, rules.max_sink_rate / ability.airspeed)
     builder = _ReturnBuilder(
         transit_circle, circle.up, target.slope_base, rules.min_slope_height, ability, dive, start, next_position
@@ -425,7 +426,7 @@ class _ReturnBuilder:
 
     def __init__(
         self,
-        circle: Node,
+        circle: RoutePoint,
         end_altitude: float,
         slope_base: float,
         min_slope_height: float,
@@ -435,7 +436,7 @@ class _ReturnBuilder:
         next_position: Position | None,
     ) -> None:
         self.points: list[RoutePoint] = []
-        self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
+        self._stop, self._circle, self._slope_base = circle, circle, slope_base
         self._end_altitude = end_altitude
         self._min_slope_height = min_slope_height
         self._ability = ability
@@ -473,7 +474,7 @@ class _ReturnBuilder:
         sweep = min(full_sweep, first_climb / self._ability.climb_slope / radius)
         self._first_climb_altitude = self._position[2] + first_climb
         self._add_arc(node, course, sweep)
-        end_course = course + math.copysign(sweep, node.signed_radius)
+        end_course = course + math.copysign(sweep, node.arc_radius)
         self._add_waypoint(*point_on_circle(node, end_course), 0.0)
         if sweep == full_sweep and self._first_climb_altitude > self._circle.up:
             self._add_climb_leg(tangent)
@@ -494,13 +495,13 @@ class _ReturnBuilder:
         """Add the turn to the target, the straight leg to the target, and the loiter there."""
         bearing = _course(self._position, (self._circle.east, self._circle.north, 0.0))
         arc = self._turn_to_tangent(course, self._ability.turn_radius(course, bearing, self._position[2]))
-        point = Node(self._stop, *self._position)
+        point = self._stop.at(self._position)
         if arc is None:
             # No tangent leads from the turn to the loiter: use a sharp corner.
             leg_course = tangent_course(point, self._circle)
         else:
             node, sweep, leg_course = arc
-            if abs(node.signed_radius) * math.tan(0.5 * min(sweep, MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
+            if abs(node.arc_radius) * math.tan(0.5 * min(sweep, MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
                 self._add_arc(node, course, sweep)
                 self._add_waypoint(*point_on_circle(node, leg_course), 0.0)
             else:
@@ -532,8 +533,10 @@ class _ReturnBuilder:
         """Add the leg to a point on the circle, and the loiter until its altitude and its time are reached."""
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
-        self._circle = replace(self._circle, up=self._end_altitude)
-        radius = abs(self._circle.signed_radius)
+        self._circle = self._circle.at(
+            (self._circle.east, self._circle.north, self._end_altitude), self._circle.arc_radius
+        )
+        radius = abs(self._circle.arc_radius)
         altitude_change = self._altitude_difference
         spiral_angle = (
             abs(altitude_change) / (self._ability.climb_slope if altitude_change > 0.0 else self._dive_slope) / radius
@@ -550,7 +553,7 @@ class _ReturnBuilder:
         """Add the part of the loiter that starts at a course (rad) and covers an angle (rad)."""
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(
-            *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.signed_radius)),
+            *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.arc_radius)),
             0.0,
             on_circle=True,
         )
@@ -562,8 +565,8 @@ class _ReturnBuilder:
         """
         if spiral_angle > 0.0:
             self._add_circle(course, spiral_angle)
-            course += math.copysign(spiral_angle, self._circle.signed_radius)
-        self._circle = Node(self._stop, next_position[0], next_position[1], self._position[2])
+            course += math.copysign(spiral_angle, self._circle.arc_radius)
+        self._circle = self._stop.at((next_position[0], next_position[1], self._position[2]))
         radius = self._ability.turn_radius(course, _course(self._position, next_position), self._position[2])
         arc = self._turn_to_tangent(course, radius)
         if arc is not None and radius * math.tan(0.5 * min(arc[1], MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
@@ -571,7 +574,7 @@ class _ReturnBuilder:
             self._add_arc(node, course, sweep, on_circle=True)
             self._add_waypoint(*point_on_circle(node, exit_course), 0.0, on_circle=True)
 
-    def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
+    def _turn_to_tangent(self, course: float, radius: float) -> tuple[RoutePoint, float, float] | None:
         """Return the arc from the current position to a tangent of the target's loiter, in the shorter direction.
 
         course: course at the start of the arc, rad.
@@ -589,31 +592,26 @@ class _ReturnBuilder:
         ]
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
-    def _turn_on_side(self, course: float, signed_radius: float) -> tuple[Node, float, float] | None:
+    def _turn_on_side(self, course: float, signed_radius: float) -> tuple[RoutePoint, float, float] | None:
         """Return the arc of `_turn_to_tangent` for a turn to one side.
 
         A positive radius means a turn to the right.
         """
         east, north, up = self._position
-        node = Node(
-            self._stop,
-            east + signed_radius * math.cos(course),
-            north - signed_radius * math.sin(course),
-            up,
-            signed_radius,
-        )
+        center = (east + signed_radius * math.cos(course), north - signed_radius * math.sin(course), up)
+        node = self._stop.at(center, signed_radius)
         if not is_joined(node, self._circle):
             return None
         tangent = tangent_course(node, self._circle)
         return node, (math.copysign(1.0, signed_radius) * (tangent - course)) % (2.0 * math.pi), tangent
 
-    def _add_arc(self, node: Node, course: float, sweep: float, *, on_circle: bool = False) -> None:
+    def _add_arc(self, node: RoutePoint, course: float, sweep: float, *, on_circle: bool = False) -> None:
         """Add the corners of an arc.
 
         on_circle: True for an arc of the loiter, on which no slope applies.
         """
         for east, north in circle_corners(node, course, sweep):
-            self._add_waypoint(east, north, abs(node.signed_radius), on_circle=on_circle)
+            self._add_waypoint(east, north, abs(node.arc_radius), on_circle=on_circle)
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
         """Add a waypoint at the altitude that the RTL has at this position.
@@ -652,7 +650,7 @@ class _ReturnBuilder:
         )
 
 
-def _rim_point_ahead(position: Position, course: float, circle: Node) -> tuple[float, float, float]:
+def _rim_point_ahead(position: Position, course: float, circle: RoutePoint) -> tuple[float, float, float]:
     """Return the point at which a straight path from inside a circle crosses the circle, and the course there.
 
     course: course of the straight path, rad. Returns east and north of the point, m, and the course along the circle at
@@ -664,14 +662,14 @@ def _rim_point_ahead(position: Position, course: float, circle: Node) -> tuple[f
         max(
             0.0,
             distance_past_center * distance_past_center
-            + circle.signed_radius * circle.signed_radius
+            + circle.arc_radius * circle.arc_radius
             - offset_east * offset_east
             - offset_north * offset_north,
         )
     )
     east, north = position[0] + distance * math.sin(course), position[1] + distance * math.cos(course)
     bearing = math.atan2(east - circle.east, north - circle.north)
-    return east, north, bearing + math.copysign(0.5 * math.pi, circle.signed_radius)
+    return east, north, bearing + math.copysign(0.5 * math.pi, circle.arc_radius)
 
 
 def _course(a: Position, b: Position) -> float:

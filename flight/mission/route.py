@@ -498,7 +498,14 @@ def route_through_stops(
     direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
         placed_stops += read_stops(direct_landing.stops, len(all_stops))
-    lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
+    lay_out = partial(
+        lay_out_waypoints,
+        mission.source,
+        notes=notes,
+        default_radius=_default_radius_function(limits),
+        slopes=_spiral_slope_function(limits),
+        rules=loiter_rules,
+    )
     points, unjoined = lay_out(placed_stops)
     _note_unsimulated_loiters(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
@@ -573,15 +580,6 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
     """
     open_items = itinerary.px4_open_items if reads_as_px4 else itinerary.open_items
     return open_items if landing is None else open_items + landing.open_items
-
-
-def _lay_out_waypoints(
-    source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[RoutePoint]
-) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
-    """Lay out waypoints as `lay_out_waypoints` does, with loiters and spirals that the aircraft can fly."""
-    return lay_out_waypoints(
-        source, stops, notes, _default_radius_function(limits), _spiral_slope_function(limits), loiters
-    )
 
 
 def _find_direct_landing(

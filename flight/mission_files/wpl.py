@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from itertools import pairwise
 
@@ -74,15 +74,6 @@ _ALLOWED_RANGES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    """Numbers of one line of the file."""
-
-    location: TextLine
-    current: bool
-    item: MissionItem
-
-
 def parse_waypoints(text: str, source: str) -> Mission:
     """Read the text of a WPL 110 file; ``source`` names it in messages.
 
@@ -118,24 +109,26 @@ def parse_waypoints(text: str, source: str) -> Mission:
         )
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{source}: too long: {len(lines) - 1:,} items; the limit is {MAX_ITEMS:,}", file=source)
-    rows = [_parse_row(TextLine(source, number), line) for number, line in lines[1:]]
-    if not rows:
+    locations = [TextLine(source, number) for number, _ in lines[1:]]
+    items = [_parse_row(location, line) for location, (_, line) in zip(locations, lines[1:], strict=True)]
+    if not items:
         raise MissionError(f"{source}: no items after the header", file=source)
-    warnings = _collect_warnings(rows, *_split_home(rows))
-    home, body = _split_home(_renumbered_rows(rows))
-    fences = number_items([row.item for row in body if row.item.command in FENCES])
+    has_current = any(int(line.split()[_COLUMNS.index("current")]) for _, line in lines[1:])
+    warnings = _collect_warnings(locations, items, has_current=has_current)
+    home, body = _split_home(_renumbered_items(items))
+    fences = number_items([item for item in body if item.command in FENCES])
     fence_shapes(fences, source)
     return Mission(
         home=home,
-        items=tuple(row.item for row in body if row.item.command not in _COMMANDS_WITH_OWN_FILES),
+        items=tuple(item for item in body if item.command not in _COMMANDS_WITH_OWN_FILES),
         fences=fences,
-        rally=number_items([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
+        rally=number_items([item for item in body if item.command == Command.NAV_RALLY_POINT]),
         warnings=tuple(warnings),
         source=source,
     )
 
 
-def _parse_row(location: TextLine, line: str) -> _Row:
+def _parse_row(location: TextLine, line: str) -> MissionItem:
     """Parse a line of twelve columns. Raises MissionError, which names the column, for an invalid line."""
     fields = line.split()
     if len(fields) != len(_COLUMNS):
@@ -163,7 +156,7 @@ def _parse_row(location: TextLine, line: str) -> _Row:
     problem = item_problem(item)
     if problem is not None:
         raise MissionError(**problem.at(location.file, location))
-    return _Row(location, bool(integers["current"]), item)
+    return item
 
 
 def _value_error(location: TextLine, field: str, value: str | int, value_text: str, allowed: str) -> MissionError:
@@ -190,84 +183,88 @@ def _parse_number(location: TextLine, name: str, text: str) -> float:
     return float(text) + 0.0
 
 
-def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
-    """Return the rows numbered in the order of their lines: from 0 if the file has a home line, else from 1.
+def _renumbered_items(items: list[MissionItem]) -> list[MissionItem]:
+    """Return the items numbered in the order of their lines: from 0 if the file has a home line, else from 1.
 
     Fence and rally items without a home line are numbered from 0, too.
     """
-    first_number = 0 if _begins_with_home(rows) or rows[0].item.command in _COMMANDS_WITH_OWN_FILES else 1
-    return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first_number)]
+    first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
+    return [replace(item, seq=seq) for seq, item in enumerate(items, first_number)]
 
 
-def _begins_with_home(rows: list[_Row]) -> bool:
-    """Return True if the first row is home.
+def _begins_with_home(items: list[MissionItem]) -> bool:
+    """Return True if the first item is home.
 
     Files of fences and rally points may have no home line, as MAVProxy writes them.
     """
-    return rows[0].item.seq == 0 and rows[0].item.command not in _COMMANDS_WITH_OWN_FILES
+    return items[0].seq == 0 and items[0].command not in _COMMANDS_WITH_OWN_FILES
 
 
-def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
-    """Return home and the rows of all items; home is None if the file states no valid position for it."""
-    if not _begins_with_home(rows):
-        return None, rows
-    home_item = rows[0].item
+def _split_home(items: list[MissionItem]) -> tuple[Home | None, list[MissionItem]]:
+    """Return home and the items without home; home is None if the file states no valid position for it."""
+    if not _begins_with_home(items):
+        return None, items
+    home_item = items[0]
     if not home_item.has_position:
-        return None, rows[1:]
-    return Home(home_item.lat_deg, home_item.lon_deg, home_item.alt), rows[1:]
+        return None, items[1:]
+    return Home(home_item.lat_deg, home_item.lon_deg, home_item.alt), items[1:]
 
 
-def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
-    """Return warnings about the home, the numbers and the positions in a file's rows.
+def _collect_warnings(locations: list[TextLine], items: list[MissionItem], *, has_current: bool) -> list[str]:
+    """Return warnings about the home, the numbers and the positions in a file's items.
 
-    body: rows without home.
+    locations: line of each item.
+    has_current: True if a line is marked as current.
     """
+    home, body = _split_home(items)
     warnings: list[str] = []
-    if all(row.item.command in _COMMANDS_WITH_OWN_FILES for row in body):
+    if all(item.command in _COMMANDS_WITH_OWN_FILES for item in body):
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
         return warnings
-    if not any(row.current for row in rows):
+    if not has_current:
         warnings.append("no current item: flown from the first item")
-    first = rows[0].item
-    if len(body) == len(rows):
+    first = items[0]
+    if len(body) == len(items):
         warnings.append(
-            f"{rows[0].location}: no home line (seq 0): the mission has no home and begins with this "
+            f"{locations[0]}: no home line (seq 0): the mission has no home and begins with this "
             "item, as in Mission Planner; QGroundControl and MAVProxy treat it as home and do "
             "not fly it"
         )
     elif first.command != Command.NAV_WAYPOINT:
         warnings.append(
-            f"{rows[0].location}: {command_name(first.command)} in the line of home (seq 0): "
+            f"{locations[0]}: {command_name(first.command)} in the line of home (seq 0): "
             "ignored, because ground stations treat that line as home and do not fly it"
         )
-    if len(body) < len(rows):
+    if len(body) < len(items):
         if home is None:
-            warnings.append(
-                f"{rows[0].location}: home is at 0, 0, which stands for no position: the mission has no home"
-            )
+            warnings.append(f"{locations[0]}: home is at 0, 0, which stands for no position: the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
-                f"{rows[0].location}: home in frame {first.frame}: its height is taken as above mean sea level;"
+                f"{locations[0]}: home in frame {first.frame}: its height is taken as above mean sea level;"
                 f" {HOME_LINE_MISSING_TEXT}, so ground stations take the first item for home and do not fly it"
             )
     numbering_text = "items are numbered by line instead, as ground stations do, and jumps use these numbers"
-    seq_steps = [(following, following.item.seq - previous.item.seq) for previous, following in pairwise(rows)]
-    gaps, falling = [row for row, step in seq_steps if step > 1], [row for row, step in seq_steps if step < 1]
+    seq_steps = list(enumerate((following.seq - item.seq for item, following in pairwise(items)), 1))
+    gaps, falling = [k for k, step in seq_steps if step > 1], [k for k, step in seq_steps if step < 1]
     if gaps:
         warnings.append(
-            f"{gaps[0].location}: the sequence numbers have a gap before {gaps[0].item.seq}"
+            f"{locations[gaps[0]]}: the sequence numbers have a gap before {items[gaps[0]].seq}"
             f" ({count_text(len(gaps), 'gap')} in all): {numbering_text}"
         )
     if falling:
         warnings.append(
-            f"{falling[0].location}: sequence number {falling[0].item.seq} is not higher than the one before"
+            f"{locations[falling[0]]}: sequence number {items[falling[0]].seq} is not higher than the one before"
             f" ({count_text(len(falling), 'such line')} in all): {numbering_text}"
         )
-    unplaced = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
+    unplaced = [
+        (location, item)
+        for location, item in zip(locations[-len(body) :], body, strict=True)
+        if item.command in PLACES | LANDINGS and not item.has_position
+    ]
     if unplaced:
-        name = command_name(unplaced[0].item.command)
+        name = command_name(unplaced[0][1].command)
         warnings.append(
-            f"{unplaced[0].location}: {name} at 0, 0, which is not a position"
+            f"{unplaced[0][0]}: {name} at 0, 0, which is not a position"
             f" ({count_text(len(unplaced), 'such item')} in all)"
         )
     return warnings

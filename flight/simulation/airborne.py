@@ -5,29 +5,31 @@ In a `flight.simulation.simulate.Flight` a simulated autopilot controls the airc
 """
 
 import math
-from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import Gear
+from aircraft.contacts import Gear, find_contacts
 from aircraft.path_limits import Limits, ground_speed_on
 from flight.autopilots.parts import ControlLaw
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import Trim
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.path import fly_by_path, waypoint_records
+from flight.mission.ground_ways import GroundPhases, TakeOff
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
-from flight.simulation.start import Start, find_start, start_trimmed
 from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, rtl_loiter_timeout
 from flight.simulation.track import Rows, join_rows, quantise
 from flight.simulation.turbulence import start_gusts
 from world.arrays import Floats
+from world.errors import FlightError, StartError
 from world.forecast.wind_field import without_levels_above
+from world.frames import to_geo
 from world.geometry import leg_courses
 from world.kernels import Records
 from world.random_streams import NAVIGATION, TURBULENCE, stream
@@ -41,7 +43,30 @@ TIME_LIMIT_BASE_S = 60.0
 MIN_GROUND_SPEED_MPS = 3.0
 
 
-class Airborne(ABC):
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Position, course, airspeed and wind at the start of a route.
+
+    lat_deg, lon_deg: geodetic.
+    amsl: altitude of the aircraft, m.
+    course: true course of the first leg, rad.
+    slope: slope of the first leg, rad.
+    airspeed: m/s, true.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    amsl: float
+    course: float
+    slope: float
+    airspeed: float
+    wind: tuple[float, float, float]
+    ground: float
+
+
+class Airborne:
     """One flight in progress, advanced by `fly_block`.
 
     dt: duration of a tick, s.
@@ -53,9 +78,12 @@ class Airborne(ABC):
     max_ticks: time limit, ticks.
     engine: flight model in use, and the reason for it, as in "JSBSim, as requested".
     _law: control law of a simulated autopilot; None for an external program that starts in the air.
+    _fly_ticks: flies up to a number of ticks, fills the workspace's rows, and returns the end code; 0 if the flight
+        continues.
     """
 
     _law: ControlLaw | None = None
+    _fly_ticks: Callable[[int], int]
     engine: str = "JSBSim, because the program of an autopilot flies"
 
     def __init__(
@@ -139,10 +167,6 @@ class Airborne(ABC):
         true = self._work.true
         return np.array([true.east, true.north, true.up])
 
-    @abstractmethod
-    def _fly_ticks(self, count: int) -> int:
-        """Fly up to ``count`` ticks, fill the workspace's rows, and return the end code; 0 if the flight continues."""
-
     def _start_disturbances(self, setup: FlightSetup) -> None:
         """Set the mean wind, and initialise turbulence and navigation error from their random streams."""
         wind, record = setup.scenario.wind, self._work
@@ -167,16 +191,53 @@ class Airborne(ABC):
             start_navigation(self._navigation_random.standard_normal(6), record.navigation)
 
     def _find_start(self, setup: FlightSetup) -> Start:
-        """Return the start of the route. Raises StartError if the start is not above the terrain."""
-        airspeed = float(self._airspeeds[0])
-        return find_start(setup, self.map, self._ground, self.fdm.aircraft, airspeed, self._start_offset)
+        """Return the start of the route, with the airspeed limited to the aircraft's range.
 
-    def _start_trimmed(self, source: str, start: Start) -> Trim:
-        """Start the aircraft trimmed, in the wind of the start. Raises StartError if that is not possible."""
-        trimmed = start_trimmed(self.fdm, source, start)
+        Raises StartError if the start is not above the terrain.
+        """
+        points, aircraft = setup.route.positions, self.fdm.aircraft
+        east, north, up = (float(value + offset) for value, offset in zip(points[0], self._start_offset, strict=True))
+        ground_altitude = self._ground.height(east, north)
+        if not math.isnan(ground_altitude) and up <= ground_altitude:
+            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {ground_altitude:.0f} m"
+            raise StartError(setup.mission.source, reason, field="start", value=up)
+        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
+        first_leg = points[1] - points[0]
+        convergence = self.map.convergence(lat, lon)
+        # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed
+        # that the aircraft can hold; the verdict reports it.
+        return Start(
+            lat_deg=lat,
+            lon_deg=lon,
+            amsl=up,
+            course=math.atan2(first_leg[0], first_leg[1]) - convergence,
+            slope=math.atan2(first_leg[2], math.hypot(first_leg[0], first_leg[1])),
+            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(self._airspeeds[0]))),
+            wind=_find_wind(setup, (east, north, up), convergence),
+            ground=min(0.0, up - 1000.0) if math.isnan(ground_altitude) else ground_altitude,
+        )
+
+    def _start_trimmed(self, source: str, start: Start) -> None:
+        """Start the aircraft trimmed on the slope of the first leg, or level if it cannot hold that slope.
+
+        source: file of the mission, for messages.
+
+        Raises StartError if the aircraft can fly neither the slope nor level.
+        """
+        start_values = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
+        try:
+            trimmed = self.fdm.start(*start_values, start.slope, start.wind, start.ground)
+        except FlightError:
+            try:
+                trimmed = self.fdm.start(*start_values, 0.0, start.wind, start.ground)
+            except FlightError as error:
+                error_fields = {"field": error.field, "value": error.value, "allowed": error.allowed}
+                raise StartError(source, str(error), **error_fields) from error
+        # Mean wind is set as part of the gust.
+        self.fdm.set_wind(0.0, 0.0, 0.0)
+        self.fdm.set_gust(*start.wind)
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
-        return trimmed
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, and return their rows and the reason for the flight's end, "" if it continues."""
@@ -269,3 +330,91 @@ def _max_wind_deviation(setup: FlightSetup, length: float) -> float:
     longest_time = TIME_LIMIT_FACTOR * length / MIN_GROUND_SPEED_MPS + TIME_LIMIT_BASE_S
     near = without_levels_above(field.between(0.0, longest_time), float(setup.route.positions[:, 2].max()))
     return float(np.linalg.norm(near.velocities, axis=-1).max())
+
+
+def _find_wind(setup: FlightSetup, position: Sequence[float], convergence: float) -> tuple[float, float, float]:
+    """Return the mean wind at a position (east, north, up, m) at the start, true north, east and down, m/s.
+
+    convergence: grid convergence, the map course of true north, rad.
+    """
+    east, north = setup.scenario.wind_velocity(position)
+    # The wind of a forecast is along true north, and a stated wind along the map's north.
+    angle = convergence if setup.scenario.wind.field is None else 0.0
+    return *_to_true_north(east, north, angle), 0.0
+
+
+# ----------------------------------------------------------------------
+# Start from the ground.
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """State of the aircraft at its release.
+
+    position: latitude and longitude, deg, and altitude, m AMSL.
+    attitude: roll, pitch, yaw (true), rad.
+    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
+    """
+
+    position: tuple[float, float, float]
+    attitude: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    wind: tuple[float, float, float]
+    ground: float
+
+
+def default_gear(ground_phases: GroundPhases) -> Gear:
+    """Return the gear that is added to a model without contacts: wheels for a runway, otherwise a belly."""
+    return (
+        "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
+    )
+
+
+def find_release(
+    setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
+) -> Release:
+    """Return the state of the aircraft at the release: at the end of the launch, or at rest on the runway."""
+    launch = take_off.launch
+    position, velocity = take_off.release()
+    if launch.method == "runway":
+        stand_heights = [contact.down for contact in find_contacts(aircraft, "wheels") if contact.is_support]
+        position[2] += max(stand_heights, default=0.0)
+    lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
+    convergence = local_map.convergence(lat, lon)
+    ground_altitude = ground.height(float(position[0]), float(position[1]))
+    return Release(
+        position=(lat, lon, float(position[2])),
+        attitude=(0.0, launch.incline, take_off.course - convergence),
+        velocity=(*_to_true_north(float(velocity[0]), float(velocity[1]), convergence), -float(velocity[2])),
+        wind=_find_wind(setup, position.tolist(), convergence),
+        ground=float(take_off.home[2]) if math.isnan(ground_altitude) else ground_altitude,
+    )
+
+
+def _to_true_north(east: float, north: float, convergence: float) -> tuple[float, float]:
+    """Return the true north and east components of a map vector.
+
+    convergence: grid convergence, the map course of true north, rad.
+    """
+    cos, sin = math.cos(convergence), math.sin(convergence)
+    return north * cos + east * sin, east * cos - north * sin
+
+
+def release(
+    fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Release the aircraft with elevator, aileron, rudder and throttle commands, and return these commands."""
+    fdm.release(
+        release_state.position,
+        release_state.attitude,
+        release_state.velocity,
+        wind=release_state.wind,
+        terrain_amsl=release_state.ground,
+        commands=commands,
+    )
+    # Mean wind is set as part of the gust.
+    fdm.set_wind(0.0, 0.0, 0.0)
+    fdm.set_gust(*release_state.wind)
+    return commands

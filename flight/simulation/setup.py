@@ -30,7 +30,7 @@ from world.scenario_tables import Navigation
 VerticalDatum = Literal["amsl", "ellipsoid", "pressure", "unstated"]
 
 # Kinds of data that rules require in addition to time and position.
-Quantity = Literal["attitude", "airspeed", "wind", "battery", "throttle", "heights", "velocity"]
+DataKind = Literal["attitude", "airspeed", "wind", "battery", "throttle", "heights", "velocity"]
 
 # End reason of a stretch: a mode change, the end of the log, or the landing.
 StretchEnd = Literal["mode", "log", "landed"]
@@ -176,7 +176,7 @@ class ImportedLog:
     format: str
     program: str = ""
     utc_start: float = math.nan
-    holds: tuple[Quantity, ...] = ()
+    holds: tuple[DataKind, ...] = ()
     stretches: tuple[MissionStretch, ...] = ()
     heights: Heights = field(default_factory=lambda: Heights("", "unstated"))
     wind: str = ""

@@ -18,10 +18,9 @@ from flight.dynamics.trim import steady_flight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
 from flight.mission.ground_ways import GroundPhases
-from flight.simulation.airborne import Airborne
+from flight.simulation.airborne import Airborne, Start, default_gear, find_release, release
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
-from flight.simulation.start import Start, default_gear, find_release, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
@@ -317,7 +316,7 @@ class Flight(Airborne):
         self._law.initialise(self.memory, self._workspace.own)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(setup)
-        self._loop = self._make_loop()
+        self._fly_ticks = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
         """Change to the route of another setup, which starts at the aircraft's position at time 0.
@@ -339,7 +338,7 @@ class Flight(Airborne):
             setattr(self.memory, name, 0)
         self._law.initialise(self.memory, self._workspace.own)
         self._law.transfer_state(old_memory, self._workspace.own, setup.route.positions[0])
-        self._loop = self._make_loop()
+        self._fly_ticks = self._make_loop()
 
     def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
         """Trim the aircraft at the start of the route, and store the trim of the model in the guidance memory.
@@ -370,9 +369,6 @@ class Flight(Airborne):
             commands = (elevator, 0.0, 0.0, self._law.released_throttle)
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
-
-    def _fly_ticks(self, count: int) -> int:
-        return self._loop(count)
 
     def _choose_engine(self, setup: FlightSetup) -> tuple[CompiledModel | None, str]:
         """Choose the engine; return the compiled model (None for JSBSim), and a text with the engine and the reason."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from flight.mission.items import Mission
-from flight.simulation.setup import Gap, HeightOffset, Heights, MissionStretch, Quantity, RowFaults
+from flight.simulation.setup import DataKind, Gap, HeightOffset, Heights, MissionStretch, RowFaults
 from flight.simulation.track import THROTTLE, Track
 from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, metres_between
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
@@ -179,7 +179,7 @@ _REFUSED: dict[VehicleKind, str] = {
     "blimp": "a blimp",
 }
 # Quantities that a log may lack.
-_OPTIONAL_QUANTITIES: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
+_OPTIONAL_QUANTITIES: tuple[DataKind, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
 # Largest number of positions that are read.
 _MAX_ROWS = 4_000_000
 
@@ -209,7 +209,7 @@ class LoggedFlight:
     lon: Floats
     up: Floats
     columns: dict[str, Floats]
-    holds: tuple[Quantity, ...]
+    holds: tuple[DataKind, ...]
     stretches: tuple[MissionStretch, ...]
     mission: LoggedMission | None
     heights: Heights
@@ -295,7 +295,7 @@ def _extract_flight(
         name: _interpolate_at(raw.series.get(name), name, time, positions) for name in COLUMNS if name != "height"
     }
     up = positions.up[is_kept]
-    available_quantities: list[Quantity] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
+    available_quantities: list[DataKind] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
     if np.isfinite(up).all():
         available_quantities.append("heights")
     start = part.stretches[0].start if part.stretches else part.start

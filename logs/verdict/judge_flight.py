@@ -12,21 +12,18 @@ from flight.simulation.track import Track
 from logs.verdict.conditions import judging_conditions
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
-from logs.verdict.judge_geometry import (
+from logs.verdict.judge_geometry import judge_geometry, judge_plan_only, judge_unflown
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.track_alignment import flown_phases, leg_ends
+from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
+from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
+from logs.verdict.rules.registry import (
     blocking_item_findings,
     flown_findings,
-    flown_level,
     geometric_findings,
-    judge_geometry,
-    judge_plan_only,
-    judge_unflown,
     with_passing_suggestions,
     with_suggestions,
 )
-from logs.verdict.measures.flown_phases import flown_phases, leg_ends
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, ReferenceFlights, numbered_place
-from logs.verdict.rule_words import FRONT_OVERLAP, GROUND_RULES, SIDE_OVERLAP
 from logs.verdict.summary import failed_at_take_off, headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import FLOWN_COUNTERPARTS
@@ -130,13 +127,13 @@ def _level_answers(
         finding.ok is False for finding in flight_findings
     )
     own_answer = LevelAnswer(
-        flown_level(requirements.setup), flyable, headline(flight_findings, flyable, notes), undecided=undecided
+        requirements.setup.autopilot.level, flyable, headline(flight_findings, flyable, notes), undecided=undecided
     )
     return (*levels, own_answer)
 
 
 def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
-    """Return the airframe's answer, by the reference flight, with its disagreements with the flight.
+    """Return the airframe's answer from the reference flight, with its disagreements with the flight.
 
     A flight that failed at take-off is not compared, because the reference flight begins in the air.
     """

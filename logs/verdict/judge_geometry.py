@@ -1,246 +1,21 @@
 """Judge without a flight: a route by its geometry, a flight that never began, or a plan that is not feasible."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
 
-from flight.guidance.path import reversals
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, judging_conditions
 from logs.verdict.findings import (
-    NOT_FLOWN,
-    UNKNOWN_AIRCRAFT,
     Finding,
     finding_reason,
     make_finding,
     message,
-    undecided_findings,
-    worst_first_key,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName, TriedSuggestions
-from logs.verdict.rule import Judge, Rule
-from logs.verdict.rules.registry import RULES
+from logs.verdict.places import FLIGHT, PLAN, LevelAnswer
+from logs.verdict.rules.registry import geometric_findings, mission_findings, with_suggestions
 from logs.verdict.summary import headline, setup_notes, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import place_text
 from planner.plan import Plan, Violation
-
-# ----------------------------------------------------------------------
-# The findings of each level, rule by rule in the order of `RULES`.
-
-
-def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return the findings on mission items, for any autopilot."""
-    return [finding for rule in RULES.values() if rule.judge_items is not None for finding in rule.judge_items(setup)]
-
-
-def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
-    """Return the findings on mission items that fail or leave the verdict undecided.
-
-    The items of a plan are judged only if PX4 is to fly them, because planfly wrote them.
-    """
-    items_are_judged = setup.plan is None or setup.autopilot.checks.dialect == "px4"
-    findings = mission_findings(setup) if items_are_judged else []
-    return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
-
-
-def geometric_findings(
-    requirements: RouteRequirements, flight_findings: Sequence[Finding] | None = None
-) -> tuple[Finding, ...]:
-    """Return the findings on a route's geometry, compared with the aircraft's envelope.
-
-    flight_findings: findings on a flight of the route.  Findings of rules with `Rule.is_same_for_plan` are copied from
-        them; None to run these rules, too.
-    """
-    return _run_rules(requirements, None, (), geometric=True, flight_findings=flight_findings)
-
-
-def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Return only those geometric findings that judge legs, corners, threats and zones, not the route as a whole."""
-    return _run_rules(requirements, None, (), geometric=True, includes_whole_flight=False)
-
-
-def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return the findings on a flown track, compared with its route and the aircraft's envelope.
-
-    The end of the flight is not judged here; see `flown_findings`.
-    """
-    return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
-
-
-def flown_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
-) -> tuple[Finding, ...]:
-    """Return findings on the track of a flight and on how the flight ended.
-
-    end_reason: "completed", or the reason why the flight ended early.
-    log_complete: True if the log is not cut off.
-    """
-    end_judges = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    end_findings = tuple(
-        finding for judge in end_judges for finding in judge(requirements, aligned, end_reason, log_complete)
-    )
-    return (
-        *blocking_item_findings(requirements.setup),
-        *_run_rules(requirements, aligned, end_findings, geometric=False),
-    )
-
-
-def _run_rules(
-    requirements: RouteRequirements,
-    aligned: AlignedTrack | None,
-    end_findings: Sequence[Finding],
-    *,
-    geometric: bool,
-    includes_whole_flight: bool = True,
-    flight_findings: Sequence[Finding] | None = None,
-) -> tuple[Finding, ...]:
-    """Run all rules, add `end_findings`, and let the rules merge the findings.
-
-    end_findings: findings on how the flight ended.
-    includes_whole_flight: True to include rules that judge the whole flight, and to keep only the worst findings of
-        each stop.
-    flight_findings: as in `geometric_findings`.
-    """
-
-    def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
-        """Run one rule, or take its findings from the flight's findings if they are the same for the plan."""
-        if rule.is_same_for_plan and flight_findings is not None:
-            return [finding for finding in flight_findings if finding.rule == rule.name]
-        return judge(requirements, aligned, geometric=geometric)
-
-    findings: tuple[Finding, ...] = tuple(
-        finding
-        for rule in RULES.values()
-        if rule.judge is not None and (includes_whole_flight or not rule.judges_whole_flight)
-        for finding in rule_findings(rule, rule.judge)
-    )
-    findings = (*findings, *end_findings)
-    for rule in RULES.values():
-        if rule.merge is not None:
-            findings = rule.merge(requirements, aligned, findings)
-    if includes_whole_flight:
-        findings = (*worst_finding_per_stop(findings), *_other_side_findings(requirements, findings))
-    return findings
-
-
-# Rules that judge the aircraft's position, which depends on the side to which it turns at a course reversal.
-_POSITION_RULES = ("clearance", "threat", "fence")
-
-
-def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings on places that fail only for one direction of a turn at a course reversal.
-
-    A flight shows only one direction, which depends on its navigation error: of 12 ArduPlane flights through a turn of
-    180 degrees, 4 turned left.  Return [] for an imported flight, and for a route without a course reversal.
-    """
-    setup = requirements.setup
-    corners = reversals(setup.route)
-    if setup.source is not None or not corners.size:
-        return []
-    failures_by_side = [
-        {
-            (finding.rule, finding.place): finding
-            for name in _POSITION_RULES
-            if (judge := RULES[name].judge) is not None
-            for finding in judge(side_requirements, None, geometric=True)
-            if finding.ok is False
-        }
-        for side_requirements in (route_requirements(setup), route_requirements(setup.with_long_reversals()))
-    ]
-    failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
-    corners_text = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
-    one_sided_findings = []
-    for key in (failures_by_side[0].keys() ^ failures_by_side[1].keys()) - failed_keys:
-        finding = failures_by_side[0].get(key) or failures_by_side[1][key]
-        brief = f"the autopilot may turn left or right at {corners_text}, and on one side the flight fails"
-        fault = message(brief, f": {finding.reason}")
-        one_sided_findings.append(
-            make_finding(finding.rule, finding.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)
-        )
-    return sorted(one_sided_findings, key=lambda finding: (finding.rule, str(finding.place)))
-
-
-def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep each rule's worst finding on the corners of each stop, and its worst on the legs to the stop.
-
-    A stop is a waypoint or a loiter of the mission; a loiter is flown as several corners and legs.
-
-    >>> from logs.verdict.places import Place
-    >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
-    >>> margins = zip(legs, (9.0, 4.0, 7.0))
-    >>> heights = [make_finding("clearance", leg, ok=True, reason="", margin=margin) for leg, margin in margins]
-    >>> [item.place.index for item in worst_finding_per_stop(heights)]
-    [3]
-    """
-    worst_by_stop: dict[tuple[object, ...], Finding] = {}
-    for k, finding in enumerate(findings):
-        place = finding.place
-        has_stop = place.kind in ("leg", "waypoint") and place.number is not None
-        key = (finding.rule, finding.check, place.kind, place.number, place.item, place.to_item) if has_stop else (k,)
-        if key not in worst_by_stop or worst_first_key(finding) < worst_first_key(worst_by_stop[key]):
-            worst_by_stop[key] = finding
-    return tuple(worst_by_stop.values())
-
-
-# Greatest number of findings for which suggestions are made; if more fail, no single change mends the mission.
-MAX_SUGGESTED_FINDINGS = 200
-
-
-def with_suggestions(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
-) -> tuple[Finding, ...]:
-    """Add ``suggestions`` to the failed or undecided findings that a change could fix.
-
-    Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
-    If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
-    """
-    return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
-    places = [
-        k
-        for k, finding in enumerate(findings)
-        if (finding.ok is False or (finding.ok is None and finding.check == UNKNOWN_AIRCRAFT))
-        and RULES[finding.rule].suggest is not None
-        and finding.place not in return_legs
-    ]
-    results = list(findings)
-    for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():
-        if (suggest := RULES[results[k].rule].suggest) is not None:
-            results[k] = replace(results[k], suggestions=suggest(requirements, aligned, results[k]))
-    return tuple(results)
-
-
-def with_passing_suggestions(
-    findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
-) -> tuple[Finding, ...]:
-    """Remove the suggestions that passed no trial from failed findings.
-
-    trials: suggestions that passed their trials; None to keep all suggestions.
-
-    >>> from logs.verdict.places import Change, Place
-    >>> higher = ((Change("height", Place("leg", 2), None, 12.0, "m"),),)
-    >>> low = [
-    ...     replace(make_finding("clearance", Place("leg", k), ok=False, reason=""), suggestions=higher) for k in (1, 2)
-    ... ]
-    >>> passing = with_passing_suggestions(tuple(low), [TriedSuggestions("clearance", Place("leg", 2), higher)])
-    >>> [bool(item.suggestions) for item in passing]
-    [False, True]
-    """
-    if trials is None:
-        return findings
-    passing_suggestions = {(trial.rule, trial.place): trial.suggestions for trial in trials}
-    return tuple(
-        replace(finding, suggestions=passing_suggestions.get((finding.rule, finding.place), ()))
-        if finding.ok is False
-        else finding
-        for finding in findings
-    )
-
-
-# ----------------------------------------------------------------------
-# The verdicts.
 
 
 def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
@@ -289,11 +64,6 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     )
 
 
-def flown_level(setup: FlightSetup) -> LevelName:
-    """Return the level at which a flight of a setup is judged."""
-    return setup.autopilot.level
-
-
 def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_complete: bool = True) -> Verdict:
     """Judge a flight without rows by its route's geometry; the verdict is never complete.
 
@@ -316,7 +86,7 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     notes = setup_notes(setup, findings)
     levels = (
         LevelAnswer("geometry", passes, headline(route_findings, passes, notes)),
-        LevelAnswer(flown_level(setup), False, headline(findings, False, notes)),
+        LevelAnswer(setup.autopilot.level, False, headline(findings, False, notes)),
     )
     conditions = judging_conditions(setup)
     lines = summary_lines(findings, setup, "geometric", levels, conditions)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from flight.simulation.setup import FlightSetup, Quantity
+from flight.simulation.setup import DataKind, FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -52,7 +52,7 @@ class LogNeeds:
     reports_missing: True if the rule is reported as not judged if it finds nothing because `quantities` are missing.
     """
 
-    quantities: tuple[Quantity, ...] = ()
+    quantities: tuple[DataKind, ...] = ()
     needs_planned_heights: bool = False
     needs_aircraft: bool = False
     needs_full_leg: bool = False

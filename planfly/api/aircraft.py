@@ -13,8 +13,7 @@ from flight.autopilots.catalog import autopilot_classes, program_classes
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, level_flight_modes, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.model_check import shipped_model
-from planfly.flight_options import takes_options
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import check_level_flight
 from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
@@ -91,8 +90,7 @@ class DataSheetOptions(TypedDict, total=False):
     params: str | Path | None
 
 
-@with_warm_up()
-@takes_options
+@api_function()
 def new_aircraft(
     folder: str | Path,
     source: str | Path | None = None,
@@ -155,8 +153,7 @@ def new_aircraft(
         )
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def describe_aircraft(
     name: str | Path, *, motor_braking: bool = False, out: str | Path | None = None, overwrite: bool = False
 ) -> AircraftNumbers:

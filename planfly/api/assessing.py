@@ -7,9 +7,9 @@ from typing import Unpack
 from planfly.api.campaigns import answer_command_line, make_workers, open_sample
 from planfly.arguments import check_arguments
 from planfly.campaigns.find_ground_risk import GroundRiskGoal, GroundRiskResult, find_ground_risk
-from planfly.flight_options import SampleOptions, takes_options
+from planfly.flight_options import SampleOptions
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
@@ -19,8 +19,7 @@ from world.scenario import Scenario
 
 
 @requires_extra("campaigns")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def ground_risk(
     target: Plan | Scenario | str | Path,
     *,

@@ -50,10 +50,9 @@ from planfly.flight_options import (
     WindsOptions,
     fence_file_names,
     select_mission_options,
-    takes_options,
 )
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from planfly.runtime.stages import report_line, stage
 from planfly.workflow.output_paths import check_output_folder, replace_files
@@ -227,8 +226,7 @@ def _warn_of_too_few_flights(goal: Goal) -> None:
 
 
 @requires_extra("campaigns")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def campaign(
     target: Plan | Scenario | str | Path,
     *,
@@ -301,8 +299,7 @@ def _fly_and_summarise(
 
 
 @requires_extra("campaigns")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def campaign_flight(
     target: Plan | Scenario | str | Path,
     index: int,
@@ -370,8 +367,7 @@ def compare_campaigns(first: str | Path, second: str | Path) -> CampaignComparis
 
 
 @requires_extra("campaigns")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def winds(
     target: Plan | Scenario | str | Path,
     *,
@@ -448,8 +444,7 @@ def open_sample(target: Plan | Scenario | str | Path, options: SampleOptions) ->
 
 
 @requires_extra("campaigns")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def battery(
     target: Plan | Scenario | str | Path,
     *,

@@ -27,19 +27,17 @@ from logs.views.exports.map_files import (
     return_lines,
     track_line,
 )
-from planfly.api.flying import FlownMission
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, loss_text
-from planfly.flight_options import FencePaths, MissionOptions
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import FencePaths, MissionOptions, read_named_fences
 from planfly.plan_fence import add_plan_fence
 from planfly.rtl.return_summary import return_summary
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import check_output_file
+from planfly.workflow.pipeline import FlownMission
 from planner.plan import Plan, plan_json
-from world.argument_types import checks_types
 from world.errors import MissionError, ParameterError, PlanflyError
 from world.extras import require_extra
 from world.files import missing_text, temporary_folder, write_atomically
@@ -110,8 +108,7 @@ class _SourceContent:
     aircraft: str = ""
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def export(
     source: FlightLog | FlownMission | Plan | str | Path,
     *files: str | Path,

@@ -20,9 +20,9 @@ from planfly.campaigns.find_window import (
     find_window,
     last_departure,
 )
-from planfly.flight_options import WindowOptions, takes_options
+from planfly.flight_options import WindowOptions
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_folder, replace_files
 from planner.plan import Plan
@@ -35,8 +35,7 @@ _MAX_STEP = timedelta(hours=24)
 
 
 @requires_extra("campaigns")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def window(
     target: Plan | str | Path,
     *,

@@ -7,11 +7,10 @@ from typing import Any, Unpack
 
 from flight.autopilots.catalog import program_class_for
 from flight.autopilots.sitl.process import check_binary
-from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
-from logs.recording.reader import FlightLog, LogEvent, read_log
+from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
@@ -23,21 +22,21 @@ from planfly.flight_options import (
     FlyOptions,
     LogOptions,
     MissionOptions,
+    NamedFences,
     load_scenario_with_options,
+    read_named_fences,
     select_log_options,
     select_mission_options,
-    takes_options,
 )
 from planfly.kernel_units.unit_kernels import FLYING, PLANNING_AND_FLYING
-from planfly.named_fences import NamedFences, read_named_fences
 from planfly.rtl.return_summary import ReturnSummary, return_summary
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
 from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
-from planfly.workflow.open_flight import open_flight, with_engine
+from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
-from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log_path, fly_and_judge
+from planfly.workflow.pipeline import FlownMission, PlanThenFly, autopilot_log_path, fly_and_judge
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
@@ -45,65 +44,7 @@ from world.extras import require_extra
 from world.scenario import Scenario, with_terrain
 
 # ----------------------------------------------------------------------
-# Results of the functions.  They are frozen data with a short printed form and a table in a notebook.
-
-
-@dataclass(frozen=True, slots=True, repr=False)
-class FlownMission:
-    """Result of `planfly.fly`.
-
-    setup: all inputs of the flight.
-    track: rows of the flight; empty if the flight could not start.
-    verdict: verdict on the mission, with a finding for every rule and place.
-    ended: "completed", or the reason for an early end.
-    events: entries of the log in addition to the rows.
-    log: the file of the flight log; None if no log was requested or nothing was flown.
-    autopilot_log: the autopilot program's own log, next to the flight log, if such a program flew.
-    returns: returns from a few points of the flight, as recorded in the log; None without a log.
-    engine: flight model that flew, and the reason; "" if nothing was flown.
-    """
-
-    setup: FlightSetup
-    track: Track
-    verdict: Verdict
-    ended: str
-    events: tuple[LogEvent, ...] = ()
-    log: Path | None = None
-    autopilot_log: Path | None = None
-    returns: ReturnSummary | None = None
-    engine: str = ""
-
-    @property
-    def mission(self) -> Mission:
-        """Mission that was flown, read from a file or made from a plan."""
-        return self.setup.mission
-
-    @property
-    def plan(self) -> Plan | None:
-        """Plan that was flown; None for a mission file."""
-        return self.setup.plan
-
-    @property
-    def flyable(self) -> bool:
-        """True if the verdict is flyable."""
-        return self.verdict.flyable
-
-    @property
-    def returns_line(self) -> str:
-        """One line on returns from a few points of the flight; "" for a mission without a home."""
-        return self.return_summary.line
-
-    @property
-    def return_summary(self) -> ReturnSummary:
-        """Returns from a few points of the flight; without a log they are computed at each call."""
-        return return_summary(self.setup, self.track) if self.returns is None else self.returns
-
-    def __repr__(self) -> str:
-        return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
-
-    def _repr_html_(self) -> str:
-        """Return the HTML that a notebook shows."""
-        return self.verdict._repr_html_() + self.track._repr_html_()
+# Results of the functions, except those of `planfly.workflow.pipeline`.
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +83,7 @@ class Judged:
 # Fly a mission.
 
 
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def plan_then_fly(
     scenario: Scenario | str | Path,
     *,
@@ -171,8 +111,7 @@ def plan_then_fly(
     return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
 
-@with_warm_up(*FLYING)
-@takes_options
+@api_function(*FLYING)
 def fly(
     mission: Plan | str | Path,
     *,
@@ -215,13 +154,13 @@ def fly(
     ('completed', True, 4.0)
     """
     limits = FlightLimits(options["max_hours"], options["max_log"])
-    check_arguments(seed=options["seed"], log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes)
-    check_arguments(engine=options["engine"])
+    stated = {name: options[name] for name in ("seed", "log_hz", "max_hours", "max_log", "engine")}
+    check_arguments(**stated)
     program = named_program(options["sitl"])
-    setup = with_engine(open_flight(mission, options, program), options["engine"])
+    setup = open_flight(mission, options, program, options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
-        flight = fly_and_judge(
+        return fly_and_judge(
             setup,
             target,
             advance,
@@ -231,28 +170,9 @@ def fly(
             reference="always" if options["levels"] else "failed",
             returns=target is not None,
         )
-    return _flown_mission(flight, target, program)
 
 
-def _flown_mission(flight: JudgedFlight, log: Path | None, program: Path | None) -> FlownMission:
-    """Convert a judged flight to a `FlownMission`, without log and flight model if it did not start."""
-    log = log if len(flight.track) else None
-    program_log = None if log is None or program is None else autopilot_log_path(log, program)
-    return FlownMission(
-        flight.setup,
-        flight.track,
-        flight.verdict,
-        flight.ended,
-        flight.events,
-        log,
-        program_log,
-        flight.returns,
-        flight.engine if len(flight.track) else "",
-    )
-
-
-@with_warm_up(*FLYING)
-@takes_options
+@api_function(*FLYING)
 def fly_by_each(
     mission: Plan | str | Path, autopilots: Sequence[str], **options: Unpack[MissionOptions]
 ) -> dict[str, FlownMission]:
@@ -307,8 +227,7 @@ def _prepare_log_file(
 # Judge a flight log or a mission.
 
 
-@with_warm_up()
-@takes_options
+@api_function()
 def judge(
     what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Judged:
@@ -353,7 +272,7 @@ def judge(
     return Judged(setup, judge_mission_geometry(setup, requirements), requirements=requirements)
 
 
-@takes_options
+@api_function()
 def check(
     what: FlightLog | FlownMission | Plan | str | Path, *, geometry: bool = False, **options: Unpack[LogOptions]
 ) -> Verdict:

@@ -10,10 +10,10 @@ from typing import Any, Unpack
 
 from planfly.api.planning import stop_condition
 from planfly.arguments import RANGES, check_arguments
-from planfly.flight_options import FlightOptions, load_scenario_with_options, takes_options
+from planfly.flight_options import FlightOptions, load_scenario_with_options
 from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import choose_seed, load_airframe
 from planfly.workflow.output_paths import RUN_FOLDER, clean_folder, expand_path_pattern
@@ -39,8 +39,7 @@ FRONT_FILES = (
 )
 
 
-@with_warm_up(*FRONT_PLANNING)
-@takes_options
+@api_function(*FRONT_PLANNING)
 def plan_front(
     scenario: Scenario | str | Path,
     count: int = 20,

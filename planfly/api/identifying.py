@@ -32,10 +32,9 @@ from planfly.identification.records import (
 )
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_quantities import WideQuantity, wide_quantities
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.data_sheets import parse_sheet
-from world.argument_types import checks_types
 from world.arrays import Floats
 from world.errors import FlightError, LogError, PlanflyError
 from world.extras import requires_extra
@@ -93,8 +92,7 @@ class IdentifiedAircraft:
 
 
 @requires_extra("identification")
-@with_warm_up()
-@checks_types
+@api_function()
 def identify_aircraft(
     logs: str | Path | Sequence[str | Path],
     folder: str | Path,

@@ -14,9 +14,9 @@ from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import not_reflown_lines, refly_lines
 from planfly.arguments import check_arguments
-from planfly.flight_options import LogOptions, takes_options
+from planfly.flight_options import LogOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
 from planfly.workflow.output_paths import (
@@ -49,7 +49,7 @@ class Reflown:
     files: tuple[Path, ...]
 
 
-@takes_options
+@api_function()
 def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFlight:
     """Read and judge a flight from the log of another program, with the options of `import_log`.
 
@@ -63,8 +63,7 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
     return import_flight(Path(log), options)
 
 
-@with_warm_up()
-@takes_options
+@api_function()
 def import_log(
     log: str | Path, target: str | Path | None = None, *, overwrite: bool = False, **options: Unpack[LogOptions]
 ) -> ImportedFlight:
@@ -146,8 +145,7 @@ def _write_log(target: Path, flight: ImportedFlight) -> None:
 # Fly the mission of an imported flight again in JSBSim, and compare model and flight.
 
 
-@with_warm_up(*FLYING)
-@checks_types
+@api_function(*FLYING)
 def refly(
     log: FlightLog | str | Path,
     out: str | Path | None = None,

@@ -10,23 +10,23 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
 from logs.verdict.findings import Finding
-from logs.verdict.measures.flown_phases import flown_phases
 from logs.verdict.measures.link_outages import LinkAlongPath
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.measures.track_alignment import align_track, flown_phases
 from logs.verdict.returns.judge_returns import Returns
 from logs.verdict.returns.returns_text import range_text
 from logs.verdict.rules.link_rule import duration_text, judge_link, period_text
 from logs.verdict.wording import place_text
-from planfly.api.flying import FlownMission, judge
+from planfly.api.flying import judge
 from planfly.arguments import check_arguments, parse_position
-from planfly.flight_options import LinkOptions, select_log_and_mission_options, takes_options
+from planfly.flight_options import LinkOptions, select_log_and_mission_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.rtl.jsbsim_returns import fly_return
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import with_ground_at_station
 from planfly.workflow.output_paths import check_output_folder, replace_files
+from planfly.workflow.pipeline import FlownMission
 from planner.plan import Plan
 from world.arrays import Floats
 from world.errors import ArgumentError
@@ -121,8 +121,7 @@ class LinkResult:
         return f"<LinkResult {self.setup.scenario.name}: {self.finding.reason}>"
 
 
-@with_warm_up(*FLYING)
-@takes_options
+@api_function(*FLYING)
 def link(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,

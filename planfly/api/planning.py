@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, plan_conditions
 from planfly.arguments import check_arguments
-from planfly.flight_options import PlanOptions, load_scenario_with_options, takes_options
+from planfly.flight_options import PlanOptions, load_scenario_with_options
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.planning.expected_failures import expected_failures
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.threat_tables import GivenThreats, threat_tables
 from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_airframe
@@ -37,8 +37,7 @@ from world.scenario_tables import MAP_EXTENT
 # Plan a path through a scenario.
 
 
-@with_warm_up(*PLANNING)
-@takes_options
+@api_function(*PLANNING)
 def plan(
     scenario: Scenario | str | Path,
     *,
@@ -123,8 +122,7 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
     return path
 
 
-@with_warm_up(*PLANNING)
-@takes_options
+@api_function(*PLANNING)
 def replan(
     scenario: Scenario | str | Path,
     old: Plan | str | Path,

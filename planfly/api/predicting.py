@@ -23,11 +23,11 @@ from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import TURBULENCE_LEVELS, with_aircraft_draws
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.flight_logs import is_log
-from planfly.flight_options import LogOptions, option_defaults, takes_options
+from planfly.flight_options import LogOptions, option_defaults
 from planfly.identification.base_numbers import varied_model
 from planfly.identification.records import MIN_CHECK_SECONDS
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import DrawnFlight, fly_draws
 from planfly.workflow.output_paths import PREDICT_FILES, check_output_folder, clean_folder
@@ -89,8 +89,7 @@ class Predicted:
 
 
 @requires_extra("identification")
-@with_warm_up(*FLYING)
-@takes_options
+@api_function(*FLYING)
 def predict(
     log: str | Path,
     out: str | Path | None = None,

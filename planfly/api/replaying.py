@@ -12,7 +12,7 @@ from logs.views.replay.timeline import TimelineEntry
 from logs.views.replay.timeline import timeline as list_timeline
 from planfly.api.serving import link_access
 from planfly.arguments import check_arguments
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from world.argument_types import checks_types
 from world.errors import LogError
 from world.extras import requires_extra
@@ -50,8 +50,7 @@ def replay_interval(log: FlightLog, start: float | None, end: float | None) -> t
     return start_time, end_time
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def timeline(
     log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
 ) -> tuple[TimelineEntry, ...]:
@@ -73,8 +72,7 @@ def timeline(
     return tuple(entry for entry in list_timeline(flight_log) if start_time <= entry.time <= end_time)
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def instruments(log: FlightLog | str | Path) -> Instruments:
     """Return the instruments of a recorded flight, whose readings `Instruments.frame` formats as text lines.
 
@@ -130,8 +128,7 @@ def _play_frames(
         flight_time = min(end_time, start_time + speed * clock())
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def movie(
     log: FlightLog | str | Path,
     out: str | Path,
@@ -169,8 +166,7 @@ def _ignore_message(_text: str) -> None:
 
 
 @requires_extra("foxglove", "--foxglove needs")
-@with_warm_up()
-@checks_types
+@api_function()
 def play_to_foxglove(
     log: FlightLog | str | Path,
     *,
@@ -228,8 +224,7 @@ def _check_origin(text: str) -> str:
 
 
 @requires_extra("live", "playing to ground stations needs")
-@with_warm_up()
-@checks_types
+@api_function()
 def play_to_stations(
     log: FlightLog | str | Path,
     to: str | Sequence[str],

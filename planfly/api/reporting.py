@@ -10,13 +10,13 @@ from logs.recording.foxglove_scene import layout_text
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
-from planfly.api.flying import FlownMission
 from planfly.flight_logs import judge_log
 from planfly.rtl.return_summary import return_summary
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
+from planfly.workflow.pipeline import FlownMission
 from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.argument_types import checks_types
@@ -62,8 +62,7 @@ class _ReportContent(NamedTuple):
     versions: dict[str, str] | None = None
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def figures(source: Source) -> "dict[str, Figure]":
     """Return the pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
 
@@ -85,8 +84,7 @@ def figures(source: Source) -> "dict[str, Figure]":
     return draw_figures(content.setup, content.track, content.verdict)
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def report(
     source: Source,
     out: str | Path,
@@ -151,8 +149,7 @@ def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
     return Path(file)
 
 
-@with_warm_up()
-@checks_types
+@api_function()
 def compare(
     first: FlightLog | str | Path,
     second: FlightLog | str | Path,

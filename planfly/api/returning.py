@@ -34,10 +34,10 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FlownMission, check_keywords_not_given, named_program
+from planfly.api.flying import check_keywords_not_given, named_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
-from planfly.flight_options import LogOptions, select_log_options, select_mission_options, takes_options
+from planfly.flight_options import LogOptions, select_log_options, select_mission_options
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.rtl.jsbsim_returns import fly_return
 from planfly.rtl.return_summary import return_starts
@@ -47,12 +47,12 @@ from planfly.rtl.sitl_returns import (
     check_returns_as_arduplane,
     fly_by_program,
 )
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlownMission, fly_and_judge
 from planner.plan import Plan
 from world.files import write_atomically
 from world.scenario import with_terrain
@@ -197,8 +197,7 @@ _RETURNS_AS_FLOWN_TEXT = (
 )
 
 
-@with_warm_up(*FLYING, *GLIDING)
-@takes_options
+@api_function(*FLYING, *GLIDING)
 def returns(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,

@@ -17,15 +17,15 @@ from logs.verdict.verdict import Verdict, verdict_json
 from planfly.api.exporting import judging_parameters_text
 from planfly.api.flying import named_program
 from planfly.arguments import check_arguments
-from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults, takes_options
+from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, with_tightened_limits
 from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
-from planfly.workflow.open_flight import make_setup, mission_of_plan, with_engine
+from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.output_paths import (
     RUN_FILES,
     RUN_FOLDER,
@@ -123,8 +123,7 @@ class _RunTask:
     engine: EngineChoice
 
 
-@with_warm_up(*PLANNING_AND_FLYING, *GLIDING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING, *GLIDING)
 def run(
     scenario: Scenario | str | Path = "jacksboro",
     *,
@@ -268,7 +267,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         verdict = judge_plan_only(plan, planning_conditions(task.scenario, airframe))
         write_atomically(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
-    setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)
+    setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan, engine=task.engine)
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,
@@ -305,7 +304,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         notes=notes,
         has_log=has_log,
         returns_line=summary.line,
-        engine=flight.engine if has_log else "",
+        engine=flight.engine,
     )
 
 

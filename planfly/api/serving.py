@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from planfly.arguments import check_arguments
-from planfly.flight_options import MissionOptions, takes_options
+from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from world.errors import FlightError, PlanflyError
 from world.extras import requires_extra
@@ -28,8 +28,7 @@ def _ignore_message(_text: str) -> None:
 
 
 @requires_extra("live", "serve needs")
-@with_warm_up(*FLYING)
-@takes_options
+@api_function(*FLYING)
 def serve(
     mission: str | Path | None = None,
     *,

@@ -29,12 +29,12 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.waypoint_circles import circles_text, waypoint_circles
 from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
-from planfly.api.flying import FlownMission, check_keywords_not_given
+from planfly.api.flying import check_keywords_not_given
 from planfly.arguments import CAMERA_FORMAT, check_arguments, is_valid_camera
 from planfly.flight_logs import is_log
-from planfly.flight_options import MissionOptions, takes_options
+from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, find_survey_remedies
 from planfly.surveys.survey_text import (
@@ -54,7 +54,7 @@ from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
-from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.pipeline import FlownMission, fly_and_judge
 from world.errors import ArgumentError, LogError, MissionError, ParameterError
 from world.files import read_small_file, utf8_text, write_atomically
 from world.scenario import Scenario
@@ -167,8 +167,7 @@ class SurveyResult:
 _LINES_AS_FLOWN_TEXT = "not allowed with a log, whose photo lines are judged as they were flown"
 
 
-@with_warm_up(*FLYING)
-@takes_options
+@api_function(*FLYING)
 def survey(
     what: FlightLog | FlownMission | str | Path,
     *,
@@ -254,7 +253,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     _check_has_survey(setup)
     with stage(f"flying {length_and_duration_text(setup)}", "flying a survey") as advance:
         flight = fly_and_judge(setup, None, advance, reference="never")
-    result = _measure_survey(flight.requirements, flight.track, flight.verdict)
+    result = _measure_survey(route_requirements(flight.setup), flight.track, flight.verdict)
     if not suggest or result.usable or result.unknown_lines:
         return result
     with stage("looking for what would help") as advance:

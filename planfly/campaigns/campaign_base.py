@@ -21,8 +21,7 @@ from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, judging_conditions
 from planfly.campaigns.campaign_inputs import describe_differences, flatten_inputs, hash_input
 from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
-from planfly.flight_options import MissionOptions, load_scenario_with_options
-from planfly.named_fences import NamedFences, read_named_fences
+from planfly.flight_options import MissionOptions, NamedFences, load_scenario_with_options, read_named_fences
 from planfly.workflow.airframe import (
     Airframe,
     airframe_for_setup,

@@ -26,8 +26,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.returns.glide_map import glide_slopes
-from logs.verdict.returns.judge_glides import fly_without_engine
-from logs.verdict.returns.judge_returns import make_return_world, simulate_returns, without_engine_world
+from logs.verdict.returns.judge_returns import make_return_world, without_engine_world
 from logs.verdict.returns.return_starts import flown_starts
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary_flight
 from planfly.campaigns.dispersions import draw_flight
@@ -215,14 +214,14 @@ def _return_paths(setup: FlightSetup, track: Track, interval: float, *, glide: b
     if not len(starts):
         return none
     targets = [world.target(row) for row in starts.rows]
-    _, paths = simulate_returns(world, starts, targets, store_paths=True)
+    paths = world.fly(starts, targets, store_paths=True).tracks
     radius = abs(world.autopilot.returns.rules.radius)
     positions = {target.position[:2] for target in targets if not target.straight}
     glides: list[Floats] = []
     if glide and world.aircraft.glides:
         gliding_world = without_engine_world(world)
         gliding_targets = [gliding_world.target(row) for row in starts.rows]
-        gliding = fly_without_engine(gliding_world, starts, gliding_targets, store_paths=True)
+        gliding = gliding_world.fly(starts, gliding_targets, store_paths=True, engine_out=True)
         glides = [
             one
             for one, result in zip(gliding.tracks, gliding.results, strict=True)

@@ -34,16 +34,11 @@ class Command(NamedTuple):
     module: str = ""
     function: str = ""
 
-    def load_function(self) -> Any:
-        """Import the command's module, and return the function that executes the command."""
-        return self._load("{}")
+    def load(self, name_format: str = "{}") -> Any:
+        """Import the command's module, and return its function with the formatted name of the command.
 
-    def load_parser_function(self) -> Any:
-        """Import the command's module, and return the function that adds the command's parser."""
-        return self._load("add_{}_parser")
-
-    def _load(self, name_format: str) -> Any:
-        """Return the function of the command's module whose name is `name_format` with the command's name."""
+        name_format: "{}" for the function that executes the command, "add_{}_parser" for that which adds its parser.
+        """
         module = import_module(f"planfly.commands.{self.module or self.name}")
         return getattr(module, name_format.format(self.function or self.name))
 
@@ -88,6 +83,7 @@ COMMANDS = (
     Command("help", _HELP, module="shell", function="show_help"),
     Command("completion", _HELP, module="shell"),
 )
+_COMMANDS_BY_NAME = {command.name: command for command in COMMANDS}
 
 _FIRST_STEPS = """\
 first steps:
@@ -106,7 +102,7 @@ def build_parser() -> LineParser:
     )
     for command in COMMANDS:
         parser.start_section(command.section)
-        command.load_parser_function()(parser)
+        command.load("add_{}_parser")(parser)
     return parser
 
 
@@ -118,12 +114,7 @@ def find_command(name: str) -> CommandFunction:
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
     """
-    return _find_entry(name).load_function()
-
-
-def _find_entry(name: str) -> Command:
-    """Return the entry of a command.  Raises KeyError for an unknown name."""
-    return {command.name: command for command in COMMANDS}[name]
+    return _COMMANDS_BY_NAME[name].load()
 
 
 # ----------------------------------------------------------------------
@@ -151,7 +142,7 @@ def answer_schema(name: str) -> dict[str, Any]:
 
     if name not in commands_with_json():
         raise KeyError(name)
-    module, _, answer = _find_entry(name).answer.rpartition(".")
+    module, _, answer = _COMMANDS_BY_NAME[name].answer.rpartition(".")
     answers = import_module(f"planfly.terminal.{module or 'answers'}")
     schema = TypeAdapter(getattr(answers, answer)).json_schema(mode="serialization")
     return {"$schema": _JSON_SCHEMA_DRAFT, **schema, "title": f"planfly {name} --json"}

@@ -48,11 +48,10 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, noun_with_place
-from planfly.flight_options import MissionOptions, load_scenario_with_options
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import MissionOptions, load_scenario_with_options, read_named_fences
 from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
 from planfly.workflow.open_flight import make_setup, open_flight
-from planfly.workflow.reference_flights import judge_with_reference_flights
+from planfly.workflow.reference_flights import explain_verdict
 from world.arrays import Floats
 from world.errors import PlanflyError
 from world.frames import to_geo
@@ -293,7 +292,7 @@ class ServedLog:
 
         If the path was abandoned within a second, the log is deleted.  If the process is to end, an abandoned path is
         not judged; `planfly check` can judge it.
-        should_abort: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
+        should_abort: see `planfly.workflow.reference_flights.explain_verdict`.
         """
         track = join_tracks(self._track_blocks)
         was_abandoned = end_reason.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
@@ -308,13 +307,10 @@ class ServedLog:
         if was_abandoned and should_abort():
             self._recorder.finish(end_reason)
             return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
-        if end_reason == "completed":
-            requirements = route_requirements(self._setup)
-            verdict, reference = judge_with_reference_flights(
-                requirements, self._aircraft, track, end_reason, should_abort=should_abort
-            )
-        else:
-            verdict, reference = judge_flight(self._setup, track, end_reason), None
+        requirements = route_requirements(self._setup)
+        verdict, reference = judge_flight(self._setup, track, end_reason, requirements=requirements), None
+        if end_reason == "completed" and verdict.failed:
+            verdict, reference = explain_verdict(requirements, self._aircraft, verdict, should_abort=should_abort)
         self._recorder.finish(end_reason, verdict, reference)
         texts = (
             unfinished_texts(self._verdict_basis, end_reason, verdict)

@@ -9,7 +9,7 @@ from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
-from planfly.named_fences import NamedFences
+from planfly.flight_options import NamedFences
 from planfly.studio.settings import ChangedParameters
 from planfly.workflow.airframe import Airframe, airframe_for_setup, with_tracking_error
 from planfly.workflow.mission_context import MissionContext

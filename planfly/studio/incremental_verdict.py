@@ -14,8 +14,8 @@ from flight.mission.route import Route, part_of_route, route_points
 from flight.mission.surveys import camera_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
-from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.rules.registry import place_findings
 from planfly.studio.edit_context import EditContext
 from planfly.studio.moved_route import update_moved_route
 from world.geometry import leg_runs

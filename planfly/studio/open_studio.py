@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from planfly.arguments import check_arguments
-from planfly.flight_options import MissionOptions, takes_options
+from planfly.flight_options import MissionOptions
 from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
-from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.first_start import api_function
 from planfly.runtime.process_setup import end_repeated_call
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
@@ -39,8 +39,7 @@ def _never_stop() -> bool:
 
 
 @requires_extra("studio")
-@with_warm_up(*PLANNING_AND_FLYING)
-@takes_options
+@api_function(*PLANNING_AND_FLYING)
 def open_studio(
     what: str | Path = "jacksboro",
     *,

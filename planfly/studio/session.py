@@ -16,8 +16,7 @@ from flight.mission.items import LANDINGS, Mission
 from logs.verdict.places import Suggestion
 from logs.verdict.rule_words import rule_word
 from logs.verdict.wording import count_text, moves_text, suggestion_text, without_trial
-from planfly.flight_options import MissionOptions
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import MissionOptions, read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
 from planfly.studio.documents import KINDS, Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext

@@ -13,10 +13,10 @@ from flight.mission.items import AMSL, OVER_HOME, Command, Mission, MissionItem,
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
-from logs.verdict.judge_geometry import with_passing_suggestions
 from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.places import TriedSuggestions
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
 from logs.views.failures import route_distance, route_samples

@@ -15,7 +15,8 @@ import numpy as np
 
 from flight.mission.items import Mission
 from flight.simulation.track import Track
-from logs.verdict.judge_geometry import with_passing_suggestions
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rules.registry import with_passing_suggestions
 from logs.views.failures import track_distance
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.studio.changes import flight_results
@@ -52,8 +53,9 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
     context, mission = payload
     setup = context.setup(mission)
     flight = fly_and_judge(setup, None, advance, reference="never")
-    judged_mission = JudgedMission(mission, setup, flight.requirements, flight.verdict)
-    states = place_states(flight.requirements, flight.verdict.findings)
+    requirements = route_requirements(setup)
+    judged_mission = JudgedMission(mission, setup, requirements, flight.verdict)
+    states = place_states(requirements, flight.verdict.findings)
     seconds = round(float(flight.track.time[-1]), 1) if len(flight.track) else 0.0
     return {
         "verdict": verdict_page_data(flight.verdict),

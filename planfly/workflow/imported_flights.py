@@ -34,10 +34,15 @@ from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.flight_options import LogOptions, apply_options, flight_entries, load_scenario_with_options
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import (
+    LogOptions,
+    apply_options,
+    flight_entries,
+    load_scenario_with_options,
+    read_named_fences,
+    with_file_autopilot,
+)
 from planfly.workflow.airframe import find_aircraft_and_energy, load_airframe, max_turn_bank
-from planfly.workflow.file_autopilots import with_file_autopilot
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
 from planner.plan import read_plan

@@ -19,10 +19,14 @@ from flight.mission.preflight_notes import preflight_notes
 from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
-from planfly.flight_options import MissionOptions, apply_options, load_scenario_with_options
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import (
+    MissionOptions,
+    NamedFences,
+    apply_options,
+    load_scenario_with_options,
+    read_named_fences,
+)
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
-from planfly.workflow.file_autopilots import with_file_autopilot
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.errors import ForecastError, MissionError, ScenarioError, TerrainError
 from world.files import did_you_mean, missing_text
@@ -37,17 +41,15 @@ MAX_CAPACITY_DIFFERENCE = 0.2
 _MAH_PER_AH = 1000.0
 
 
-def with_engine(setup: FlightSetup, engine: EngineChoice) -> FlightSetup:
-    """Return the setup with the chosen flight model; the same object if it already has this model."""
-    return setup if setup.engine == engine else replace(setup, engine=engine)
-
-
-def open_flight(source: Plan | str | Path, options: MissionOptions, program: Path | None = None) -> FlightSetup:
+def open_flight(
+    source: Plan | str | Path, options: MissionOptions, program: Path | None = None, engine: EngineChoice = "auto"
+) -> FlightSetup:
     """Make the setup of a plan, or of a plan.json, .waypoints or .plan file.
 
     The scenario is the named scenario, the scenario of the plan, or for a mission file a scenario implied by its items.
 
     program: the autopilot program that flies, or None for a simulated autopilot.
+    engine: flight model that flies.
     Raises MissionError, ScenarioError, ParameterError or TerrainError.
 
     >>> from planfly.workflow.make_plan import make_plan
@@ -57,23 +59,22 @@ def open_flight(source: Plan | str | Path, options: MissionOptions, program: Pat
     >>> setup.name, setup.mission.source, setup.scenario.wind.speed
     ('paper-07', 'plan.json', 4.0)
     """
+    fences, named_world = read_named_fences(options.get("fence") or ()), options.get("scenario")
+    terrain = None if options.get("terrain") is None else str(options.get("terrain"))
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
-        return _open_plan(source, options, program)
-    fences = read_named_fences(options.get("fence") or ())
-    named_world = options.get("scenario")
-    terrain = _terrain_option(options)
+        return _open_plan(source, options, program, engine, fences, terrain)
     mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
     if named_world is not None:
-        scenario = load_scenario_with_options(named_world, options, program)
+        scenario = load_scenario_with_options(named_world, options, program, mission)
         if scenario.link is not None:
             scenario = with_ground_at_station(scenario, mission)
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
         implied_world = implied_scenario(mission, terrain, vertical_legs=True)
-        scenario, placed = apply_options(implied_world.scenario, options, program), implied_world.placed
-    scenario = with_file_autopilot(fences.add_to_scenario(scenario), mission)
+        scenario, placed = apply_options(implied_world.scenario, options, program, mission), implied_world.placed
+    scenario = fences.add_to_scenario(scenario)
     seed = choose_seed(scenario, options.get("seed"))
-    return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed)
+    return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed, engine=engine)
 
 
 def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
@@ -91,11 +92,19 @@ def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
         return scenario
 
 
-def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path | None) -> FlightSetup:
-    """Make the setup of a plan in its own scenario, or of its mission in a named scenario."""
-    fences = read_named_fences(options.get("fence") or ())
+def _open_plan(
+    source: Plan | str | Path,
+    options: MissionOptions,
+    program: Path | None,
+    engine: EngineChoice,
+    fences: NamedFences,
+    terrain: str | None,
+) -> FlightSetup:
+    """Make the setup of a plan in its own scenario, or of its mission in a named scenario.
+
+    terrain: elevation file that replaces the terrain of the plan; None keeps the terrain.
+    """
     named_world = options.get("scenario")
-    terrain = _terrain_option(options)
     if not isinstance(source, Plan):
         plan = read_plan(check_mission_exists(Path(source)), terrain=terrain)
         file = str(source)
@@ -106,17 +115,11 @@ def _open_plan(source: Plan | str | Path, options: MissionOptions, program: Path
     mission = fences.add_to_mission(mission_of_plan(plan, airframe, file))
     chosen_seed = plan.seed if seed is None else seed
     if named_world is None:
-        return make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
+        return make_setup(scenario, airframe, mission, chosen_seed, plan=plan, engine=engine)
     # The plan's waypoints are in the map coordinates of its own scenario.  Therefore its mission items are flown in
     # another scenario.
     scenario = fences.add_to_scenario(load_scenario_with_options(named_world, options, program))
-    return make_setup(scenario, load_airframe(scenario), mission, chosen_seed)
-
-
-def _terrain_option(options: MissionOptions) -> str | None:
-    """Return the option `terrain` as text, or None if it is not given."""
-    terrain = options.get("terrain")
-    return None if terrain is None else str(terrain)
+    return make_setup(scenario, load_airframe(scenario), mission, chosen_seed, engine=engine)
 
 
 def check_mission_exists(path: Path) -> Path:
@@ -190,11 +193,12 @@ def make_setup(
     plan: Plan | None = None,
     placed: PlacedMission | None = None,
     fdm_hz: Literal[60, 120] = FDM_HZ,
+    engine: EngineChoice = "auto",
 ) -> FlightSetup:
     """Make the setup of a mission's flight in a scenario.
 
     placed: the mission placed on the map of the scenario, if already computed.
-    fdm_hz: step rate of JSBSim, Hz.
+    fdm_hz: step rate of JSBSim, Hz.  engine: flight model that flies.
     Raises MissionError for a mission without a valid route, and for a fence without valid zones.
     """
     # A fence without valid zones could not be judged.
@@ -236,6 +240,7 @@ def make_setup(
         nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
         fdm_hz=fdm_hz,
+        engine=engine,
     )
 
 

@@ -1,5 +1,6 @@
 """Plan, fly, record and judge a mission, with one function for each stage."""
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.measures.energy import reason_not_to_start
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
@@ -24,9 +26,8 @@ from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
-from planfly.workflow.reference_flights import FlyReference, judge_with_reference_flights
+from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
-from planfly.workflow.trial_flight import reason_not_to_start
 from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
@@ -77,30 +78,64 @@ class OffNominal:
     start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class JudgedFlight:
-    """A flight from its first tick to its verdict.
+@dataclass(frozen=True, slots=True, repr=False)
+class FlownMission:
+    """Result of `planfly.fly`: a flight from its first tick to its verdict.
 
-    setup: the setup, with the program that flew, if any.
-    requirements: the route requirements by which the flight was judged.
-    track: the recorded rows, or all rows if there is no log; empty for a flight that could not start.
+    setup: all inputs of the flight, with the program that flew, if any.
+    track: the recorded rows, or all rows if there is no log; empty if the flight could not start.
+    verdict: verdict on the rows of `track`, with a finding for every rule and place.
     ended: "completed", or the reason for an early end.
-    verdict: the verdict on the rows of `track`.
     events: entries of the log in addition to the rows.
-    engine: flight model that flew, and the reason; "" for a flight that did not start.
+    log: the file of the flight log; None if no log was requested or nothing was flown.
+    autopilot_log: the autopilot program's own log, next to the flight log, if such a program flew.
+    returns: returns from a few points of the flight, as recorded in the log; None without a log.
+    engine: flight model that flew, and the reason; "" if nothing was flown.
     reference: the results of reference flights; None if none were flown.
-    returns: returns from a few points of the flight; None if they were not requested.
     """
 
     setup: FlightSetup
-    requirements: RouteRequirements
     track: Track
-    ended: str
     verdict: Verdict
-    events: tuple[LogEvent, ...]
+    ended: str
+    events: tuple[LogEvent, ...] = ()
+    log: Path | None = None
+    autopilot_log: Path | None = None
+    returns: ReturnSummary | None = None
     engine: str = ""
     reference: ReferenceFlights | None = None
-    returns: ReturnSummary | None = None
+
+    @property
+    def mission(self) -> Mission:
+        """Mission that was flown, read from a file or made from a plan."""
+        return self.setup.mission
+
+    @property
+    def plan(self) -> Plan | None:
+        """Plan that was flown; None for a mission file."""
+        return self.setup.plan
+
+    @property
+    def flyable(self) -> bool:
+        """True if the verdict is flyable."""
+        return self.verdict.flyable
+
+    @property
+    def returns_line(self) -> str:
+        """One line on returns from a few points of the flight; "" for a mission without a home."""
+        return self.return_summary.line
+
+    @property
+    def return_summary(self) -> ReturnSummary:
+        """Returns from a few points of the flight; without a log they are computed at each call."""
+        return return_summary(self.setup, self.track) if self.returns is None else self.returns
+
+    def __repr__(self) -> str:
+        return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
+
+    def _repr_html_(self) -> str:
+        """Return the HTML that a notebook shows."""
+        return self.verdict._repr_html_() + self.track._repr_html_()
 
 
 def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
@@ -133,7 +168,7 @@ def fly_and_judge(
     returns: bool = False,
     findings_only: bool = False,
     limits: FlightLimits = _DEFAULT_LIMITS,
-) -> JudgedFlight:
+) -> FlownMission:
     """Fly a setup, record the flight if a log is named, and judge it.
 
     log: file for the flight log; None writes no log.
@@ -141,13 +176,12 @@ def fly_and_judge(
     autopilot: the program of ArduPlane or PX4 that flies instead of planfly's simulated autopilot; its own log is kept
     next to the flight log.
     off_nominal: differences between the flight and the assumptions of plan and guidance; ignored if a program flies.
-    reference: cases in which reference flights are flown, see
-    `planfly.workflow.reference_flights.judge_with_reference_flights`.
+    reference: cases in which reference flights are flown, see `planfly.workflow.reference_flights.explain_verdict`.
     returns: True judges returns from a few points, and draws them in the log.  Without a log no returns are judged.
     findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
     limits: limits of the flight time and of the size of the log.
 
-    If the flight cannot start, or `planfly.workflow.trial_flight.reason_not_to_start` gives a reason not to start it,
+    If the flight cannot start, or `logs.verdict.measures.energy.reason_not_to_start` gives a reason not to start it,
     the result has no row and no log; its verdict covers the route and says that the flight did not start.  Raises
     FlightError if the catalog does not contain the setup's aircraft, or if a program does not fly the mission to its
     end; then no log is left.
@@ -182,7 +216,7 @@ class _FlightTask:
     findings_only: bool
 
 
-def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
+def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAutopilot) -> FlownMission:
     """Fly a setup with an autopilot program, keep the program's own log, and judge the flight.
 
     Raises FlightError, after removing the flight log, if the program does not fly the mission to its end.
@@ -196,7 +230,9 @@ def _fly_with_program(task: _FlightTask, setup: FlightSetup, program: ProgramAut
                 task.log.unlink(missing_ok=True)
             raise
         if task.log is not None:
-            flight.keep_log(task.log.with_suffix(program.log_suffix))
+            program_log = task.log.with_suffix(program.log_suffix)
+            flight.keep_log(program_log)
+            judged_flight = replace(judged_flight, autopilot_log=program_log if judged_flight.log else None)
     return judged_flight
 
 
@@ -209,22 +245,47 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
     return log.with_suffix(program_class_for(program).log_suffix)
 
 
-def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:
+def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: Airborne) -> FlownMission:
     """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
-    if task.log is None:
-        track, end_reason = _simulate_and_record(task, flight, None)
-        return _judge_track(task, requirements, track, end_reason, flight.engine)
-    with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
-        track, recorder.end_reason = _simulate_and_record(task, flight, recorder)
-        rows = thin_track(track, task.every)
-        judged_flight = _judge_track(task, requirements, rows, recorder.end_reason, flight.engine)
-        for event in judged_flight.events:
-            recorder.event(event.time, event.text, event.level)
-        summary = return_summary(flight.setup, judged_flight.track) if task.returns else None
-        drawn_returns = None if summary is None else summary.drawn_returns_without_glides()
-        recorder.finish(judged_flight.ended, judged_flight.verdict, judged_flight.reference, drawn_returns)
-    return replace(judged_flight, returns=summary)
+    with ExitStack() as open_logs:
+        recorder = None
+        if task.log is not None:
+            recorder = open_logs.enter_context(CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S))
+        track, end_reason = _simulate_and_record(task, flight, recorder)
+        if recorder is not None:
+            recorder.end_reason, track = end_reason, thin_track(track, task.every)
+        reference_flights, summary = None, None
+        verdict = judge_flight(
+            requirements.setup, track, end_reason, requirements=requirements, findings_only=task.findings_only
+        )
+        is_requested = task.reference == "always"
+        if is_requested or (task.reference == "failed" and verdict.failed):
+            verdict, reference_flights = explain_verdict(
+                requirements, task.aircraft, verdict, is_requested=is_requested
+            )
+        end_time = float(track.time[-1]) if len(track) else 0.0
+        events = (
+            LogEvent(0.0, f"flight model: {flight.engine}", "info"),
+            LogEvent(end_time, f"flight ended: {end_reason}", "info" if end_reason == "completed" else "error"),
+        )
+        if recorder is not None:
+            for event in events:
+                recorder.event(event.time, event.text, event.level)
+            summary = return_summary(flight.setup, track) if task.returns else None
+            drawn_returns = None if summary is None else summary.drawn_returns_without_glides()
+            recorder.finish(end_reason, verdict, reference_flights, drawn_returns)
+    return FlownMission(
+        requirements.setup,
+        track,
+        verdict,
+        end_reason,
+        events,
+        task.log if len(track) else None,
+        returns=summary,
+        engine=flight.engine if len(track) else "",
+        reference=reference_flights,
+    )
 
 
 def _simulate_and_record(task: _FlightTask, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
@@ -249,7 +310,7 @@ def _simulate_and_record(task: _FlightTask, flight: Airborne, recorder: CrashSaf
 
 def _judge_unflown(
     requirements: RouteRequirements, log: Path | None, end_reason: str, reference: FlyReference
-) -> JudgedFlight:
+) -> FlownMission:
     """Judge a flight that did not start, and remove an earlier flight's log at the path `log`."""
     if log is not None:
         log.unlink(missing_ok=True)
@@ -257,22 +318,4 @@ def _judge_unflown(
     verdict = judge_flight(setup, track, end_reason, requirements=requirements)
     if reference != "never":
         verdict = with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))
-    return JudgedFlight(setup, requirements, track, end_reason, verdict, ())
-
-
-def _judge_track(
-    task: _FlightTask, requirements: RouteRequirements, track: Track, end_reason: str, engine: str
-) -> JudgedFlight:
-    """Judge the recorded track of a flight, with reference flights unless only findings are requested."""
-    end_time = float(track.time[-1]) if len(track) else 0.0
-    events = (
-        LogEvent(0.0, f"flight model: {engine}", "info"),
-        LogEvent(end_time, f"flight ended: {end_reason}", "info" if end_reason == "completed" else "error"),
-    )
-    if task.findings_only:
-        verdict = judge_flight(requirements.setup, track, end_reason, requirements=requirements, findings_only=True)
-        return JudgedFlight(requirements.setup, requirements, track, end_reason, verdict, events, engine)
-    verdict, reference_flights = judge_with_reference_flights(
-        requirements, task.aircraft, track, end_reason, fly=task.reference
-    )
-    return JudgedFlight(requirements.setup, requirements, track, end_reason, verdict, events, engine, reference_flights)
+    return FlownMission(setup, track, verdict, end_reason)

@@ -11,9 +11,8 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_FOLLOWING_ERROR, PITCH_LIMIT_TIME, Finding
-from logs.verdict.judge_flight import judge_flight, with_reference
+from logs.verdict.judge_flight import with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_airspeed_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import most_urgent_failure
@@ -136,7 +135,7 @@ def judge_airframe_flight(
 
     The flight has the same true airspeeds as a flight by ArduPlane.  ArduPlane treats airspeeds as equivalent
     airspeeds, which are higher true airspeeds at a higher altitude.
-    should_abort: see `judge_with_reference_flights`.
+    should_abort: see `explain_verdict`.
     """
     airframe_route = true_airspeed_route(setup)
     trial = Trial(
@@ -158,7 +157,7 @@ def find_deciding_parameter(
     """Find an autopilot parameter that makes a failed flight pass at another value, or return None.
 
     verdict: verdict on the flight with the setup's own parameters.
-    should_abort: see `judge_with_reference_flights`.  This takes about ten flights with the simulated autopilot.  For
+    should_abort: see `explain_verdict`.  This takes about ten flights with the simulated autopilot.  For
     the flight of an autopilot program, the result is None unless the simulated autopilot fails, too.
     """
     if setup.autopilot.parameters is None or verdict.flies:
@@ -214,41 +213,36 @@ def passes_with_margin(trial_findings: Sequence[Finding], failed_findings: Seque
     return True
 
 
-# Cases in which reference flights are flown.
+# Cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all pass.
 FlyReference = Literal["never", "failed", "always"]
 
 
-def judge_with_reference_flights(
+def explain_verdict(
     requirements: RouteRequirements,
     aircraft: Aircraft,
-    track: Track,
-    end_reason: str,
+    verdict: Verdict,
     *,
-    fly: FlyReference = "failed",
+    is_requested: bool = False,
     should_abort: AbortCheck = never_abort,
 ) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge a flight; explain the verdict by reference flights, and try its suggestions.
+    """Explain the verdict on a flight by reference flights, and try its suggestions.
 
     The reference flights do not change the verdict's answer.
 
     requirements: the route requirements of the flown setup.
-    track, end_reason: the flight, and the reason for its end.
-    fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
-    pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.  A failed flight
-    that is too long for `planfly.workflow.trial_flight.max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs,
-    has none either.
+    is_requested: True if the reference flight is flown however long it is.  A flight of planfly's own guidance has no
+    reference flight, but its suggestions are tried.  A flight that is too long for
+    `planfly.workflow.trial_flight.max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs, has none either
+    unless it is requested.
     should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict
     contains the results up to that moment.
     """
     setup = requirements.setup
-    verdict = judge_flight(setup, track, end_reason, requirements=requirements)
-    if fly == "never" or (fly == "failed" and not verdict.failed):
-        return verdict, None
     reference = ReferenceFlights(tried=() if verdict.failed else None)
     with suppress(TrialAborted):
         # planfly's guidance does not return by itself, so that its flight does not explain such a return.
         is_only_return = bool(verdict.failed) and all(finding.rule == "return" for finding in verdict.failed)
-        is_affordable = fly == "always" or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
+        is_affordable = is_requested or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
         if setup.autopilot.level != "airframe" and not is_only_return and is_affordable:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
         is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS

@@ -15,7 +15,7 @@ from itertools import islice
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
-from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
+from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import (
     FAR_MOVE_DISTANCE_M,
@@ -27,6 +27,7 @@ from logs.verdict.places import (
     TriedSuggestions,
 )
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict

@@ -4,23 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from aircraft.catalog import Aircraft
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, TrackBuilder, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.measures.energy import predicted_energy
+from logs.verdict.measures.energy import reason_not_to_start
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
 from planfly.workflow.crash_safe_log import predicted_seconds
 from world.errors import StartError
 
-# A mission is not flown if its predicted energy exceeds this multiple of the energy carried, because the flight would
-# show nothing new.
-MAX_ENERGY_RATIO = 2.0
 # Longest predicted time of all flights that explain one verdict, reference flights and trial flights, s of flight.
 MAX_EXPLAINING_TIME_S = 6 * 3600.0
 
@@ -90,21 +85,3 @@ def max_explaining_flights(setup: FlightSetup) -> int:
     True
     """
     return int(MAX_EXPLAINING_TIME_S / predicted_seconds(setup))
-
-
-def reason_not_to_start(requirements: RouteRequirements) -> str:
-    """Return the reason not to start a flight, or "" if it may start.
-
-    A flight is not started if its predicted energy exceeds `MAX_ENERGY_RATIO` times the energy carried.  The prediction
-    is skipped if even full power throughout the flight would not exceed this energy.
-    """
-    setup = requirements.setup
-    duration = setup.path.length / float(setup.demanded_route.leg_airspeeds.min())
-    full_power = setup.envelope.power_full
-    full_energy = float(np.nanmax(full_power, initial=0.0)) * duration / 3600.0
-    if full_energy <= MAX_ENERGY_RATIO * setup.battery:
-        return ""
-    energy_ratio = predicted_energy(requirements)[0] / setup.battery
-    return (
-        f"not started: it takes {energy_ratio:.0f} times the energy carried" if energy_ratio > MAX_ENERGY_RATIO else ""
-    )

@@ -31,10 +31,10 @@ from flight.guidance.gains import load_gains
 from flight.guidance.path import profile_at, project
 from flight.mission.ground_ways import TakeOff
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
+from flight.simulation.airborne import Release, default_gear, find_release, release
 from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S
-from flight.simulation.start import Release, default_gear, find_release, release
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,

@@ -14,10 +14,10 @@ import numpy as np
 
 from flight.simulation.setup import (
     Damage,
+    DataKind,
     FlightSetup,
     ImportedLog,
     MissingItems,
-    Quantity,
     RowFaults,
     VerticalDatum,
 )
@@ -25,10 +25,9 @@ from flight.simulation.track import Track
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, judging_conditions
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
-from logs.verdict.judge_geometry import track_findings
 from logs.verdict.places import FLIGHT, LevelAnswer, Place
 from logs.verdict.rule_words import RULE_WORDS
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rules.registry import RULES, track_findings
 from logs.verdict.summary import headline, undecided_text
 from logs.verdict.tolerances import MAX_UNSEEN_TIME_S
 from logs.verdict.verdict import Verdict
@@ -223,7 +222,7 @@ def _start_time_text(source: ImportedLog) -> str:
 
 
 # Name of each quantity in a message about a log without it.
-_QUANTITY_LABELS: dict[Quantity, str] = {
+_QUANTITY_LABELS: dict[DataKind, str] = {
     "heights": "height",
     "airspeed": "airspeed",
     "attitude": "attitude",
@@ -233,7 +232,7 @@ _QUANTITY_LABELS: dict[Quantity, str] = {
     "velocity": "velocity",
 }
 # Track columns of quantities.
-_TRACK_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
+_TRACK_COLUMNS: dict[DataKind, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
 _DATUM_REASONS = {
     "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
     "pressure": "the log's heights are pressure altitudes, above the 1013.25 hPa level",
@@ -384,7 +383,7 @@ def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding)
     return finding
 
 
-def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
+def _missing_values_text(legs: FlownLegs, quantity: DataKind) -> str:
     """Describe the rows of a stretch without a value of a quantity; return "" if every row has one."""
     values = getattr(legs.aligned.track, _TRACK_COLUMNS[quantity])
     is_missing = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)

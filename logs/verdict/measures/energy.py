@@ -8,6 +8,10 @@ import numpy as np
 from aircraft.envelope import ground_speed
 from logs.verdict.measures.route_requirements import RouteRequirements
 
+# A mission is not flown if its predicted energy exceeds this multiple of the energy carried, because the flight would
+# show nothing new.
+MAX_ENERGY_RATIO = 2.0
+
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
     """Predict the energy (Wh) and peak current (A) of steady flight along a route; NaN if the power is not known.
@@ -52,3 +56,21 @@ def air_climb_angle(requirements: RouteRequirements, leg: int, speed: float, alt
         ground_track_speed = ground_speed(speed * math.cos(angle), tailwind, crosswind)
         angle = math.asin(min(1.0, max(-1.0, slope * ground_track_speed / speed)))
     return angle
+
+
+def reason_not_to_start(requirements: RouteRequirements) -> str:
+    """Return the reason not to start a flight, or "" if it may start.
+
+    A flight is not started if its predicted energy exceeds `MAX_ENERGY_RATIO` times the energy carried.  The prediction
+    is skipped if even full power throughout the flight would not exceed this energy.
+    """
+    setup = requirements.setup
+    duration = setup.path.length / float(setup.demanded_route.leg_airspeeds.min())
+    full_power = setup.envelope.power_full
+    full_energy = float(np.nanmax(full_power, initial=0.0)) * duration / 3600.0
+    if full_energy <= MAX_ENERGY_RATIO * setup.battery:
+        return ""
+    energy_ratio = predicted_energy(requirements)[0] / setup.battery
+    return (
+        f"not started: it takes {energy_ratio:.0f} times the energy carried" if energy_ratio > MAX_ENERGY_RATIO else ""
+    )

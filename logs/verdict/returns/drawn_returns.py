@@ -19,7 +19,6 @@ from logs.verdict.returns.judge_returns import (
     ReturnWorld,
     SimulatedReturn,
     heights_above_ground,
-    simulate_returns,
     worst_first_key,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -151,7 +150,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     if not drawn_ranges:
         return ()
     targets = [return_range.worst.target for return_range in drawn_ranges]
-    _, paths = simulate_returns(world, starts.subset(rows), targets, store_paths=True)
+    paths = world.fly(starts.subset(rows), targets, store_paths=True).tracks
     return tuple(
         WorstReturn(drawn_range, path, _marked_position(world, drawn_range.worst, path))
         for drawn_range, path in zip(drawn_ranges, paths, strict=True)

@@ -9,7 +9,6 @@ path, and stay out of kill spheres.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Literal, NamedTuple
@@ -17,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SimulatedReturns
+from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_GROUND_IMPACT
 from flight.mission.placing import landing_positions
 from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
@@ -342,7 +341,8 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     targets = [world.target(row) for row in starts.rows]
     if not world.is_simulated or not world.autopilot.returns.flies_without_engine:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
-    outcomes = fly_without_engine(world, starts, targets).results
+    # A return that continues with a landing is simulated only up to its loiter.
+    outcomes = world.fly(starts, targets, engine_out=True).results
     return [_engine_out_return(world, target, row) for target, row in zip(targets, outcomes, strict=True)]
 
 
@@ -359,20 +359,6 @@ def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> Pos
         return scenario.wind_velocities(np.column_stack([east, north, amsl]), time).reshape(-1, len(altitudes), 2)
 
     return winds_at
-
-
-def fly_without_engine(
-    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], *, store_paths: bool = False
-) -> SimulatedReturns:
-    """Simulate the autopilot's own return without thrust from n starts to their targets.
-
-    A return that continues with a landing is simulated only up to its loiter.
-
-    store_paths: True to store the paths.
-    """
-    return world.fly(
-        starts.rows, targets, world.aircraft, world.environment, store_positions=store_paths, engine_out=True
-    )
 
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:

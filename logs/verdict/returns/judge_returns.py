@@ -20,7 +20,7 @@ from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.autopilot import Autopilot, Parameters
-from flight.autopilots.parts import Cause, FlyReturns, ReturnMission
+from flight.autopilots.parts import Cause, ReturnMission
 from flight.autopilots.point_mass import PointMass, make_point_mass
 from flight.autopilots.px4.parameters import FROM_ARDUPILOT, Px4Parameters
 from flight.autopilots.simulated_returns import (
@@ -29,6 +29,7 @@ from flight.autopilots.simulated_returns import (
     RETURN_OFF_TERRAIN,
     RETURN_TIMEOUT,
     ReturnEnvironment,
+    SimulatedReturns,
     make_return_environment,
 )
 from flight.mission.placing import landing_starts, return_points
@@ -320,13 +321,33 @@ class ReturnWorld:
         """Required minimum height above ground, m."""
         return self.setup.limits.min_clearance
 
-    @property
-    def fly(self) -> FlyReturns:
-        """Function that simulates the autopilot's RTLs.  Raises ValueError for an autopilot without an RTL."""
+    def fly(
+        self,
+        starts: ReturnStarts,
+        targets: Sequence[ReturnTarget],
+        *,
+        store_paths: bool = False,
+        abort_limits: tuple[Floats, Floats] | None = None,
+        engine_out: bool = False,
+    ) -> SimulatedReturns:
+        """Simulate the autopilot's RTLs from n starts to their targets.
+
+        store_paths: True to store the paths.
+        abort_limits, engine_out: see `flight.autopilots.parts.FlyReturns`.
+        Raises ValueError for an autopilot without an RTL.
+        """
         fly = self.autopilot.returns.fly
         if fly is None:
             raise ValueError(f"{self.autopilot.title} has no RTL")
-        return fly
+        return fly(
+            starts.rows,
+            targets,
+            self.aircraft,
+            self.environment,
+            store_positions=store_paths,
+            abort_limits=abort_limits,
+            engine_out=engine_out,
+        )
 
     @property
     def min_airspeed(self) -> float:
@@ -446,39 +467,31 @@ def returning_title(setup: FlightSetup) -> str:
     return ArduPlane.title if autopilot.returns.fly is None else autopilot.title
 
 
-def make_return_world(setup: FlightSetup) -> ReturnWorld:
+def make_return_world(setup: FlightSetup, other_law: Autopilot | None = None) -> ReturnWorld:
     """Collect the data with which returns to launch from a setup's mission are simulated.
 
-    The control law is that of the setup's autopilot, or of ArduPlane if that autopilot has no RTL.
+    other_law: autopilot whose RTL is simulated; None for the setup's autopilot, or ArduPlane if that has no RTL.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
     """
-    autopilot = setup.autopilot.model
-    if autopilot.returns.fly is not None:
-        return _make_world(setup, autopilot)
     aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
-    return replace(
-        _make_world(setup, ArduPlane(ArduPilotParameters.load(aircraft))),
-        stands_in=True,
-        has_other_law=autopilot.parameters is not None,
-    )
-
-
-def _make_world(setup: FlightSetup, autopilot: Autopilot) -> ReturnWorld:
-    """Collect the data for simulated returns by an autopilot that has an RTL; see `make_return_world`."""
+    law, has_other_law = other_law or setup.autopilot.model, other_law is not None
+    if law.returns.fly is None:
+        law, has_other_law = ArduPlane(ArduPilotParameters.load(aircraft)), law.parameters is not None
     return_positions = return_points(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not return_positions:
         source = setup.mission.source
         message = f"{source}: home: missing, so no return can be simulated"
         raise MissionError(message, file=source, field="home")
-    aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return ReturnWorld(
         setup,
-        autopilot,
+        law,
         return_positions[0],
         return_positions[1:],
         make_point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind, setup.scenario.geo_map),
         make_return_environment(setup.scenario),
         judged_airspace(setup),
+        stands_in=other_law is not None or setup.autopilot.model.returns.fly is None,
+        has_other_law=has_other_law,
         landings=landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
     )
 
@@ -492,7 +505,7 @@ def without_engine_world(world: ReturnWorld) -> ReturnWorld:
         return world
     aircraft = find_logged_aircraft(world.setup.aircraft, world.scenario.flight.aircraft)
     parameters = _with_px4_airspeeds(ArduPilotParameters.load(aircraft), world.autopilot.parameters)
-    return replace(_make_world(world.setup, ArduPlane(parameters)), stands_in=True, has_other_law=True)
+    return make_return_world(world.setup, ArduPlane(parameters))
 
 
 def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None) -> ArduPilotParameters:
@@ -610,33 +623,6 @@ def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
 _NO_PATH: Floats = np.zeros((0, 3))
 
 
-def simulate_returns(
-    world: ReturnWorld,
-    starts: ReturnStarts,
-    targets: Sequence[ReturnTarget],
-    abort_limits: tuple[Floats, Floats] | None = None,
-    *,
-    store_paths: bool = False,
-) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns from n starts to their targets.
-
-    Returns the results, (n,) of dtype `RETURN_RESULT`, and the paths; the paths are empty without zones.
-
-    abort_limits: as in `flight.autopilots.parts.FlyReturns`.
-    store_paths: True to return the paths even without zones.
-    """
-    store_paths = store_paths or bool(world.airspace.zones)
-    flown = world.fly(
-        starts.rows,
-        targets,
-        world.aircraft,
-        world.environment,
-        store_positions=store_paths,
-        abort_limits=abort_limits,
-    )
-    return flown.results, flown.tracks
-
-
 def simulate_judged_returns(
     world: ReturnWorld,
     starts: ReturnStarts,
@@ -653,7 +639,7 @@ def simulate_judged_returns(
     min_heights: required heights above ground, m, (n,).
     min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
         None to simulate every return to its end.
-    Returns results and paths as `simulate_returns` does.
+    Returns the results, (n,) of dtype `RETURN_RESULT`, and the paths; the paths are empty without zones.
     """
     has_approach = np.array(
         [target.landing is not None and bool(target.landing.next_stops) for target in targets], dtype=np.bool_
@@ -661,23 +647,24 @@ def simulate_judged_returns(
     abort_limits = (
         None if min_sphere_distances is None else (np.where(has_approach, -math.inf, min_heights), min_sphere_distances)
     )
-    results, paths = simulate_returns(world, starts, targets, abort_limits)
+    flown = world.fly(starts, targets, store_paths=bool(world.airspace.zones), abort_limits=abort_limits)
+    results = flown.results
     indices = np.flatnonzero((results["clearance"] < min_heights) & has_approach)
     if not indices.size:
-        return results, paths
+        return results, flown.tracks
     short_targets = [
         targets[k]._replace(landing=landing._replace(next_stops=()))
         for k in indices.tolist()
         if (landing := targets[k].landing) is not None
     ]
-    short_results, _ = simulate_returns(world, starts.subset(indices), short_targets)
+    short_results = world.fly(starts.subset(indices), short_targets).results
     results = results.copy()
     for name in ("clearance", "clearance_east", "clearance_north", "clearance_up"):
         values = results[name]
         # A return that meets the ground keeps the place where it does.
         is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
         values[indices[is_airborne]] = short_results[name][is_airborne]
-    return results, paths
+    return results, flown.tracks
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:

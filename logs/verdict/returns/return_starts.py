@@ -11,9 +11,9 @@ from flight.autopilots.simulated_returns import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.measures.energy import leg_energies, predicted_energy
-from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
 from logs.verdict.measures.route_requirements import RouteRequirements, find_leg_winds, route_requirements
+from logs.verdict.measures.track_alignment import ground_phase_rows
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, saturated_rows
-from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_sweeps import passages
+from logs.verdict.measures.track_alignment import ground_phase_rows
 from logs.views.report.text import NOTHING, number, quantity
 from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats

@@ -14,10 +14,9 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import make_finding
 from logs.verdict.judge_flight import _disagreements, judge_flight, judge_geometry
-from logs.verdict.judge_geometry import geometric_findings
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Disagreement, Place
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rules.registry import RULES, geometric_findings
 from logs.verdict.verdict import verdict_json
 from tests.logs.verdict.judging import ROUTE, SILENT_ON_WAYPOINTS, failing, judge, leg, of, waypoint
 from tests.soak import scaled

@@ -5,11 +5,10 @@ from dataclasses import replace
 from flight.simulation.setup import FlightSetup
 from logs.recording.example_log import example_log
 from logs.verdict.judge_flight import judge_plan_only
-from logs.verdict.judge_geometry import flown_findings
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import PLAN
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rules.registry import RULES, flown_findings
 from logs.verdict.verdict import verdict_json
 from tests.logs.verdict.judging import bad_plan, failing
 

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from logs.verdict import judge_geometry as judge_geometry_module
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.rules import registry
 from tests.logs.verdict.judging import leg, missile, of, suggested
 from tests.synthetic import make_scenario, make_setup
 
@@ -73,7 +73,7 @@ def test_no_suggestions_for_more_findings_than_one_change_can_mend(
     limit: int, has_suggestions: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Three legs climb at 16 degrees, and the aircraft at 13.7."""
-    monkeypatch.setattr(judge_geometry_module, "MAX_SUGGESTED_FINDINGS", limit)
+    monkeypatch.setattr(registry, "MAX_SUGGESTED_FINDINGS", limit)
     rise = 4000.0 * math.tan(math.radians(16.0))
     verdict = judge_geometry(make_setup([[0, 4000 * k, 300 + rise * k] for k in range(4)]))
     slopes = [of(verdict, "slope", leg(k)) for k in range(3)]

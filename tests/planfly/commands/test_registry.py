@@ -14,7 +14,7 @@ def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
     modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - {"__init__", "registry"}
     assert modules == {command.module or command.name for command in COMMANDS}
     for command in COMMANDS:
-        function, options = find_command(command.name), command.load_parser_function()
+        function, options = find_command(command.name), command.load("add_{}_parser")
         assert function.__module__ == options.__module__
         assert (function.__doc__ or "").strip()
 

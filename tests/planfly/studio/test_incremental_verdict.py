@@ -13,8 +13,8 @@ from flight.mission import edits
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import ROUTE_POINT, Route
 from logs.verdict.findings import Finding
-from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.rules.registry import place_findings
 from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.moved_route import update_moved_route

@@ -9,9 +9,9 @@ from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Suggestion
 from logs.verdict.verdict import Verdict
-from planfly.api.flying import FlownMission
 from planfly.workflow.apply_suggestion import apply_suggestion, can_apply
 from planfly.workflow.mission_context import JudgedMission, MissionContext
+from planfly.workflow.pipeline import FlownMission
 from tests.failing_missions import draw_failing_mission
 from tests.soak import SOAK, tally
 

@@ -20,9 +20,8 @@ from logs.recording.reader import read_log
 from logs.verdict.judge_flight import judge_geometry
 from planfly.cli import main
 from planfly.flight_logs import is_log
-from planfly.flight_options import MissionOptions
+from planfly.flight_options import MissionOptions, read_named_fences
 from planfly.live.served_flights import ServeOptions, load_served_scenario
-from planfly.named_fences import read_named_fences
 from planfly.plan_fence import add_plan_fence
 from planfly.workflow.airframe import airframe_for_setup, load_airframe
 from planfly.workflow.make_plan import make_plan

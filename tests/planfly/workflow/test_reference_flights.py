@@ -19,18 +19,20 @@ from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import PITCH_LIMIT_TIME, Fact, Finding, make_finding
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Place, ReferenceFlights
-from logs.verdict.verdict import verdict_json
+from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
 from planfly.live.served_flights import ServedLog
 from planfly.workflow import reference_flights, suggestion_trials
-from planfly.workflow.pipeline import JudgedFlight, fly_and_judge
+from planfly.workflow.pipeline import FlownMission, fly_and_judge
 from planfly.workflow.reference_flights import (
+    explain_verdict,
     find_deciding_parameter,
     find_passing_parameter,
     judge_airframe_flight,
-    judge_with_reference_flights,
     passes_with_margin,
 )
 from tests.setups import setup_maker
@@ -236,12 +238,12 @@ def over_a_hill(spare: float) -> FlightSetup:
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[JudgedFlight, Path]:
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlownMission, Path]:
     setup, log = over_a_hill(4.7), tmp_path_factory.mktemp("hill") / "flight.mcap"
     return fly_and_judge(setup, log), log
 
 
-def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path]) -> None:
+def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[FlownMission, Path]) -> None:
     """2.5 m/s of climb, three seconds late, are 7.5 m: too low by 3 m; 1.2 m are the law's own error, and a lag
     of 3.5 / 2.5 = 1.4 s would pass."""
     judged, _ = flown
@@ -271,7 +273,7 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path])
 
 
 def test_a_served_flight_tells_stations_which_parameter_decides(
-    flown: tuple[JudgedFlight, Path], tmp_path: Path
+    flown: tuple[FlownMission, Path], tmp_path: Path
 ) -> None:
     judged, _ = flown
     served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT, AUTO)
@@ -285,7 +287,7 @@ def test_a_served_flight_tells_stations_which_parameter_decides(
 
 @pytest.mark.parametrize("patience", [0, 300])
 def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
-    patience: int, flown: tuple[JudgedFlight, Path], tmp_path: Path
+    patience: int, flown: tuple[FlownMission, Path], tmp_path: Path
 ) -> None:
     """At once, and after the airframe's flight of some 200 s: nothing is lost but what was not known yet."""
     judged, _ = flown
@@ -304,18 +306,22 @@ def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
     assert log.reference == ReferenceFlights(airframe, tried=())
 
 
+def unexplained(flown: FlownMission) -> Verdict:
+    return judge_flight(flown.setup, flown.track, flown.ended)
+
+
 @pytest.mark.parametrize(("affordable", "has_airframe", "has_deciding"), [(1, False, False), (2, True, False)])
 def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
     affordable: int,
     has_airframe: bool,
     has_deciding: bool,
-    flown: tuple[JudgedFlight, Path],
+    flown: tuple[FlownMission, Path],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     judged, _ = flown
     for module in (reference_flights, suggestion_trials):
         monkeypatch.setattr(module, "max_explaining_flights", lambda _: affordable)
-    verdict, reference = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended)
+    verdict, reference = explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
     assert not verdict.flyable
     assert reference is not None
     assert (reference.airframe is not None, reference.deciding is not None) == (has_airframe, has_deciding)
@@ -323,17 +329,17 @@ def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
 
 @pytest.mark.parametrize(("legs", "has_airframe"), [(0, True), (-1, False)])
 def test_a_failed_flight_with_too_many_legs_has_no_reference_flight(
-    legs: int, has_airframe: bool, flown: tuple[JudgedFlight, Path], monkeypatch: pytest.MonkeyPatch
+    legs: int, has_airframe: bool, flown: tuple[FlownMission, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At the greatest number of legs there is one, and none with a leg more: each judges all legs."""
     judged, _ = flown
-    monkeypatch.setattr(reference_flights, "MAX_TRIED_LEGS", judged.requirements.legs + legs)
-    _, reference = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended)
+    monkeypatch.setattr(reference_flights, "MAX_TRIED_LEGS", route_requirements(judged.setup).legs + legs)
+    _, reference = explain_verdict(route_requirements(judged.setup), AIRCRAFT, unexplained(judged))
     assert reference is not None
     assert (reference.airframe is not None) is has_airframe
 
 
-def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:
+def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[FlownMission, Path]) -> None:
     judged, path = flown
     log = read_log(path)
     assert log.reference == judged.reference
@@ -357,11 +363,11 @@ def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
     assert find_deciding_parameter(setup, AIRCRAFT, usual.verdict) is None
 
 
-def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[JudgedFlight, Path]) -> None:
+def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[FlownMission, Path]) -> None:
     judged, _ = flown
-    alone, none = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended, fly="never")
-    assert none is None
-    assert [(one.place, one.margin) for one in alone.failed] == [
+    alone = fly_and_judge(judged.setup, reference="never")
+    assert alone.reference is None
+    assert [(one.place, one.margin) for one in alone.verdict.failed] == [
         (one.place, one.margin) for one in judged.verdict.failed
     ]
 

@@ -8,6 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from logs.recording.example_log import example_log
+from logs.verdict.measures import energy
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.workflow import trial_flight
 from planfly.workflow.trial_flight import Trial, TrialAborted, max_explaining_flights
@@ -44,8 +45,8 @@ def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
     """A kilowatt all the way takes more than the battery of 0.01 Wh."""
     envelope = replace(SETUP.limits.envelope, power_full=np.array([1000.0]))
     setup = replace(SETUP, battery=0.01, limits=replace(SETUP.limits, envelope=envelope))
-    monkeypatch.setattr(trial_flight, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
-    assert trial_flight.reason_not_to_start(route_requirements(setup)) == reason
+    monkeypatch.setattr(energy, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
+    assert energy.reason_not_to_start(route_requirements(setup)) == reason
 
 
 def test_flights_that_explain_a_verdict_last_six_hours_in_all() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from planfly.named_fences import read_named_fences
+from planfly.flight_options import read_named_fences
 from tests.soak import at_most
 from tests.world.made.made_scenario import SMALL
 from world.airspace import zone_files

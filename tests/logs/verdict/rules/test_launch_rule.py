@@ -11,8 +11,8 @@ from flight.autopilots.autopilot import StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.flown_phases import flown_phases
 from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import flown_phases
 from logs.verdict.suggestions import suggest_better_launch
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved, with_hole
