@@ -59,7 +59,8 @@ def open_flight(
     >>> setup.name, setup.mission.source, setup.scenario.wind.speed
     ('paper-07', 'plan.json', 4.0)
     """
-    fences, named_world = read_named_fences(options.get("fence") or ()), options.get("scenario")
+    fences = read_named_fences(options.get("fence") or ())
+    named_world = options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options.get("terrain"))
     if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
         return _open_plan(source, options, program, engine, fences, terrain)
