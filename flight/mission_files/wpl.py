@@ -253,8 +253,7 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     if gaps:
         warnings.append(
             f"{gaps[0].location}: the sequence numbers have a gap before {gaps[0].item.seq}"
-            f" ({count_text(len(gaps), 'gap')} in all):"
-            f" {numbering_text}"
+            f" ({count_text(len(gaps), 'gap')} in all): {numbering_text}"
         )
     if falling:
         warnings.append(

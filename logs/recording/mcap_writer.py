@@ -149,7 +149,7 @@ class ContainerWriter:
     def pop_new_records(self) -> bytes:
         """Return the records of schemas and channels that no chunk contains yet, for the next chunk.
 
-        The records are returned only once.
+        Each record is returned only once.
         """
         new_records = b"".join(_record_bytes(record) for record in self._unwritten_records)
         self._unwritten_records.clear()

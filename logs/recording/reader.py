@@ -383,7 +383,7 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
 
 
 def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | None, str]:
-    """Return how the flight ended as recorded, or None, and the fault of the record, "" if it has none."""
+    """Return the recorded end of the flight, or None, and the fault of the record; "" without a fault."""
     if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
     data = _parse_object(attachments[RESULT_FILE])
@@ -402,7 +402,7 @@ def _recorded_loss(recovery: bytes) -> str:
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
-    """Return the recorded verdict, or None, and the fault of its attachment, "" if it has none."""
+    """Return the recorded verdict, or None, and the fault of its attachment; "" without a fault."""
     if VERDICT_FILE not in attachments:
         return None, ""
     verdict = _parse_object(attachments[VERDICT_FILE])
@@ -410,7 +410,7 @@ def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None,
 
 
 def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
-    """Return the results of reference flights, or None, and the fault of their attachment, or ""."""
+    """Return the results of reference flights, or None, and the fault of their attachment; "" without one."""
     if REFERENCE_FILE not in attachments:
         return None, ""
     try:

@@ -40,13 +40,12 @@ def shortfall_phrase(noun: str, finding: Finding) -> str:
 
 
 def excess_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)".
+    """Return a phrase such as "slope on leg 0 (14.5° > 14.2°)", with the value of the margin, or else the worse one.
 
-    The phrase states the larger of the planned and the flown value.  If both are within the limit, it states the reason
-    instead.
+    If the value is within the limit, return a phrase with the reason.
     """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
-    worst_value = max(values, key=abs, default=None)
+    worst_value = max(values, key=abs, default=None) if finding.margin is None else finding.value
     limit = finding.effective_limit
     if limit is None or worst_value is None or abs(worst_value) <= abs(limit):
         return reason_phrase(noun, finding)

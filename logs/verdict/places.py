@@ -83,6 +83,9 @@ def numbered_place(place: Place) -> Place:
     return place if place.number is None else replace(place, index=place.number)
 
 
+# Horizontal move of an item that is suggested only if no smaller move passes, m; the detour is up to twice as long.
+FAR_MOVE_DISTANCE_M = 300.0
+
 FLIGHT = Place("flight")
 MISSION = Place("mission")
 PLAN = Place("plan")

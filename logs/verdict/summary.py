@@ -87,7 +87,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> from logs.verdict.places import Place
     >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
-    'slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge, because the aircraft's ...'
+    "slopes on leg 0, to item 1, and leg 1, to item 2, are too close to the limit to judge, because the aircraft's ..."
     """
     open_findings = undecided_findings(findings)
     paths = [
@@ -406,7 +406,7 @@ def _misspelling_lines(parameters: ParameterSet) -> list[str]:
     known_names, stated_names = parameters.table.by_any_name, parameters.by_origin("file")
 
     def is_meant(name: str, known: str) -> bool:
-        """Return True if a name is a misspelled known name; short parts such as P and D count as correct."""
+        """Return True if a name misspells a known name; short parts such as P and D are not compared."""
         parts = set(name.split("_")) ^ set(known.split("_"))
         is_stated = known_names[known][0].name in stated_names
         return not is_stated and is_one_edit(name, known) and min(map(len, parts)) > _LONGEST_SHORT_PART

@@ -4,7 +4,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, RemainingFinding, Suggestion
+from logs.verdict.places import (
+    FAR_MOVE_DISTANCE_M,
+    Change,
+    DecidingParameter,
+    Disagreement,
+    ItemMove,
+    Place,
+    RemainingFinding,
+    Suggestion,
+)
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
 from world.wording import count_text as count_text
@@ -225,6 +234,9 @@ def suggestion_text(suggestion: Suggestion) -> str:
     >>> longer = [Change("length", Place("leg", k), 150.0, 260.0, "m") for k in (1, 2)]
     >>> suggestion_text(tuple(longer))
     'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
+    >>> moves = (ItemMove(3, 0.0, 412.0, 0.0),)
+    >>> suggestion_text((Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m", moves=moves),))
+    'with a move of 412 m, pass town 40 m further north (move item 3 412 m north)'
     """
     if all(change.what == "terrain height" for change in suggestion):
         text = _terrain_height_text(suggestion)
@@ -234,6 +246,9 @@ def suggestion_text(suggestion: Suggestion) -> str:
         text = " and ".join(map(change_text, suggestion))
     moves = [move for change in suggestion for move in change.moves]
     remaining = [finding for change in suggestion for finding in change.remaining]
+    distance = max((math.hypot(move.east, move.north) for move in moves), default=0.0)
+    if distance >= FAR_MOVE_DISTANCE_M:
+        text = f"with a move of {distance:.0f} m, {text}"
     notes = [f"move {moves_text(moves)}"] if moves else []
     notes += [
         f"later in the flight {state}: {', '.join(texts)}"

@@ -209,7 +209,7 @@ def _picture_settings() -> Iterator[None]:
 
 
 def write_png(figure: Figure, path: FilePath) -> None:
-    """Write the figure as a PNG, whole or not at all.  Raises OSError.
+    """Write the figure as a PNG, completely or not at all. Raises OSError.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -352,7 +352,7 @@ def _title_lines(panel: Panel) -> list[str]:
 
 
 def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_numbers: bool) -> None:
-    """Separate the legs by thin lines, and number them above the topmost panel as far as the numbers fit."""
+    """Separate the legs by thin lines, and number them above the topmost panel if the numbers fit."""
     for value, _ in marks[1:]:
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
     if not has_leg_numbers or not marks:
@@ -377,9 +377,9 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_number
 
 
 def _set_place_ticks(axes: Any, panel: Panel) -> None:
-    """Label the horizontal axis by numbers of waypoints or legs, failing ones in the colour of failures.
+    """Label the horizontal axis with waypoint or leg numbers; failing ones have the colour of failures.
 
-    A label that would touch another one is left out, of the failing ones the later one.
+    A label that would touch another label is left out.  Of two failing labels, the later one is left out.
     """
     positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
@@ -403,7 +403,7 @@ def _set_place_ticks(axes: Any, panel: Panel) -> None:
 
 
 def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
-    """Draw the layers of a panel from the lowest, with its limits between bands and lines.
+    """Draw the layers of a panel, the lowest first; its limits lie between bands and lines.
 
     min_zorder: zorder of the lowest layer.
     """

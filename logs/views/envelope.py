@@ -69,8 +69,8 @@ def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
 def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
     """Chart the air-relative path angle and the bank over true airspeed, with their limits.
 
-    Limits apply at the lowest and highest altitude of the route.  Dots are moments of the flight; a pull-up or a gust
-    may exceed the limits for a moment, a leg may not.
+    Limits apply at the lowest and highest altitude of the route.  Dots are moments of the flight.  A pull-up or a gust
+    may exceed the limits for a moment, but a leg must not.
 
     >>> from logs.recording.example_log import example_log
     >>> [panel.title for panel in envelope_chart(example_log().setup, None).panels]

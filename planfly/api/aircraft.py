@@ -139,11 +139,10 @@ def new_aircraft(
         copy_aircraft_folder(Path(folder), source_aircraft, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
-        raise PlanflyError.of_argument(
-            "source",
-            source,
-            f"cannot be combined with `{next(iter(sheet_values))}`, because a copy keeps the numbers of its aircraft",
+        reason = (
+            f"cannot be combined with `{next(iter(sheet_values))}`, because a copy keeps the numbers of its aircraft"
         )
+        raise PlanflyError.of_argument("source", source, reason)
     from planfly.workflow.data_sheets import make_data_sheet_folder, parse_sheet
 
     params = options["params"]

@@ -392,10 +392,10 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
 
 
 def _cruise_speed(source: _SourceContent) -> tuple[float, str]:
-    """Return the cruiseSpeed of a .plan, m/s, and where it comes from.
+    """Return the cruiseSpeed of a .plan, m/s, and its source.
 
-    It is the mission's, or else the airspeed with which planfly flies the mission; without a scenario or a plan, that
-    is the cruise airspeed of the default aircraft.
+    It is the mission's cruise speed, or else the airspeed at which planfly flies the mission.  Without a scenario or a
+    plan, this is the cruise airspeed of the default aircraft.
     """
     if (stated := stated_cruise_speed(source.mission)) is not None:
         return stated, "the mission's"
@@ -410,7 +410,7 @@ def judging_parameters_text(
 ) -> tuple[str, str]:
     """Return a parameter file for take-off, landing and returns, and a description of its content.
 
-    A value with which the autopilot does not arm is left out.
+    Values with which the autopilot would refuse to arm are left out.
 
     has_own_parameters: False if no parameter was given, and the values are planfly's defaults for the mission.
 

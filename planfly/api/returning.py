@@ -157,9 +157,8 @@ class ReturnsResult:
             reflown_text = count_text(len(self.returns.jsbsim_differences), "return")
             verb = "was" if len(self.returns.jsbsim_differences) == 1 else "were"
             notes.append(
-                f"{reflown_text} close to a limit {verb} also flown in JSBSim; the heights of the two"
-                " simulations differ by"
-                f" up to {max_difference:.0f} m"
+                f"{reflown_text} close to a limit {verb} also flown in JSBSim; the heights of the two simulations"
+                f" differ by up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
             notes.append(

@@ -476,8 +476,8 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
     if winds.undecided and any(reasons):
         _, first_text = winds.undecided[0]
         lines.append(
-            f"{word}: {len(winds.undecided)} of {count_text(len(winds.flights), 'flight')} are not judged in full, the"
-            f" first of them because of {first_text}"
+            f"{word}: {len(winds.undecided)} of {count_text(len(winds.flights), 'flight')} are not judged in full;"
+            f" reason of the first: {first_text}"
         )
     all_counts = zip(winds.flight_counts(), winds.undecided_counts(), reasons, strict=True)
     counts = [count for count, undecided_count, reason in all_counts if reason and not undecided_count]
@@ -504,9 +504,8 @@ def _lost_lines(winds: WindsResult) -> list[str]:
         for number in winds.lost[:10]
     )
     return [
-        f"lost      {len(winds.lost)} flights could not be flown, because their workers died; they"
-        " count as not flyable:"
-        f" {flight_texts}"
+        f"lost      {count_text(len(winds.lost), 'flight')} could not be flown, because their workers died; they count"
+        f" as not flyable: {flight_texts}"
     ]
 
 

@@ -467,7 +467,8 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     if summary.lost:
         lost_text = ", ".join(map(str, summary.lost[:10]))
         lines.append(
-            f"  lost    {len(summary.lost)} flights could not be flown, because their workers died: {lost_text}"
+            f"  lost    {count_text(len(summary.lost), 'flight')} could not be flown, because their"
+            f" workers died: {lost_text}"
         )
     return lines + deciding_lines(summary)
 

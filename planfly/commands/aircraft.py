@@ -70,9 +70,7 @@ def add_aircraft_parser(command_line: LineParser) -> None:
             dest="logs",
             metavar="LOG",
             nargs="+",
-            help="identify the aircraft from these logs: .BIN or .tlog of ArduPlane, .ulg of PX4, or a"
-            " table of columns;"
-            " requires planfly[identification]",
+            help="logs to identify from (.BIN, .tlog, .ulg or a table of columns); requires planfly[identification]",
         ),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
@@ -85,9 +83,7 @@ def add_aircraft_parser(command_line: LineParser) -> None:
         complete_aircraft,
     )
     with_completer(
-        log_group.add_argument(
-            "--check", metavar="LOG", help="with --identify: another log, on which the identified aircraft is tested"
-        ),
+        log_group.add_argument("--check", metavar="LOG", help="with --identify: another log, to test the result"),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     log_group.add_argument(

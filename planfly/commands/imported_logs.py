@@ -50,9 +50,8 @@ def add_import_log_parser(command_line: LineParser) -> None:
             dest="files",
             metavar="FILE",
             nargs="+",
-            help="guess a table of columns for these CSV, MAT, Parquet or HDF5 files from names and values,"
-            " and write it"
-            " to LOG for you to check; requires planfly[data-logs]",
+            help="guess a table of columns for these CSV, MAT, Parquet or HDF5 files from names and values, and"
+            " write it to LOG for you to check; requires planfly[data-logs]",
         ),
         file_completer("csv", "mat", "parquet", "h5", "hdf5"),
     )

@@ -64,9 +64,10 @@ def add_plan_parser(command_line: LineParser) -> None:
         metavar="N",
         type=number_parser("front"),
         help=(
-            "plan up to N alternatives (2 to 100) that trade length, exposure to radars, height above ground and "
-            "energy or time against each other; --out is then a folder (default: runs/<name>-seed<N>-front; an "
-            "existing one is replaced)"
+            "plan up to N alternatives (2 to 100), none of which is better than another in all four objectives:"
+            " length, exposure to radars, height above ground, and energy (or time with [planner] "
+            'objective = "time"). --out is then a folder with plan-1.json ..., front.csv, front.json '
+            "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
         ),
     )
     add_flights_option(planning_group)
@@ -76,10 +77,7 @@ def add_plan_parser(command_line: LineParser) -> None:
         file_completer("json"),
     )
     replanning_group.add_argument(
-        "--at-leg",
-        metavar="K",
-        type=number_parser("at_leg"),
-        help="number of the next leg: the legs before leg K have been flown, and are kept",
+        "--at-leg", metavar="K", type=number_parser("at_leg"), help="leg that is flown next; earlier legs are kept"
     )
     replanning_group.add_argument(
         "--add-threat",

@@ -67,9 +67,8 @@ def add_replay_parser(command_line: LineParser) -> None:
         "--speed",
         metavar="X",
         type=number_parser("speed"),
-        help="play X times as fast as real time (default: 1 on a terminal and in Foxglove; as fast as"
-        " needed for a film "
-        "of 20 s; otherwise at once)",
+        help="play X times as fast as real time (default: 1 on a terminal and in Foxglove; as fast as needed for a"
+        " film of 20 s; otherwise at once)",
     )
     part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
     output_group = parser.add_group("other outputs")
@@ -81,9 +80,8 @@ def add_replay_parser(command_line: LineParser) -> None:
     output_group.add_argument(
         "--foxglove",
         action="store_true",
-        help="play the flight to Foxglove on this machine over WebSocket; requires the extra"
-        " planfly[foxglove], and a viewer "
-        "that speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
+        help="play the flight to Foxglove on this machine over WebSocket; requires the extra planfly[foxglove], and"
+        " a viewer that speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
     )
     output_group.add_argument(
         "--port",
@@ -93,9 +91,7 @@ def add_replay_parser(command_line: LineParser) -> None:
         help="port of --foxglove (default: 8765; 0: any free port)",
     )
     output_group.add_argument(
-        "--allow-origin",
-        metavar="URL,URL",
-        help="addresses of other web pages that may connect to --foxglove (https://HOST)",
+        "--allow-origin", metavar="URL,URL", help="web pages that may also connect to --foxglove (https://HOST)"
     )
     output_group.add_argument(
         "--wait",

@@ -23,7 +23,7 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Set rare garbage collection, and limit linear algebra to one thread.
+    """Make garbage collection rare, and limit linear algebra to one thread.
 
     Call this function before NumPy is imported.
 
@@ -36,7 +36,7 @@ def prepare_process() -> None:
 
 
 def prepare_child() -> None:
-    """Set rare garbage collection in a process that planfly started, such as the worker of a campaign.
+    """Make garbage collection rare in a process that planfly started, such as the worker of a campaign.
 
     Garbage collection in the processes of a short campaign took a sixth of its time. If the address space is limited,
     import only modules that fit (`world.address_space`).

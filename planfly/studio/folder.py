@@ -43,7 +43,7 @@ def folder_message(folder: Path | None) -> Json:
 
 
 def _may_contain_mission(file: Path) -> bool:
-    """Return False for a text or a JSON document that is no mission or plan, and for a file that cannot be read."""
+    """Return True unless a file is unreadable, or a text or JSON document without a mission or plan."""
     mark = _MISSION_MARKS.get(file.suffix.lower(), b"")
     try:
         with file.open("rb") as stream:

@@ -332,7 +332,7 @@ def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
 def _path_json(front_plan: FrontPlan) -> Json:
     """Return page data of a planned path.
 
-    They include length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh).
+    The data include length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh).
     """
     plan, (length, exposure, clearance, seconds, energy) = (
         front_plan.plan,

@@ -83,7 +83,7 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
     payload: editing context, and mission.
     """
     require_extra("campaigns")
-    from planfly.campaigns.statistics.decision import wilson
+    from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
 
     base = _campaign_base(*payload)
     flyable, undecided, failure_counts = 0, 0, Counter[str]()
@@ -93,8 +93,8 @@ def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) ->
         flyable += row.outcome == "flyable"
         undecided += row.outcome == "undecided"
         failure_counts.update({rule for rule, _ in row.failures})
-    lower = wilson(flyable, FLIGHT_COUNT).low
-    upper = wilson(flyable + undecided, FLIGHT_COUNT).high
+    tally = Tally(flyable, FLIGHT_COUNT - flyable - undecided, undecided=undecided)
+    lower, upper = Estimator(Goal(None, False, FLIGHT_COUNT)).estimate(tally).interval
     headline = f"{flyable} of {FLIGHT_COUNT} flights are flyable"
     headline += f", {undecided} not judged in full" if undecided else ""
     common = [f"{rule_word(rule)} fails in {count}" for rule, count in failure_counts.most_common(5)]

@@ -173,6 +173,7 @@ def settings_json(
         "autopilot": airframe.autopilot.name,
         "autopilot_title": airframe.autopilot.title,
         "airspeed": round(airframe.airspeed, 1),
+        "airspeed_kind": "equivalent" if airframe.autopilot.speeds.equivalent else "true",
         "wind_speed": float(scenario.wind.speed),
         "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1),
         "turbulence": scenario.wind.turbulence,

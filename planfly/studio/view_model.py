@@ -138,7 +138,7 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 def mission_json(context: EditContext, judged_mission: JudgedMission) -> Json:
     """Return page data of a mission and its geometric verdict.
 
-    They include items, route, path, states, findings and profile.
+    The data include items, route, path, states, findings and profile.
     """
     verdict, setup = judged_mission.verdict, judged_mission.setup
     states = place_states(judged_mission.requirements, verdict.findings)
@@ -321,7 +321,7 @@ def _finding_json(number: int, finding: Finding) -> Json:
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
     """Return page data of the profile along the route.
 
-    They include terrain, waypoints, and sections of threats and zones.
+    The data include terrain, waypoints, and sections of threats and zones.
     """
     route = setup.route.positions
     waypoint_distance = route_distance(route)

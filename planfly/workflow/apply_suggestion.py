@@ -241,7 +241,7 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving its ends, or only one of them."""
+    """Reduce the climb or descent of a leg by moving one or both of its ends."""
     leg = _changed_leg(change, edited.route)
     excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs

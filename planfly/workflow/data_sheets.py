@@ -246,9 +246,8 @@ def _parse_battery(text: str) -> tuple[float, float]:
         _VOLTAGE_RANGE_V[0] <= volts <= _VOLTAGE_RANGE_V[1] and _ENERGY_RANGE_WH[0] <= watt_hours <= _ENERGY_RANGE_WH[1]
     ):
         allowed = (
-            "expected volts and capacity, such as 14.8V,5Ah; allowed"
-            f" {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g} V,"
-            f" {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
+            f"expected volts and capacity, such as 14.8V,5Ah; allowed {_VOLTAGE_RANGE_V[0]:g}..{_VOLTAGE_RANGE_V[1]:g}"
+            f" V, {_ENERGY_RANGE_WH[0]:g}..{_ENERGY_RANGE_WH[1]:g} Wh"
         )
         raise FlightError.of_argument("battery", text, allowed)
     return volts, 3600.0 * watt_hours

@@ -17,7 +17,15 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.places import FLIGHT, Change, ItemMove, RemainingFinding, Suggestion, TriedSuggestions
+from logs.verdict.places import (
+    FAR_MOVE_DISTANCE_M,
+    FLIGHT,
+    Change,
+    ItemMove,
+    RemainingFinding,
+    Suggestion,
+    TriedSuggestions,
+)
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M
 from logs.verdict.trials import first_that_passes
@@ -41,8 +49,6 @@ MAX_TRIED_LEGS = 5000
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
 _ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
-# Horizontal move of an item that is suggested only if no smaller move passes, m; the detour is up to twice as long.
-FAR_MOVE_DISTANCE_M = 300.0
 # Greatest share of a leg's height error that may remain with a suggestion for its slope.
 MAX_HEIGHT_ERROR_SHARE = 0.5
 # Factor on the part that a step still lacks.
@@ -173,7 +179,7 @@ class PassedTrial:
 def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSuggestions, ...]:
     """Return the suggestions that passed, grouped by finding, the smallest moves of items first.
 
-    A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller move passed.
+    A move of `FAR_MOVE_DISTANCE_M` or more is left out if a smaller one passed, and is stated first otherwise.
     """
     trials_by_finding: dict[int, list[PassedTrial]] = {}
     for trial in passed_trials:

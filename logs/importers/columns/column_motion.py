@@ -114,8 +114,8 @@ def _attitude(log: ColumnLog) -> Samples:
 def read_velocity(log: ColumnLog) -> Samples:
     """Return the ground velocity to north, east and down, m/s, (n, 3).
 
-    It is from components, or from ground speed and course.  A vertical velocity that is not logged is computed from the
-    altitude; there are no rows if the table lacks both.
+    The velocity comes from components, or from ground speed and course.  If the vertical velocity is not logged, it is
+    computed from the altitude.  There are no rows if the table lacks both.
     """
     if log.has("velocity_north", "velocity_east"):
         parts = [log.series("velocity_north"), log.series("velocity_east")]
@@ -205,7 +205,7 @@ def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
 
 
 def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls, which of them are angles, and True if elevons make them.
+    """Return the controls, flags for the controls that are angles, and True if the aircraft has elevons.
 
     The controls and the flags of the three surfaces are those of `MotionLog.controls` and `MotionLog.angles`.  Left and
     right halves become one surface: the elevator is their mean, the aileron half their difference.  There are no rows

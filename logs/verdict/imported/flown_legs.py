@@ -179,7 +179,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     >>> setup = replace(log.setup, source=source)
     >>> far = replace(log.track, position=log.track.position + np.array([0.0, 9000.0, 0.0]))
     >>> plan_mismatch(setup, log.track) is None, plan_mismatch(setup, far).text
-    (True, 'the mission lies elsewhere: the flight never comes within 8.9 km of its waypoints')
+    (True, 'the flight is elsewhere, at least 8.9 km from every waypoint')
     """
     source = setup.source
     stretches = () if source is None else source.stretches

@@ -20,6 +20,7 @@ from logs.verdict.returns.suggest_returns import Remedy
 from logs.verdict.wording import quantity_text
 from world.frames import to_geo
 from world.scenario import Scenario
+from world.wording import count_text
 
 # Texts for the outcome of one return, and of several returns.
 _SINGULAR_TEXTS: dict[Kind, str] = {
@@ -217,10 +218,10 @@ def point_of_no_return_text(returns: Returns) -> str:
         case "never":
             left_text = f"at least {quantity_text(point.remaining_energy, 'Wh')} are left"
             text = f"{name}: none, because every return leaves {reserve} ({left_text})"
-    skipped_texts = {0: "", 1: "; 1 return that does not arrive is ignored"}
-    return text + skipped_texts.get(
-        point.skipped_count, f"; {point.skipped_count} returns that do not arrive are ignored"
-    )
+    if not point.skipped_count:
+        return text
+    verb = "does" if point.skipped_count == 1 else "do"
+    return f"{text}; this leaves out {count_text(point.skipped_count, 'return')} that {verb} not arrive"
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:

@@ -77,6 +77,7 @@ def _leg_finding(
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = _planned_slope_messages(requirements, leg, limit, source)
+    is_plan_steep = bool(faults)
     arc_faults = _steep_arc_faults(requirements, leg, measure)
     ground = None if faults or arc_faults else _steep_ground(requirements, leg, measure)
     if ground is not None:
@@ -86,24 +87,23 @@ def _leg_finding(
     aircraft_facts = _aircraft_slope_facts(requirements, leg) if arc_faults or (faults and source == "aircraft") else []
     # A fault of the plan states the planned slope itself.
     facts = facts if faults or arc_faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
-    fit: LegFit | None = None
+    fit = measure.slope if measure is not None and ground is None else None
     method = "route"
     if measure is not None:
         flown_faults, flown_facts = _flown_messages(requirements, leg, measure, limit)
         faults, facts = faults + flown_faults, facts + flown_facts
-        fit = measure.slope if ground is None else None
         method = _fit_text(fit) if fit is not None else "not flown" if ground is None else "route"
     # The arc at the leg's end may be steep only because the leg is.
     faults = faults + arc_faults
-    ok: bool | None = not faults
-    check = ""
     uncertainty = "" if ground else _ability_text(requirements, leg, limit, source, has_failed=bool(faults))
-    if not faults and uncertainty:
-        ok, check = None, UNKNOWN_AIRCRAFT
+    check = UNKNOWN_AIRCRAFT if uncertainty and not faults else ""
+    ok = None if check else not faults
     facts = [uncertainty, *facts] if uncertainty else facts
     if measure is not None and not measure.is_finished:
         facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
         ok = False if faults else None
+    # The plan decides if the leg fails by it, as the reason states.
+    deciding_fit = None if is_plan_steep else fit
     return make_finding(
         "slope",
         requirements.leg(leg),
@@ -115,8 +115,8 @@ def _leg_finding(
         limit=math.degrees(sign * limit),
         at_least=sign < 0.0,
         source=source,
-        tolerance=math.degrees(PLAN_TOLERANCE_RAD if fit is None else fit.tolerance),
-        margin=math.degrees(limit - sign * (planned_slope if fit is None else fit.value)),
+        tolerance=math.degrees(PLAN_TOLERANCE_RAD if deciding_fit is None else deciding_fit.tolerance),
+        margin=math.degrees(limit - sign * (planned_slope if deciding_fit is None else deciding_fit.value)),
         unit="deg",
         method=method,
         check=check,
@@ -321,7 +321,7 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Return a message on a leg's planned slope, which exceeds its limit, and on the limit."""
+    """Return a message on a leg's planned slope, which is too steep, and on its limit."""
     planned_slope = float(requirements.slopes[leg])
     verb = "climbs" if planned_slope >= 0.0 else "descends"
     slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
@@ -340,9 +340,10 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
 
 
 def _no_progress_text(requirements: RouteRequirements, leg: int) -> str:
-    """State ground speed and wind if the aircraft cannot climb or descend on a leg against the wind; otherwise "".
+    """State ground speed and wind if the aircraft makes no progress in a climb or descent; otherwise "".
 
-    The horizontal part of the airspeed on the steepest climb or descent is then not larger than the headwind.
+    This is the case if the horizontal part of the airspeed, on the steepest climb or descent, is not larger than the
+    headwind.
     """
     speed, envelope = float(requirements.route.leg_airspeeds[leg]), requirements.setup.envelope
     for altitude in requirements.points[leg : leg + 2, 2].tolist():
@@ -467,10 +468,10 @@ def _flown_faults(
     if fit is not None:
         flown_slope = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
-            limit_text = _no_progress_text(requirements, leg) if limit == 0.0 else ""
-            faults["slope"] = message(
-                f"flown at {flown_slope:+.1f}°, {limit_text or f'steeper than the limit of {math.degrees(limit):.1f}°'}"
-            )
+            limit_deg, tolerance_deg = math.degrees(limit), math.degrees(fit.tolerance)
+            limit_text = f"steeper than the limit of {limit_deg:.1f}° with its tolerance of {tolerance_deg:.1f}°"
+            no_progress_text = _no_progress_text(requirements, leg) if limit == 0.0 else ""
+            faults["slope"] = message(f"flown at {flown_slope:+.1f}°, {no_progress_text or limit_text}")
         elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None and abs(measure.height_error) > _height_error_limit(measure):

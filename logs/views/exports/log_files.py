@@ -46,7 +46,7 @@ def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
 def csv_text(log: FlightLog) -> str:
     """Return the columns of a flight as CSV: a line of names, then one line per row.
 
-    Numbers have the fewest digits from which the same value is read back.
+    Numbers have the fewest digits that reproduce the same value when they are read.
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
@@ -88,7 +88,7 @@ def parquet_bytes(log: FlightLog) -> bytes:
 
 
 def battery_voltage(log: FlightLog) -> float:
-    """Return the constant voltage of the battery, V: the aircraft's, or the mean of the logged energy and current.
+    """Return the battery's constant voltage, V: the aircraft's, or the mean from logged energy and current.
 
     Returns NaN for an aircraft without a battery.
 
@@ -330,8 +330,8 @@ def _battery_values(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Column
 def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     """Return the topic navigator_mission_item, with each item from the time at which it becomes active.
 
-    Items without a position get the time of the next item with a position, and the position 0, 0: a gap in the numbers
-    would read as lost items.
+    Items without a position get the time of the next item with a position, and the position 0, 0.  They are not
+    omitted, because a gap in the numbers would look like lost items.
     """
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
     legs, first_rows = np.unique(track.leg[rows], return_index=True)

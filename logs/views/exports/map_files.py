@@ -130,7 +130,7 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> list[MapLine]:
     """Return lines of a flight's returns and glides.
 
-    They are the path coloured by the outcome of a return from there, the paths of the worst returns, and the path
+    They are the path coloured by the outcome of a return from each point, the paths of the worst returns, and the path
     coloured by the destination that a glide reaches.
 
     track: the flown track; None for returns from the planned path.
@@ -161,7 +161,8 @@ def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str,
 def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZone]:
     """Return the areas of the glide footprint; [] if none was computed.
 
-    They are the areas by the lowest height above ground from which a chosen place can be reached, and flat ground.
+    They are areas, one for each range of the lowest height above ground from which a chosen place can be reached, and
+    flat ground.
     """
     footprint = drawn_returns.glides.footprint
     if footprint is None:

@@ -107,7 +107,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 
 def _tolerance_notes(names: tuple[str, str], verdicts: tuple[Verdict, Verdict]) -> Iterator[str]:
-    """Yield a note for each smallest margin that is negative and passes by its tolerance."""
+    """Yield a note for each smallest margin that is negative, but passes within its tolerance."""
     for name, verdict in zip(names, verdicts, strict=True):
         for rule, finding in verdict.closest.items():
             if finding.tolerance_note:
@@ -179,7 +179,7 @@ def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
 
 
 def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
-    """List sentences on the differences of the setups, and on the distance between the tracks."""
+    """Return sentences on the differences between the setups, and on the distance between the tracks."""
     first_setup, second_setup = first.setup, second.setup
     notes = []
     for name, first_value, second_value in (
@@ -221,7 +221,7 @@ _BLOCK_POINTS = 32
 def nearest_distances(points: Floats, track: Floats) -> Floats:
     """Return the distance (n,) from each point of one track to the nearest point of another track.
 
-    Because successive points lie near each other, bounding boxes show which points of the other track can be nearest.
+    Bounding boxes of successive points, which lie near each other, exclude points that cannot be the nearest.
 
     points, track: (n, 3) and (m, 3).
 

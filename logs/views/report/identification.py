@@ -60,7 +60,7 @@ class ParameterRow(NamedTuple):
 
 
 def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
-    """Return every parameter with its prior, its estimate and its 95 % interval."""
+    """Return a row for every parameter: its prior, its estimate and its 95 % interval."""
     shares = np.round(100.0 * estimate.log_fractions()).astype(int).tolist()
     rows = []
     for parameter, value, sd, share in zip(

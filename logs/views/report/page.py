@@ -92,7 +92,7 @@ def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[st
 def picture_data_url(png: bytes) -> str:
     """Return a picture as a data URL.
 
-    A large picture, which is seen only on paper, is converted to a JPEG.
+    A large picture, which is shown only in print, is converted to a JPEG.
 
     >>> picture_data_url(b"PNG")
     'data:image/png;base64,UE5H'
@@ -169,7 +169,7 @@ def page_template(name: str, package: str = "logs.views.report") -> Template:
 
 
 def script_text(names: tuple[str, ...]) -> str:
-    """Join the looks of the theme and scripts of ``templates/scripts``.
+    """Join the theme's looks and scripts of ``templates/scripts`` to one script.
 
     names: names of the scripts in their order; ``start`` is added at the end.
     """
@@ -199,7 +199,7 @@ def script_digest(text: str) -> str:
 
 @cache
 def page_library() -> PageLibrary:
-    """Return plotly.js as packed by the build, at a third of its original size.
+    """Return plotly.js as compressed by the build, to a third of its original size.
 
     Raises OSError if the build is missing.
     """

@@ -113,6 +113,20 @@ def _flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: 
     )
 
 
+def _judged_part_text(setup: FlightSetup) -> str:
+    """Describe the part of a flight on whose legs the required height above ground applies in full.
+
+    >>> from logs.recording.example_log import example_log
+    >>> _judged_part_text(example_log().setup)
+    ''
+    """
+    phases = setup.ground_phases
+    parts = ["after the take-off"] if phases.take_off is not None else []
+    if phases.approach is not None:
+        parts.append(f"before the final approach on leg {setup.route.leg_numbers[phases.approach.leg]}")
+    return " " + " and ".join(parts) if parts else ""
+
+
 def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     """Return one sentence on the flight: distance, time, lowest height and energy; "" for a plan."""
     if track is None:
@@ -126,7 +140,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
         if heights_above_ground is None
         else number(_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
     )
-    phase_text = " between take-off and landing" if is_ground_phase.any() else ""
+    phase_text = _judged_part_text(setup) if is_ground_phase.any() else ""
     height_text = f", never less than {lowest_text} m above ground{phase_text}" if lowest_text != NOTHING else ""
     energy_used = float(track.energy[-1])
     # An imported log may contain no battery data.
@@ -198,7 +212,7 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     limits, wind = setup.scenario.limits, setup.scenario.wind
 
     def angle(value: float | str) -> str:
-        """Return a limit on an angle as text, or that the aircraft's limit applies."""
+        """Return a limit on an angle as text, or a text which states that the aircraft's limit applies."""
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
     wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
@@ -263,7 +277,7 @@ def mission_notes(setup: FlightSetup) -> list[str]:
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
-    """Return facts on the energy drawn from the battery, other than the amount in `flight_sentence`."""
+    """Return facts on the energy drawn from the battery, except the amount that `flight_sentence` states."""
     if track is None or len(track) == 0:
         return []
     used_energy = float(track.energy[-1])

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import Finding, undecided_findings
+from logs.verdict.findings import Finding, undecided_findings, worst_first_key
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter
 from logs.verdict.presentation import RuleFindings, findings_by_rule
@@ -81,7 +81,7 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
 
     None and non-finite values become an en dash.
 
-    digits: number of decimals, if all numbers of a column need the same.
+    digits: number of decimals, for columns in which all numbers need the same number.
     """
     if value is None or not math.isfinite(value):
         return NOTHING
@@ -148,7 +148,7 @@ def headline_without_answer(badge: Badge, headline: str) -> str:
 
 
 def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text: failed, then those that leave the verdict open, passed, not judged.
+    """Return all findings as text, in this order: failed, undecided, passed, not judged.
 
     Within each state, the order of the verdict is kept.
 
@@ -183,7 +183,7 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
 def first_remedy(verdict: Verdict) -> FindingRow | None:
     """Return the first failed finding with a remedy, or None if none has one.
 
-    A ground contact comes before all others.
+    A finding on ground contact comes before all others.
     """
     worst = [rule.failed[0] for rule in verdict.present().failed_rules]
     # A ground contact ended the flight; the sort keeps the order of the others.
@@ -319,10 +319,13 @@ def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
 
 
 def _rule_row(rule: RuleFindings) -> RuleRow:
-    """Return the row of one rule: the numbers of its findings, and the finding closest to its limit."""
+    """Return the row of one rule: the numbers of its findings, and the finding closest to its limit.
+
+    If none fails, an undecided finding is named instead of those that pass.
+    """
     failed_count, judged_count = len(rule.failed), rule.judged
-    is_open = bool(undecided_findings(rule.findings))
-    state = "fail" if failed_count else "open" if is_open else "pass" if judged_count else "unjudged"
+    open_findings = undecided_findings(rule.findings)
+    state = "fail" if failed_count else "open" if open_findings else "pass" if judged_count else "unjudged"
     parts: list[str] = (
         [f"{failed_count} of {judged_count} fail" if failed_count else f"{judged_count} ok"] if judged_count else []
     )
@@ -331,10 +334,11 @@ def _rule_row(rule: RuleFindings) -> RuleRow:
     sign = f"{_SIGNS[state]} {_WORDS[state]}"
     rule_name = rule.words.word
     counts = ", ".join(parts)
-    if rule.closest is None:
+    closest = rule.closest if failed_count or not open_findings else min(open_findings, key=worst_first_key)
+    if closest is None:
         reason = "" if judged_count else rule.findings[0].reason
         return RuleRow(state, sign, rule_name, counts, reason, NOTHING, NOTHING, NOTHING, NOTHING, "")
-    row = _finding_row(rule.closest)
+    row = _finding_row(closest)
     return RuleRow(state, sign, rule_name, counts, row.where, row.planned, row.flown, row.limit, row.margin, row.unit)
 
 

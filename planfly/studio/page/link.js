@@ -13,7 +13,7 @@ function token() {
 }
 
 // Numbers that the server takes: m, but for the seed.
-const RANGES = { east: [-6e5, 6e5], north: [-6e5, 6e5], up: [-500, 9000], by: [-9000, 9000], seed: [0, 2 ** 31 - 1] };
+export const RANGES = { east: [-6e5, 6e5], north: [-6e5, 6e5], up: [-500, 9000], by: [-9000, 9000], seed: [0, 2 ** 31 - 1] };
 
 function bounded(message) {
   const copy = { ...message };

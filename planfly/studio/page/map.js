@@ -333,12 +333,20 @@ export class MapView {
   }
 
   // The whole mission: its items, and the path with its arcs and circles.
+  // The open legend covers no waypoint: the mission is fitted above it.  box: the legend.
+  setLegend(box) {
+    this.legendHeight = box.open ? box.offsetHeight + 44 : 0;
+    const under = box.getBoundingClientRect();
+    const covers = ({ left, right, top, bottom }) => left < under.right && under.left < right && top < under.bottom && under.top < bottom;
+    if (box.open && this.marks?.some((mark) => covers(mark.lastChild.getBoundingClientRect()))) this.fit();
+  }
+
   fit() {
     const { items, route, path } = this.model, shown = [...items.map((item) => item.at), ...route];
     for (const flat of path) for (let i = 0; i < flat.length; i += 3) shown.push([flat[i], flat[i + 1]]);
     const [east, north] = this.extentOf(shown);
     const rim = 0.04 * Math.max(east[1] - east[0], north[1] - north[0], 400);
-    this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]], TOOLS);
+    this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]], Math.max(TOOLS, this.legendHeight || 0));
     this.layOut();
   }
 }

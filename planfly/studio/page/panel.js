@@ -1,6 +1,7 @@
 // The panels beside the map: verdict with suggestions, table of waypoints, planner, settings, files.
 
 import { clear, element, groundAt, plain } from "/axes.js";
+import { RANGES } from "/link.js";
 import { cornerStates } from "/map.js";
 import { buildSettings, field, isParameters, sendParameters } from "/settings.js";
 
@@ -228,8 +229,11 @@ export class Panel {
     const { rev } = now, [state, text] = worst.get(item.k) || ["open", "not flown"];
     const height = element("input", { type: "number", step: "1", value: item.at[2] === null ? "" : Math.round(item.at[2] * 10) / 10, "aria-label": `Height of item ${item.seq}, metres above mean sea level` });
     height.addEventListener("change", () => {
-      const up = Number(height.value);
-      if (height.value !== "" && Number.isFinite(up)) app.commit({ kind: "move", rev, k: item.k, up });
+      const up = Number(height.value), [low, high] = RANGES.up;
+      if (height.value === "" || !Number.isFinite(up)) return undefined;
+      if (up >= low && up <= high) return app.commit({ kind: "move", rev, k: item.k, up });
+      height.value = height.defaultValue;
+      return app.complain(`Item ${item.seq}: ${up} m: a height is from ${low} to ${high} m above mean sea level.`);
     });
     const go = element("button", { type: "button", class: "place", onclick: () => { app.select(item.k, true); } }, String(item.seq));
     const remove = element("button", { type: "button", class: "remove", "aria-label": `Delete item ${item.seq}`, title: "Delete", onclick: () => app.commit({ kind: "delete", rev, ks: [item.k] }) }, "\u00d7");
@@ -252,14 +256,15 @@ export class Panel {
       const asked = { kind: "plan", seed: Math.max(0, Math.round(Number(this.seed.value) || 0)), ways };
       if ((this.first.value === "") !== (this.last.value === "")) return app.complain("Choose both ends of the part to plan, or none for the whole mission.");
       if (this.algorithm.value && ways === 1) asked.algorithm = this.algorithm.value;
+      this.waysAsked = ways;
       if (this.first.value !== "" && this.last.value !== "") Object.assign(asked, { first: Number(this.first.value), last: Number(this.last.value) });
       return app.send(asked);
     };
     this.wayBox = element("div", { class: "ways" });
     box.append(element("p", { class: "more" }, "The planner searches for a path that the aircraft can fly, clear of ground, threats and zones."),
       field("From", this.first), field("To", this.last), field("Seed", this.seed), field("Algorithm", this.algorithm),
-      element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", onclick: () => plan(1) }, "Plan from here"), " ",
-        element("button", { type: "button", "data-job": "plan", id: "other-ways", title: "Several plans from one search with the default algorithm; none is better than another in every respect", onclick: () => plan(WAYS) }, "Other paths")), this.wayBox);
+      element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", "data-ways": 1, onclick: () => plan(1) }, "Plan from here"), " ",
+        element("button", { type: "button", "data-job": "plan", "data-ways": WAYS, id: "other-ways", title: "Several plans from one search with the default algorithm; none is better than another in every respect", onclick: () => plan(WAYS) }, "Other paths")), this.wayBox);
     this.drawPlanEnds();
   }
 
@@ -361,6 +366,8 @@ export class Panel {
   working({ job, share, text }, begins) {
     if (job === "trials" && begins) this.drawVerdict();
     for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) {
+      // Of the two buttons of the planner, the one that was pressed.
+      if (button.dataset.ways && Number(button.dataset.ways) !== (this.waysAsked || 1)) continue;
       button.dataset.share = `${Math.round(100 * share)} %`;
       button.title = text || "";
     }

@@ -47,7 +47,7 @@ function flown(settings, offered, send) {
   return [
     field("Aircraft", list("set-aircraft", same(settings.aircraft_names, settings.aircraft), settings.aircraft, need("aircraft"))),
     field("Autopilot", list("set-autopilot", same(offered.autopilots, settings.autopilot), settings.autopilot, need("autopilot"))),
-    field("Airspeed, m/s", number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
+    field(`${settings.airspeed_kind === "equivalent" ? "Equivalent" : "True"} airspeed, m/s`, number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
     field("Wind, m/s", number("set-wind_speed", settings.wind_speed, 0.5, need("wind_speed"))),
     field("Wind from, °", number("set-wind_from", settings.wind_from, 5, need("wind_from"))),
     ...(settings.forecast ? [element("p", { class: "more" }, `The wind is that of the ${settings.forecast}; its mean at the start stands above. A wind entered here replaces it.`)] : []),

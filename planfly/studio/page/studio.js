@@ -578,6 +578,7 @@ for (const [id, factor] of [["zoom-in", 1.5], ["zoom-out", 1 / 1.5]]) {
     return map.layOut();
   };
 }
+$("legend").ontoggle = () => map.setLegend($("legend"));
 $("fit").onclick = () => (inScene() ? scene.enlarge(1 / scene.zoom) : map.fit());
 $("three").onclick = () => {
   const on = $("scene").hidden;

@@ -294,7 +294,11 @@ def test_a_rule_with_a_finding_left_open_is_not_called_ok_in_the_report() -> Non
     passed = make_finding("slope", Place("leg", 0), ok=True, reason="", margin=1.0, unit="deg")
     unsure = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     assert [row.state for row in rule_rows([passed])] == ["pass"]
-    assert [(row.state, row.counts) for row in rule_rows([passed, unsure])] == [("open", "1 ok, 1 not judged")]
+    (row,) = rule_rows([passed, unsure])
+    # The row names the leg that is open, not the one that passes.
+    assert (row.state, row.counts, row.where) == ("open", "1 ok, 1 not judged", "leg 1")
+    failed = make_finding("slope", Place("leg", 2), ok=False, reason="too steep")
+    assert [row.where for row in rule_rows([passed, unsure, failed])] == ["leg 2"]
 
 
 def made_verdict() -> Verdict:

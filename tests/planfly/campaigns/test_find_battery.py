@@ -141,7 +141,7 @@ def test_no_battery_carries_itself(base: CampaignBase) -> None:
         capacity=math.inf,
         interval=none,
     )
-    assert answer_line(result).startswith("no battery keeps 20%")
+    assert answer_line(result).startswith("no battery keeps a reserve of 20%")
 
 
 @pytest.mark.parametrize(("lost", "is_known"), [(4, True), (5, False)])
@@ -153,7 +153,8 @@ def test_no_battery_covers_a_return_that_does_not_arrive(base: CampaignBase, los
     assert result.kept == 100 - lost
     assert math.isfinite(result.capacity) == is_known
     nothing = (
-        "no battery keeps 20% in the mission and in every return with probability 0.95: in 5 of 100 flights a return "
+        "no battery keeps a reserve of 20% in the mission and in every return with probability 0.95:"
+        " in 5 of 100 flights a return "
     )
     assert (answer_line(result) == f"{nothing}does not arrive") != is_known
     battery_page(result, draw_battery(result), "").render()

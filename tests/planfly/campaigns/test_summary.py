@@ -304,7 +304,7 @@ def test_undecided_flights_are_no_failures_and_name_the_reason_of_the_first(base
     assert lines[0] == (
         "P >= 0.9 is undecided: 1 of 20 flights is flyable, 19 not judged in full, P from 0.0500 to 1.0000"
     )
-    assert "  Not judged: 19 of 20 flights, the first of them because of mission (open 1)" in lines
+    assert "  Not judged: 19 of 20 flights; reason of the first: mission (open 1)" in lines
     assert not any(line.startswith("  failed") for line in lines)
     assert not any("decides mission" in line for line in lines)
     data = json.loads(summary_json(summary))

@@ -63,7 +63,7 @@ def test_a_front_without_choices_says_so(tmp_path: Path, capsys: pytest.CaptureF
     [
         (["--front", "1"], "argument --front: '1': expected a whole number of plans, 2 to 100"),
         (["--front", "101"], "argument --front: '101': expected a whole number of plans, 2 to 100"),
-        (["--front", "5", "--algorithm", "umda"], "--algorithm umda: not with --front N"),
+        (["--front", "5", "--algorithm", "umda"], "--algorithm umda: cannot be combined with --front N"),
         (["--front", "5", "--budget", "900"], "--budget 900: with --front N the budget is a number of seconds"),
     ],
 )

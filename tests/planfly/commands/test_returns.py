@@ -32,7 +32,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     with redirect_stdout(StringIO()) as out:
         # The return after the last item hits the hill.
         assert main([*flown, "--log", str(folder / "hill.mcap")]) == 4
-    assert "returns   of " in out.getvalue()
+    assert "\nreturns   " in out.getvalue()
     return (folder / "hill.mcap").read_bytes()
 
 
@@ -66,7 +66,7 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     assert of_log["headline"] == answer["headline"]
     assert of_log["engine_out"] == answer["engine_out"]
     assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 4
-    assert "returns   of " in capsys.readouterr().out
+    assert "\nreturns   " in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("blank_pictures")

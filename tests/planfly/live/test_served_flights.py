@@ -107,7 +107,13 @@ def test_an_upload_that_crosses_its_own_fence_is_warned_of_and_not_armed(
     _, judged = ServedFlights(options).prepare(JudgeMission(fenced, 1))
     assert (judged.possible, judged.flyable) == (True, armed)
     warnings = [text.text for text in judged.texts if text.severity == WARNING]
-    assert any(text.startswith("fence at fence item 0 (exclusion): 200.0 m inside at ") for text in warnings) != armed
+    assert (
+        any(
+            text.startswith("fence at fence item 0 (exclusion): 200.0 m inside; the path enters it at ")
+            for text in warnings
+        )
+        != armed
+    )
     arming = ArmingState()
     arming.on_mission_uploaded()
     arming.on_mission_judged(judged)

@@ -72,7 +72,9 @@ def test_a_report_states_the_least_height_between_take_off_and_landing() -> None
     """The take-off ends at 60 m; the way leads over 80 m and 70 m to 54 m, where the landing begins."""
     flown = flown_circuit()
     said = flight_sentence(flown.setup, flown.track)
-    low = re.search(r"never less than (\d+) m above ground between take-off and landing", said)
+    low = re.search(
+        r"never less than (\d+) m above ground after the take-off and before the final approach on leg 3,", said
+    )
     assert low is not None, said
     assert int(low[1]) == pytest.approx(54, abs=4)
 

@@ -140,11 +140,10 @@ def test_a_climb_past_its_item_states_its_angle_and_its_end(deviation_deg: float
     reason = "; the steepest climb is 14.1°, but only 9.0° is certain"
     assert found.ok is None
     assert found.reason == (
-        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground:"
-        f" 400 m from home it is {80.0 - 400.0 * slope:.0f} m below the surface"
-        f" (climb angle {math.degrees(math.atan(slope)):.1f}°,"
-        f" straight on past item 2, 300 m from home, until it is 100 m above home after {100.0 / slope:.0f} m"
-        f"{f'{reason} for this aircraft' if deviation_deg else ''})"
+        f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground: 400 m from"
+        f" home it is {80.0 - 400.0 * slope:.0f} m below the surface (climb angle"
+        f" {math.degrees(math.atan(slope)):.1f}°, straight on past item 2, 300 m from home, until it is 100 m above"
+        f" home after {100.0 / slope:.0f} m{f'{reason} for this aircraft' if deviation_deg else ''})"
     )
 
 

@@ -43,7 +43,7 @@ def test_the_envelope_limits_a_slope(slope: float, ok: bool) -> None:
 def test_a_steep_leg_is_explained() -> None:
     setup = make_setup(hill(18.3, 1400.0))
     verdict = judge(setup, fly_path(setup))
-    assert verdict.summary.startswith("not flyable: slope on leg 1, to item 2 (18.3° > 13.8°)")
+    assert verdict.summary.startswith("not flyable: slope on leg 1, to item 2 (18.3° > 13.7°)")
     reason = of(verdict, "slope", leg(1)).reason
     assert reason.startswith(
         "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m AMSL the aircraft can fly at most 13.7° in calm air"
@@ -278,9 +278,8 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
         assert told == [("full throttle", 20.0, "s")]
         assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
         assert verdict.headline == (
-            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because"
-            " the aircraft's limits are uncertain;"
-            " an aircraft from a data sheet"
+            "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because the"
+            " aircraft's limits are uncertain; an aircraft from a data sheet"
         )
         assert verdict.levels[0].undecided
 

@@ -12,12 +12,14 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.findings import Finding
+from logs.verdict.headline_phrases import excess_phrase
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.slopes import Ability, LegFit, SlopeMeasure
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules import slope_rule
 from logs.verdict.rules.slope_rule import slope_findings
+from logs.views.report.text import finding_rows
 from tests.logs.verdict.judging import leg, of
 from tests.synthetic import fly_path, make_setup
 
@@ -66,8 +68,27 @@ def test_a_slope_as_flown_is_within_the_limit_of_its_own_direction(
     assert item.ok is ok
     assert (item.flown, item.limit) == (pytest.approx(flown), math.copysign(limit, planned))
     if not ok:
-        assert item.reason.startswith(f"flown at {flown:+.1f}°, steeper than the limit of {limit:.1f}°")
+        told = f"flown at {flown:+.1f}°, steeper than the limit of {limit:.1f}° with its tolerance of 0.1°"
+        assert item.reason.startswith(told)
         assert item.margin == pytest.approx(-beyond)
+
+
+@pytest.mark.parametrize("flown", [-5.3, -5.8])
+def test_a_leg_that_is_planned_too_steeply_has_one_value_and_one_limit(
+    flown: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """5.6 degrees of 5 are planned: the reason, the headline and the report's table compare them, also of a flight.
+
+    Its fit may be off by half a degree, which is no tolerance of the plan.
+    """
+    fit = LegFit(math.radians(flown), math.radians(0.5), 1500.0, is_fitted=True)
+    item = judged(SlopeMeasure(slope=fit, is_finished=True), monkeypatch, -5.6, limits={"max_dive_deg": 5.0})
+    assert (item.ok, item.planned, item.flown) == (False, pytest.approx(-5.6), pytest.approx(flown))
+    assert item.reason.startswith("leg 1 descends 5.6° for 2.0 km; the scenario allows 5.0°")
+    assert (item.value, item.effective_limit) == (pytest.approx(-5.6), pytest.approx(-5.01))
+    assert excess_phrase("slope", item) == "slope on leg 1, to item 2 (-5.6° < -5.01°)"
+    (row,) = finding_rows([item])
+    assert (row.planned, row.limit, row.margin) == ("−5.60", "≥\u00a0−5.01", "−0.59")
 
 
 @pytest.mark.parametrize(
