@@ -251,7 +251,7 @@ def failures_to_expect(plan: Plan) -> tuple[str, ...]:
     """Return the known causes that are expected to make more than 5 % of dispersed flights fail.
 
     Each cause is one line with a remedy.  The result is empty for a plan that is not safe.  The landing on a
-    steep final is flown 40 times, which takes some seconds.
+    steep final is flown 40 times, which takes up to half a minute.
     """
     from planfly.campaigns.landing_trial import steep_landing_failures
 

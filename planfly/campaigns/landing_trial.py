@@ -14,13 +14,13 @@ from planfly.workflow.airframe import Airframe
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planner.plan import Plan
 
-# Slope of a final above which its landing is flown, rad.  In 15 plans of `benchmarks.planning.plans_in_campaigns` with
-# strips that were long enough, finals of 3.5 to 4.9 degrees held in 97 to 100 of 100 flights.  On one strip, finals of 6
-# and 7 degrees held in 78 to 95 %: an aircraft that arrives fast floats in the flare until a gust stalls it.
+# Slope of a final above which its landing is flown, rad.  In `benchmarks.planning.plans_in_campaigns`, plans with a
+# long enough strip and finals of 3.5 to 4.9 degrees held in 97 to 100 of 100 flights.  On one strip, finals of 6 and
+# 7 degrees held in 78 to 95 %: an aircraft that arrives fast floats in the flare until a gust stalls it.
 STEEP_FINAL_RAD = math.radians(5.0)
 # Number of landings that are flown.
 LANDING_COUNT = 40
-# Number of waypoints before the landing that are flown: the end of the path to the line-up, and both ends of the line-up.
+# Number of waypoints before the landing that are flown: the last before the line-up, and both ends of the line-up.
 _WAYPOINTS_BEFORE_LANDING = 3
 
 
@@ -39,9 +39,10 @@ def steep_landing_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
         return ()
     low, high = wilson(flyable_count, LANDING_COUNT)
     return (
-        f"only {flyable_count} of {LANDING_COUNT} simulated landings succeed (P between {low:.2f} and {high:.2f} at 95 %)"
-        f" on a final of {math.degrees(math.atan(descent.slope)):.1f}°; to improve this, state a final of at most"
-        f" {math.degrees(STEEP_FINAL_RAD):.0f}° ([landing] slope_deg) or another strip, or fly in less wind or turbulence",
+        f"only {flyable_count} of {LANDING_COUNT} simulated landings succeed (P between {low:.2f} and {high:.2f} at"
+        f" 95 %), on a final of {math.degrees(math.atan(descent.slope)):.1f}°; to improve this, use a strip or a"
+        f" landing course with a clear final of at most {math.degrees(STEEP_FINAL_RAD):.0f}°, or fly in less wind or"
+        " turbulence",
     )
 
 
