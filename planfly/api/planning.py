@@ -248,9 +248,15 @@ def conditions_of_plan(plan: Plan) -> Conditions:
 def failures_to_expect(plan: Plan) -> tuple[str, ...]:
     """Return the known causes that are expected to make more than 5 % of dispersed flights fail.
 
-    Each cause is one line with a remedy.  The result is empty for a plan that is not safe.
+    Each cause is one line with a remedy.  The result is empty for a plan that is not safe.  The landing on a
+    steep final is flown 40 times, which takes up to half a minute.
     """
-    return expected_failures(plan, load_airframe(plan.scenario)) if plan.safe else ()
+    from planfly.campaigns.landing_trial import steep_landing_failures
+
+    if not plan.safe:
+        return ()
+    airframe = load_airframe(plan.scenario)
+    return (*expected_failures(plan, airframe), *steep_landing_failures(plan, airframe))
 
 
 @checks_types

@@ -2,7 +2,8 @@
 
 A plan is safe within the limits of its scenario, in its stated wind and over the heights of its map.  Two causes of
 failures are known from the plan alone: limits that are looser than the aircraft's, and a strip that is too short for
-what is known of its height.  All other causes, such as gusts in the flare, take flights (`planfly plan --flights N`).
+what is known of its height.  `planfly.campaigns.landing_trial` flies the landings of steep finals.  All other causes
+take flights of the whole plan (`planfly plan --flights N`).
 """
 
 import math

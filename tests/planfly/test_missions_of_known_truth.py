@@ -284,4 +284,4 @@ def test_what_cannot_be_flown_is_a_verdict_on_the_command_line_too(
 def test_a_log_is_judged_in_the_wind_it_was_flown_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "f.mcap").write_bytes(b"\x89MCAP0\r\n")
     assert main(["check", str(tmp_path / "f.mcap"), "--wind", "5,270"]) == 2
-    assert "--wind: a log is judged with" in capsys.readouterr().err
+    assert "--wind: not allowed with a log" in capsys.readouterr().err

@@ -198,7 +198,10 @@ VIRTUAL = {
         b"<VRTDataset><SourceFilename>/etc/a.tif</SourceFilename></VRTDataset>",
         "expected files in the folder of a.vrt or below",
     ),
-    "a file that is not there": (b"<VRTDataset><SourceFilename>a.tif</SourceFilename></VRTDataset>", "no such file"),
+    "a file that is not there": (
+        b"<VRTDataset><SourceFilename>a.tif</SourceFilename></VRTDataset>",
+        "no such elevation file",
+    ),
 }
 
 

@@ -86,7 +86,7 @@ def test_a_vrt_is_refused_under_any_other_name(name: str, tmp_path: Path) -> Non
 )
 def test_urls_and_virtual_paths_are_refused(path: str, tmp_path: Path) -> None:
     assert_refused(path, "only local files")
-    with pytest.raises(TerrainError, match=r"only local files|no such file"):
+    with pytest.raises(TerrainError, match=r"only local files|no such elevation file"):
         open_raster(path, tmp_path)
 
 
@@ -98,7 +98,7 @@ def test_what_is_no_elevation_is_refused(content: bytes, suffix: str, tmp_path: 
     path = tmp_path / f"x{suffix}"
     path.write_bytes(content)
     assert_refused(path, "not")
-    assert_refused(tmp_path / "missing.tif", "no such file")
+    assert_refused(tmp_path / "missing.tif", "no such elevation file")
     (tmp_path / "empty").mkdir()
     assert_refused(tmp_path / "empty", "a folder without an elevation file")
 

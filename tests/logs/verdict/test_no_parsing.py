@@ -127,7 +127,7 @@ def test_what_a_threat_is_called_changes_its_name_alone(name: str) -> None:
     def written(called: str) -> str:
         threat = THREAT | {"kill_scale_m": 200.0, "name": called}
         verdict = judge_geometry(make_setup([[0, 0, 300], [0, 2000, 300]], threats=[threat]))
-        assert f"threat {called} (missile)" in verdict.headline
+        assert f"missile {called}" in verdict.headline
         return verdict_json(verdict).replace(called, MUTE)
 
     assert written(name) == written("Alfa")

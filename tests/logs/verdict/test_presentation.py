@@ -75,7 +75,7 @@ def test_every_rendering_shows_the_same_failures_in_the_same_order() -> None:
     """Clearance: the worst on leg 1, then leg 0; one of three passes."""
     lines = verdict_lines(VERDICT, [])
     failing = [line.split()[1] for line in lines if "  failed  " in line]
-    assert failing == ["completion", "slope", "clearance,"]
+    assert failing == ["completion:", "slope", "clearance:"]
     assert [group.rule for group in failed_groups(VERDICT)] == ["completion", "slope", "clearance"]
     assert "1 of 3 ok" in next(line for line in lines if line.startswith("  clearance"))
     page = ElementTree.fromstring(VERDICT._repr_html_())

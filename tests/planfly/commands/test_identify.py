@@ -113,7 +113,7 @@ def test_a_log_becomes_a_folder_that_flies(
             ["--identify", "a.BIN", *ARGUMENTS, "--motor-braking", "--out", "./mine"],
             "cannot be combined with --motor-braking",
         ),
-        (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "for the base aerosonde"),
+        (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "with the base aerosonde"),
         (["--identify", "a.BIN", "--mass", "99", "--span", "2.9", "--out", "./mine"], "allowed 0.3..50 kg"),
         (["--identify", "a.BIN", *ARGUMENTS, "--battery", "12", "--out", "./mine"], "volts and capacity"),
         (

@@ -492,9 +492,9 @@ def test_options_that_do_not_fit(
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ('[wind]\nforecast = "a.nc"\nspeed_mps = 5\n', "wind.speed_mps: 5: not with wind.forecast"),
-        ('[wind]\nforecast = "a.nc"\nfrom_deg = 5\n', "wind.from_deg: 5: not with wind.forecast"),
-        ('[wind]\nforecast = "a.nc"\ngradient = 0.01\n', "wind.gradient: 0.01: not with wind.forecast"),
+        ('[wind]\nforecast = "a.nc"\nspeed_mps = 5\n', "wind.speed_mps: 5: not allowed with wind.forecast"),
+        ('[wind]\nforecast = "a.nc"\nfrom_deg = 5\n', "wind.from_deg: 5: not allowed with wind.forecast"),
+        ('[wind]\nforecast = "a.nc"\ngradient = 0.01\n', "wind.gradient: 0.01: not allowed with wind.forecast"),
         ('[wind]\nforecast = ""\n', "wind.forecast"),
         ("[wind]\nforecast = 5\n", "wind.forecast"),
         ('[wind]\nforecast = ["a.nc"]\n', "wind.forecast"),

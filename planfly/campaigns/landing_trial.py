@@ -1,0 +1,54 @@
+"""Fly the landing of a plan with a steep final in dispersed conditions, because a flare is not known from the plan."""
+
+import math
+from dataclasses import replace
+
+from flight.mission.commands import Command
+from flight.mission.items import Mission
+from planfly.campaigns.campaign_base import campaign_of_setup
+from planfly.campaigns.dispersions import default_dispersions
+from planfly.campaigns.flight_row import fly_one
+from planfly.campaigns.statistics.decision import wilson
+from planfly.planning.expected_failures import HOLDING_PROBABILITY
+from planfly.workflow.airframe import Airframe
+from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planner.plan import Plan
+
+# Slope of a final above which its landing is flown, rad.  In `benchmarks.planning.plans_in_campaigns`, plans with a
+# long enough strip and finals of 3.5 to 4.9 degrees held in 97 to 100 of 100 flights.  On one strip, finals of 6 and
+# 7 degrees held in 78 to 95 %: an aircraft that arrives fast floats in the flare until a gust stalls it.
+STEEP_FINAL_RAD = math.radians(5.0)
+# Number of landings that are flown.
+LANDING_COUNT = 40
+# Number of waypoints before the landing that are flown: the last before the line-up, and both ends of the line-up.
+_WAYPOINTS_BEFORE_LANDING = 3
+
+
+def steep_landing_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
+    """Return how many landings on a steep final succeed, with what would help, if fewer than 95 % do; otherwise ().
+
+    The landing begins in the air before the line-up and has the default dispersions of a campaign.
+    """
+    descent = None if plan.ways is None else plan.ways.descent
+    if not plan.safe or descent is None or math.atan(descent.slope) <= STEEP_FINAL_RAD:
+        return ()
+    mission = landing_mission(mission_of_plan(plan, airframe))
+    base = campaign_of_setup(make_setup(plan.scenario, airframe, mission, plan.seed), default_dispersions())
+    flyable_count = sum(fly_one(base, index).outcome == "flyable" for index in range(LANDING_COUNT))
+    if flyable_count >= HOLDING_PROBABILITY * LANDING_COUNT:
+        return ()
+    low, high = wilson(flyable_count, LANDING_COUNT)
+    return (
+        f"only {flyable_count} of {LANDING_COUNT} simulated landings succeed (P between {low:.2f} and {high:.2f} at"
+        f" 95 %), on a final of {math.degrees(math.atan(descent.slope)):.1f}°; to improve this, use a strip or a"
+        f" landing course with a clear final of at most {math.degrees(STEEP_FINAL_RAD):.0f}°, or fly in less wind or"
+        " turbulence",
+    )
+
+
+def landing_mission(mission: Mission) -> Mission:
+    """Return the last part of a plan's mission: from the end of the path to the line-up, to the landing."""
+    landing_index = max(k for k, item in enumerate(mission.items) if item.command == Command.NAV_LAND)
+    waypoints = [k for k in range(landing_index) if mission.items[k].command == Command.NAV_WAYPOINT]
+    items = mission.items[waypoints[-min(len(waypoints), _WAYPOINTS_BEFORE_LANDING)] :]
+    return replace(mission, items=tuple(replace(item, seq=number) for number, item in enumerate(items, 1)))
