@@ -394,8 +394,7 @@ def scenario_from_spec(
     terrain: an elevation file that replaces the scenario's own.
     ground: terrain that is already loaded (from a log).
     external: see `Scenario`.
-    is_stored: True for the scenario of a log. Its wind already has the mean profile of the forecast, so the forecast is
-        not read.
+    is_stored: True for the scenario of a log, whose wind and ground are those of its flight; no forecast is read.
     Raises ScenarioError, TerrainError and ForecastError as `load_scenario` does.
 
     >>> again = scenario_from_spec(load_scenario("tight").to_json(), "a plan")
@@ -439,7 +438,6 @@ def scenario_from_spec(
     spec = _with_file_zones(
         spec.model_copy(update={"origin": origin_table, "area": area_table}), file_zones, source, origin, bounds
     )
-    # The ground of a log is the real one of its flight, as an elevation file that replaces the scenario's own.
     replaced = terrain is not None or is_stored
     scenario = _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=replaced)
     return scenario if is_stored else _with_forecast_wind(scenario)
@@ -705,7 +703,6 @@ def with_ground(scenario: Scenario, ground: Terrain) -> Scenario:
     [0.0, 0.0, 8.0]
     """
     spec, source = scenario.spec, scenario.name
-
     changes: dict[str, Any] = {
         "start": spec.start.model_copy(update={"height_m": None, "amsl_m": float(scenario.start[2])}),
         "destination": spec.destination.model_copy(update={"height_m": None, "amsl_m": float(scenario.destination[2])}),
