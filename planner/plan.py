@@ -65,7 +65,10 @@ class Objectives(NamedTuple):
     """Objectives of a path in the order of `Objective`: length ratio, and three sums over its points.
 
     length_ratio: length / straight line.
-    height_sum: sum of the heights above ground, divided by the six points per leg (eq. 11), m.
+    kill_exposure, detection_exposure: sums over the points inside the spheres of (scale / distance)^4, without unit and
+    without time; the exposure of a verdict is the integral of the same ratio over the time inside, s.
+    height_sum: sum of the heights above ground, divided by the six points per leg (eq. 11): the sum over the legs of
+    their mean height, m.
     """
 
     length_ratio: float

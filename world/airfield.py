@@ -222,12 +222,19 @@ def make_landing(
 
 
 def make_return_requirements(
-    table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
+    table: ReturnsTable | None,
+    source: str,
+    origin: GeoOrigin,
+    ground: Terrain | None,
+    *,
+    allows_underground: bool = False,
 ) -> ReturnRequirements | None:
     """Convert a scenario's [returns] table to RTL requirements; None without a table.
 
-    Raises ScenarioError for a rally point that is not above the ground, and for a height above ground at a position
-    with unknown ground.
+    allows_underground: True accepts a rally point in the ground, which may differ from the one of the scenario's file.
+
+    Raises ScenarioError for another rally point that is not above the ground, and for a height above ground at a
+    position with unknown ground.
     """
     if table is None:
         return None
@@ -235,7 +242,8 @@ def make_return_requirements(
     for k, rally_table in enumerate(table.rally or ()):
         key = f"returns.rally[{k}]"
         points.append(map_position(rally_table, key, source, origin, ground))
-        check_above_ground(key, points[-1], source, ground)
+        if not allows_underground:
+            check_above_ground(key, points[-1], source, ground)
     return ReturnRequirements(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
 
 

@@ -88,7 +88,7 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
     classes, item_classes = _allowed_classes(annotation)
     if classes:
         is_allowed = isinstance(value, classes) or _is_sequence_of(value, item_classes)
-        return None if is_allowed else _classes_text(classes, item_classes)
+        return None if is_allowed else _classes_text(classes, item_classes) + _hint(value, classes)
     if isinstance(annotation, type) and is_dataclass(annotation):
         return None if isinstance(value, annotation) else f"a {annotation.__name__}"
     members = get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
@@ -101,6 +101,14 @@ def _expected_type(value: Any, annotation: Any) -> str | None:
     if kinds == {Sequence} and float not in get_args(members[0]):
         return None if isinstance(value, Iterable) and not isinstance(value, str | bytes) else "a list"
     return None
+
+
+def _hint(value: Any, classes: tuple[type, ...]) -> str:
+    """Return a clause on how to proceed with a scenario where only a plan is allowed; "" for anything else."""
+    is_scenario_for_plan = type(value).__name__ == "Scenario" and "Plan" in {one.__name__ for one in classes}
+    return (
+        "; planfly.plan makes a plan of a scenario, and planfly.plan_then_fly flies it" if is_scenario_for_plan else ""
+    )
 
 
 def _is_sequence_of(value: Any, classes: tuple[type, ...]) -> bool:

@@ -10,6 +10,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -324,8 +325,8 @@ def require_covered(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike) ->
     box = np.asarray(bounds, dtype=np.float64)
     if not is_covered(raster, origin, box):
         raise TerrainError(
-            f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
-            f"reaches beyond the tile, which covers {_tile_extent_text(raster, origin)} ({cover_text(raster)})",
+            f"{raster.name}: area {_box_text(box)} reaches beyond the tile{_outside_text(raster, origin, box)}"
+            f" (the tile covers {cover_text(raster)})",
             file=raster.name,
             field="area",
             value=box.tolist(),
@@ -475,7 +476,29 @@ def cover_text(raster: RasterFile) -> str:
     return f"latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
 
-def _tile_extent_text(raster: RasterFile, origin: GeoOrigin) -> str:
-    """Return the extent of a raster on the map, as text."""
-    east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
-    return f"east {east.min():.0f}..{east.max():.0f} m, north {north.min():.0f}..{north.max():.0f} m"
+def _box_text(box: Floats) -> str:
+    """Return a box on the map, [[e0, e1], [n0, n1]] m, as text."""
+    return f"east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m"
+
+
+def _outside_text(raster: RasterFile, origin: GeoOrigin, box: Floats) -> str:
+    """Return the corner of a box that is farthest outside a raster's pixel centres, and a box within, as text.
+
+    The text is "" for a corner that the raster's coordinate system cannot express.
+    """
+    rows, cols = raster.shape
+    east, north = (axis.ravel() for axis in np.meshgrid(*box))
+    col, row = _to_window_pixels(raster.to_pixels, origin, east, north, 0, 0)
+    if not np.isfinite([col, row]).all():
+        return ""
+    # Nearest positions with data, along the tile's own axes.
+    lon, lat = raster.to_lon_lat(np.clip(col, 0.0, cols - 1.0), np.clip(row, 0.0, rows - 1.0))
+    near_east, near_north = to_map(origin, lat, lon)
+    distances = np.hypot(near_east - east, near_north - north)
+    k = int(np.argmax(distances))
+    text = f": its corner east {east[k]:.0f} m, north {north[k]:.0f} m is {distances[k]:.0f} m outside the data"
+    with suppress(TerrainError):
+        inner = tile_bounds(raster, origin)
+        # Rounded towards the inside.
+        text += f"; {_box_text(np.stack([np.ceil(inner[:, 0]), np.floor(inner[:, 1])], axis=1))} is within"
+    return text

@@ -396,8 +396,7 @@ def scenario_from_spec(
     terrain: an elevation file that replaces the scenario's own.
     ground: terrain that is already loaded (from a log).
     external: see `Scenario`.
-    is_stored: True for the scenario of a log. Its wind already has the mean profile of the forecast, so the forecast is
-        not read.
+    is_stored: True for the scenario of a log, whose wind and ground are those of its flight; no forecast is read.
     Raises ScenarioError, TerrainError and ForecastError as `load_scenario` does.
 
     >>> again = scenario_from_spec(load_scenario("tight").to_json(), "a plan")
@@ -441,7 +440,8 @@ def scenario_from_spec(
     spec = _with_file_zones(
         spec.model_copy(update={"origin": origin_table, "area": area_table}), file_zones, source, origin, bounds
     )
-    scenario = _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
+    replaced = terrain is not None or is_stored
+    scenario = _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=replaced)
     return scenario if is_stored else _with_forecast_wind(scenario)
 
 
@@ -538,7 +538,7 @@ def _assemble_scenario(
 ) -> Scenario:
     """Make a scenario from the data of its file, its map and its terrain.
 
-    replaced: True if the scenario's own terrain was replaced.
+    replaced: True if the ground may differ from the one for which the scenario was made.
     """
     area = spec.area
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
@@ -581,7 +581,7 @@ def _assemble_scenario(
         home=make_home(spec.home, source, origin, ground, bounds, start),
         launch=make_launch(spec.launch),
         landing=make_landing(spec.landing, source, origin, ground, bounds),
-        returns=make_return_requirements(spec.returns, source, origin, ground),
+        returns=make_return_requirements(spec.returns, source, origin, ground, allows_underground=replaced),
         link=make_link(spec.link, source, origin, ground),
     )
 
@@ -690,6 +690,35 @@ def with_amsl_endpoints(spec: dict[str, Any], start: Floats, destination: Floats
             other_entries = {name: value for name, value in spec[key].items() if name != "height_m"}
             changed_spec[key] = other_entries | {"amsl_m": float(point[2])}
     return changed_spec
+
+
+def with_ground(scenario: Scenario, ground: Terrain) -> Scenario:
+    """Return a scenario in which the real ground is another than the one of the map.
+
+    What stands on the ground moves with it: home, and threats and rally points without an altitude AMSL.  Heights above
+    ground of zones and of the link's station are measured from `Scenario.terrain`.  Planned altitudes stay: start,
+    destination and ceiling, which the scenario then states AMSL.
+
+    >>> scenario = load_scenario("jacksboro")
+    >>> raised = with_ground(scenario, replace(scenario.terrain, heights=scenario.terrain.heights + 8))
+    >>> (raised.threats.position - scenario.threats.position)[0].round(3).tolist()
+    [0.0, 0.0, 8.0]
+    """
+    spec, source = scenario.spec, scenario.name
+    changes: dict[str, Any] = {
+        "start": spec.start.model_copy(update={"height_m": None, "amsl_m": float(scenario.start[2])}),
+        "destination": spec.destination.model_copy(update={"height_m": None, "amsl_m": float(scenario.destination[2])}),
+    }
+    if spec.area is not None:
+        changes["area"] = spec.area.model_copy(update={"ceiling_amsl_m": scenario.ceiling})
+    return replace(
+        scenario,
+        spec=spec.model_copy(update=changes),
+        terrain=ground,
+        threats=make_threats(spec.threats, source, scenario.origin, ground),
+        home=make_home(spec.home, source, scenario.origin, ground, scenario.bounds, scenario.start),
+        returns=make_return_requirements(spec.returns, source, scenario.origin, ground, allows_underground=True),
+    )
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:

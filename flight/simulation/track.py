@@ -72,6 +72,11 @@ class Track:
     Time and position are float64, and all other values float32, so that a log stores them exactly. All arrays have t
     rows. World axes east, north, up; SI and radians.
 
+    Position, velocity, attitude and clearance are the true ones. `cross_track` and `height_error` are the errors as the
+    guidance estimates them, from its navigation ("gnss", "rtk") and relative to the path that it follows. For the true
+    deviation take `position` and the distance from the legs of `FlightSetup.route.positions`, or the findings of the
+    rules `corridor` and `height` of a verdict, which are measured on the true track.
+
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["time"] = 0.0, 0.5, 1.0
     >>> as_track(rows)
@@ -92,10 +97,10 @@ class Track:
     current: Singles  # (t,) A from the battery
     energy: Singles  # (t,) Wh used since the start
     leg: Ints  # (t,) the active leg: leg i goes from waypoint i to i + 1
-    cross_track: Singles  # (t,) m right of the fly-by path, of the estimated state
-    height_error: Singles  # (t,) m above the fly-by path
+    cross_track: Singles  # (t,) m right of the fly-by path, estimated by the guidance: not the true deviation
+    height_error: Singles  # (t,) m above the fly-by path, estimated by the guidance: not the true deviation
     speed_command: Singles  # (t,) m/s
-    clearance: Singles  # (t,) m above ground as measured in flight; the verdict computes its own
+    clearance: Singles  # (t,) m, true height above the scenario's terrain, NaN off it; the verdict computes its own
 
     def __post_init__(self) -> None:
         """Convert each array to its type, and lock it."""

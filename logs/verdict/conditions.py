@@ -66,6 +66,10 @@ class Conditions(DocumentConfig):
     """Number of zones of the scenario and of the mission's fence."""
     forecast: str = ""
     """Forecast of the wind with its time of issue, age, grid and levels; empty for a stated wind."""
+    wind_gradient_per_s: float = 0.0
+    """Increase of the wind speed with height, m/s per m; 0 in a forecast that states the wind at each height."""
+    wind_amsl_m: float | None = None
+    """Altitude at which the wind has its speed; null without a gradient."""
     unused_parameters: tuple[str, ...] = ()
     """Names in the parameter file that have no effect on the simulated flight."""
 
@@ -83,6 +87,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         mass = find_logged_aircraft(aircraft, flight_table.aircraft).mass
     east, north = scenario.wind_velocity(scenario.start.tolist())
     has_field = wind.field is not None
+    gradient = 0.0 if has_field else wind.gradient
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,
@@ -102,6 +107,8 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         height_datum=None if terrain is None else terrain.datum,
         zones=len(scenario.zones),
         forecast="" if wind.forecast is None else wind.forecast.describe(),
+        wind_gradient_per_s=gradient,
+        wind_amsl_m=wind.reference_amsl if gradient else None,
         unused_parameters=() if autopilot.parameters is None else autopilot.parameters.unused,
     )
 
@@ -181,6 +188,9 @@ def _world_line(conditions: Conditions) -> str:
         wind_text = "wind from each direction"
     elif conditions.wind_mps > 0.0:
         wind_text = f"wind {conditions.wind_mps:.3g} m/s from {conditions.wind_from_deg:.0f} degrees"
+    if conditions.wind_amsl_m is not None:
+        gradient = f"{100.0 * conditions.wind_gradient_per_s:+.3g} m/s per 100 m of height"
+        wind_text += f" at {conditions.wind_amsl_m:.0f} m AMSL, {gradient}"
     if conditions.forecast:
         wind_text = f"wind of {conditions.forecast}; {wind_text} at the start"
     turbulence_text = ""

@@ -34,7 +34,7 @@ from planfly.plan_fence import add_plan_fence
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
-from planfly.workflow.open_flight import open_flight
+from planfly.workflow.open_flight import PLAN_FILE, open_flight
 from planfly.workflow.output_paths import check_output_file
 from planfly.workflow.pipeline import FlownMission
 from planner.plan import Plan, plan_json
@@ -221,7 +221,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary
     a log.
     """
     if isinstance(source, Plan):
-        file = temporary_folders.enter_context(temporary_folder("planfly-export-")) / "plan.json"
+        file = temporary_folders.enter_context(temporary_folder("planfly-export-")) / PLAN_FILE
         write_atomically(file, plan_json(source))
         return file
     if isinstance(source, FlightLog):
@@ -268,7 +268,7 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOG_SUFFIXES:
-            message = f"{target}: only a flight log (.mcap) can be exported as {suffix}, and {path} is not a flight log"
+            message = f"{target}: only a flight log (.mcap) can be exported as {suffix}, not a plan or a mission"
             raise MissionError(message, file=target, field="suffix", value=suffix)
     needs_world = has_aircraft or any(
         target.suffix.lower() in (*MAP_WRITERS, *PARAMETER_SUFFIXES) for target in targets

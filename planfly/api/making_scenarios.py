@@ -11,6 +11,7 @@ from planfly.runtime.stages import report_line
 from planfly.threat_tables import GivenThreats, threat_tables
 from planner.search.algorithms import find_algorithm
 from world.argument_types import checks_types
+from world.errors import ArgumentError
 from world.scenario import Scenario, scenario_from_spec
 
 # Tables of a position, which replace another position as a whole.
@@ -51,6 +52,7 @@ def make_scenario(
     >>> scenario.threats.kill_scale.tolist(), scenario.wind.speed
     ([15.0, 15.0], 4.0)
     """
+    _check_terrain(tables.get("terrain"))
     base_scenario = load_scenario_with_options(base, {})
     spec = base_scenario.to_json()
     for name, values in _plain_values(tables).items():
@@ -70,6 +72,21 @@ def make_scenario(
         if note not in base_scenario.notes:
             report_line(f"{scenario.name}: {note}")
     return scenario
+
+
+def _check_terrain(table: Any) -> None:
+    """Raise ArgumentError for an array in place of [terrain] or of its file."""
+    for name, value in (
+        ("terrain", table),
+        ("terrain.path", table.get("path") if isinstance(table, Mapping) else None),
+    ):
+        if isinstance(value, np.ndarray):
+            allowed = (
+                'expected {"kind": "dem", "path": FILE}; np.savez("hills.npz", elevation=heights, xmin=, xmax=, ymin=,'
+                " ymax=) writes such a file of an array: rows from north to south, m, and its edges in degrees"
+                " (docs/your-dem.md)"
+            )
+            raise ArgumentError.of_argument(name, value, allowed, shown=f"array of shape {value.shape}")
 
 
 def _plain_values(values: Any) -> Any:

@@ -157,7 +157,10 @@ class Optimiser:
         generations: number of generations.
         evaluations: total number of evaluations at which to stop, instead of `generations`; of the last generation only
         the first points are evaluated, so that the number is exact.
+
+        Raises ArgumentError for numbers below 1.
         """
+        check_arguments(generations=generations, evaluations=evaluations)
         if evaluations is None:
             for _ in range(generations):
                 self.tell(objective(self.ask()))
@@ -194,7 +197,7 @@ def optimise(
     population: even number of points, at least 4, half of them drawn again in each generation; for "multistart" and
     "partial", which draw all points, the size of the largest generation.
     seed: a whole number, or a generator of random numbers.
-    initial: first points, (population, d); None draws uniform points.
+    initial: first points in the box, (population, d); None draws uniform points.
     Raises a `planfly.PlanflyError`, which is also a ValueError, for invalid bounds or another invalid argument.
 
     Minimum of a bowl at (1, 2); and, if a line separates it from the feasible side, a minimum of 0.5 at (0.5, 1.5):
@@ -234,12 +237,22 @@ def optimise(
         raise ArgumentError.of_argument("model", model, f"expected {', '.join(_MODELS)}")
     if population % 2:
         raise ArgumentError.of_argument("population", population, RANGES["population"].expected)
-    first_points = None if initial is None else _parse_numbers("initial", initial)
-    expected_shape = (population, lower_bounds.size)
-    if first_points is not None and (first_points.shape != expected_shape or not np.isfinite(first_points).all()):
-        allowed = f"expected finite numbers of shape {expected_shape}"
-        raise ArgumentError.of_argument("initial", initial, allowed, shown=f"of shape {first_points.shape}")
+    first_points = None if initial is None else _parse_initial(initial, population, lower_bounds, upper_bounds)
     return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
+
+
+def _parse_initial(initial: ArrayLike, population: int, lower: Floats, upper: Floats) -> Floats:
+    """Return first points as an array (population, d).  Raises ArgumentError for another shape or outside the box."""
+    points, expected_shape = _parse_numbers("initial", initial), (population, lower.size)
+    if points.shape != expected_shape or not np.isfinite(points).all():
+        allowed = f"expected finite numbers of shape {expected_shape}"
+        raise ArgumentError.of_argument("initial", initial, allowed, shown=f"of shape {points.shape}")
+    is_inside = ((points >= lower) & (points <= upper)).all(axis=1)
+    if not is_inside.all():
+        row = int(np.argmin(is_inside))
+        place = f"row {row}: {points[row].tolist()}"
+        raise ArgumentError.of_argument("initial", initial, "outside the box of lower and upper", shown=place)
+    return points
 
 
 def _parse_numbers(name: str, numbers: ArrayLike) -> Floats:

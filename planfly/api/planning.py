@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,8 +103,9 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
                 name, value, "cannot be combined with waypoints, because nothing is then searched"
             )
     expected = "expected an array (w, 3) of at least 2 rows: east, north and altitude AMSL, m"
+    coordinates = _coordinate_columns(waypoints)
     try:
-        path = np.array(waypoints, dtype=np.float64)
+        path = np.array(coordinates, dtype=np.float64)
     except (TypeError, ValueError):
         raise ArgumentError.of_argument("waypoints", type(waypoints).__name__, expected) from None
     if path.ndim != 2 or path.shape[1] != 3 or len(path) < 2:
@@ -120,6 +121,25 @@ def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOpti
             allowed = f"expected ({end[0]:.1f}, {end[1]:.1f}, {end[2]:.1f}); planfly.make_scenario makes another {name}"
             raise ArgumentError.of_argument("waypoints", path[row], allowed, shown=place)
     return path
+
+
+# Names of the coordinates in the columns of a data frame of waypoints.
+_COLUMN_NAMES = (("east_m", "north_m", "amsl_m"), ("east", "north", "amsl"), ("east_m", "north_m", "up_amsl_m"))
+
+
+def _coordinate_columns(waypoints: Any) -> Any:
+    """Return the coordinates of a data frame in the order of waypoints; anything else, also without names, unchanged.
+
+    Raises ArgumentError for columns of other names, whose order is not known.
+    """
+    names = list(getattr(waypoints, "columns", ()))
+    if not any(isinstance(name, str) for name in names):
+        return waypoints
+    for known in _COLUMN_NAMES:
+        if set(known) <= set(names):
+            return waypoints[list(known)]
+    allowed = "expected columns east_m, north_m and amsl_m"
+    raise ArgumentError.of_argument("waypoints", names, allowed, shown=f"columns {', '.join(map(str, names))}")
 
 
 @api_function(*PLANNING)

@@ -40,7 +40,7 @@ from world.errors import FlightError, MissionError
 from world.files import write_atomically
 from world.forecast.scenario_wind import shift_wind
 from world.frames import to_map
-from world.scenario import Scenario
+from world.scenario import Scenario, with_ground
 from world.terrain import Terrain
 
 # Distance beyond the ends of a strip over which its survey holds, m: the flare and the last of the final.
@@ -316,10 +316,13 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     """
     values = draw.values
     scenario, mission, placed = _with_drawn_wind(base.scenario, values, wind), base.mission, base.placed
-    if scenario.terrain is not None:
+    map_terrain, plan = scenario.terrain, base.plan
+    if map_terrain is not None:
         strip_error = _draw_strip_error(scenario.landing, draw.seed)
-        terrain = vary_terrain(scenario.terrain, values["terrain_height"], scenario.landing, strip_error)
-        scenario = replace(scenario, terrain=terrain)
+        terrain = vary_terrain(map_terrain, values["terrain_height"], scenario.landing, strip_error)
+        if terrain is not map_terrain:
+            scenario = with_ground(scenario, terrain)
+            plan = None if plan is None else replace(plan, scenario=with_ground(plan.scenario, terrain))
         home_error = _terrain_error_at_home(base, terrain)
         if home_error:
             mission, placed = _with_moved_home(base, home_error)
@@ -327,7 +330,7 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     draws = base.dispersions.draws
     limits = _limits_in_wind(base.airframe, scenario, is_drawn=draws is not None)
     airframe = replace(base.airframe, limits=limits, battery=battery)
-    setup = make_setup(scenario, airframe, mission, draw.seed, plan=base.plan, placed=placed)
+    setup = make_setup(scenario, airframe, mission, draw.seed, plan=plan, placed=placed)
     properties = () if draws is None else draws.properties(draw.seed)
     variation = Variation(
         mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties

@@ -32,7 +32,7 @@ from world.errors import ForecastError, MissionError, ScenarioError, TerrainErro
 from world.files import did_you_mean, missing_text
 from world.forecast.scenario_wind import check_coverage
 from world.frames import to_geo
-from world.scenario import Scenario, with_ground_at
+from world.scenario import Scenario, embedded_names, with_ground_at
 
 # Name of a plan without a file, in messages about its mission.
 PLAN_FILE = "plan.json"
@@ -126,8 +126,11 @@ def _open_plan(
 def check_mission_exists(path: Path) -> Path:
     """Check that a mission file exists, and return its path.
 
-    Raises MissionError with the most similar name as a suggestion.
+    Raises MissionError with the most similar name as a suggestion, and for a scenario.
     """
+    if path.suffix.lower() == ".toml" or (str(path) in embedded_names() and not path.exists()):
+        text = "a scenario, which has to be planned first: `planfly run` or planfly.plan_then_fly plan and fly it"
+        raise MissionError(f"{path}: {text}; expected a plan.json, .waypoints or .plan file", file=path)
     if not path.is_file():
         hint = "" if path.exists() else did_you_mean(path.name, _mission_file_names(path.parent), path.parent)
         expected = "expected a plan.json, .waypoints or .plan file"

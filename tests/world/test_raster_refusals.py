@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rasterio
+from pyproj import Transformer
 
 from tests.world.made.elevation_files import (
     BOUNDS,
@@ -29,8 +30,8 @@ from tests.world.made.elevation_files import (
 )
 from world.elevation_formats import FORMATS
 from world.errors import TerrainError
-from world.frames import GeoOrigin
-from world.raster import open_raster
+from world.frames import GeoOrigin, to_geo, to_map
+from world.raster import open_raster, require_covered
 
 
 def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
@@ -146,6 +147,38 @@ def test_area_beyond_the_tile(tmp_path: Path) -> None:
     assert_refused(path, "reaches beyond the tile", origin=GeoOrigin(MIDDLE.lat_deg + 1.0, MIDDLE.lon_deg))
     # A buffer is cut at the edge without a word.
     assert not np.isnan(read_window(path, buffer=50_000.0).heights).any()
+
+
+def test_the_corner_beyond_a_tilted_tile_is_named(tmp_path: Path) -> None:
+    """In UTM a map about 8 E is turned by 0.72 degrees, so a box within the tile's extents has corners outside."""
+    path = write_in_crs(tmp_path / "t.tif")
+    with rasterio.open(path) as tile:
+        (west, south, east, north), half_pixel = tile.bounds, 0.5 * tile.transform.a
+    raster = open_raster(str(path))
+    extents = np.array([[np.min(axis), np.max(axis)] for axis in to_map(MIDDLE, *raster.corners.T[::-1])])
+    with pytest.raises(TerrainError) as caught:
+        require_covered(raster, MIDDLE, extents)
+    found = re.search(
+        r"its corner east (-?\d+) m, north (-?\d+) m is (\d+) m outside the data; east (-?\d+)\.\.(-?\d+) m,"
+        r" north (-?\d+)\.\.(-?\d+) m is within",
+        str(caught.value),
+    )
+    assert found is not None, caught.value
+    corner_east, corner_north, outside, *inner = (float(number) for number in found.groups())
+    to_utm = Transformer.from_crs(4326, "EPSG:32632", always_xy=True)
+    farthest = 0.0
+    for corner in ((e, n) for e in extents[0] for n in extents[1]):
+        lat, lon = to_geo(MIDDLE, *(np.array([value]) for value in corner))
+        x, y = (float(value[0]) for value in to_utm.transform(lon, lat))
+        across = max(west + half_pixel - x, x - east + half_pixel, 0.0)
+        along = max(south + half_pixel - y, y - north + half_pixel, 0.0)
+        distance = float(np.hypot(across, along))
+        if np.hypot(corner[0] - corner_east, corner[1] - corner_north) < 1.0:
+            assert outside == pytest.approx(distance, abs=1.0)
+        farthest = max(farthest, distance)
+    assert outside == pytest.approx(farthest, abs=1.0)
+    assert outside > 50.0
+    require_covered(raster, MIDDLE, np.array(inner).reshape(2, 2))
 
 
 @pytest.mark.parametrize("value", [np.nan, -9999.0, -32768.0, 1e20, np.inf])

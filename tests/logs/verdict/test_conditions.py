@@ -45,15 +45,36 @@ def test_weather_and_ground() -> None:
     windy = with_wind(setup.scenario, 8.04, 3.0 * 3.14159265 / 2.0, "moderate")
     _, line = lines_of(setup.in_scenario(windy))
     begin = (
-        "Conditions: wind 8.04 m/s from 270 degrees, moderate turbulence; navigation without position error; terrain "
+        "Conditions: wind 8.04 m/s from 270 degrees at 420 m AMSL, +0.1 m/s per 100 m of height, moderate turbulence;"
+        " navigation without position error; terrain "
     )
     assert line.startswith(begin)
     assert "heights above " in line
     calm = replace(with_wind(setup.scenario, 0.0, 0.0, "none"), terrain=None)
     _, line = lines_of(setup.in_scenario(calm))
-    assert line == "Conditions: no wind, no turbulence; navigation without position error; no terrain; 1 zone"
+    assert line == (
+        "Conditions: no wind at 420 m AMSL, +0.1 m/s per 100 m of height, no turbulence;"
+        " navigation without position error; no terrain; 1 zone"
+    )
     _, line = lines_of(replace(setup, nav="gnss"))
     assert "; navigation with a GNSS error of 1.5 m on each axis; " in line
+
+
+def test_the_gradient_of_the_wind_is_stated_with_its_altitude() -> None:
+    """0.05 per second are 5 m/s more in 100 m; without a gradient there is no altitude."""
+    setup = make_setup()
+    wind = replace(with_wind(setup.scenario, 4.0, 0.0, None).wind, gradient=0.05, reference_amsl=445.2)
+    found = judging_conditions(setup.in_scenario(replace(setup.scenario, wind=wind)))
+    assert (found.wind_gradient_per_s, found.wind_amsl_m) == (0.05, 445.2)
+    said = "wind 4 m/s from 0 degrees at 445 m AMSL, +5 m/s per 100 m of height"
+    assert condition_lines(found)[1].startswith(f"Conditions: {said}, ")
+    any_wind = condition_lines(replace(found, wind_mps=None))[1]
+    assert any_wind.startswith("Conditions: wind from each direction at 445 m AMSL, +5 m/s per 100 m of height, ")
+    slower = replace(setup.scenario, wind=replace(wind, gradient=-0.004))
+    assert " m AMSL, -0.4 m/s per 100 m of height" in lines_of(setup.in_scenario(slower))[1]
+    even = judging_conditions(setup.in_scenario(replace(setup.scenario, wind=replace(wind, gradient=0.0))))
+    assert (even.wind_gradient_per_s, even.wind_amsl_m) == (0.0, None)
+    assert "AMSL" not in condition_lines(even)[1].partition(";")[0]
 
 
 def test_the_zones_are_counted_the_missions_own_among_them() -> None:

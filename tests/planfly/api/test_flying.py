@@ -183,3 +183,20 @@ def test_a_wind_that_is_none_is_refused_by_its_name_in_python(wind: object) -> N
 def test_a_wind_may_be_any_two_numbers() -> None:
     winds = ((4, 90), [4.0, 90.0], np.array([4.0, 90.0]))
     assert len({plan_json(planfly.plan("paper-07", seed=1, wind=wind)) for wind in winds}) == 1  # type: ignore[arg-type]
+
+
+def test_a_scenario_has_to_be_planned_first(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FIELD)
+    for mission in (tmp_path / "mine.toml", "tight"):
+        with pytest.raises(planfly.PlanflyError, match=r"a scenario, which has to be planned first: .*plan_then_fly"):
+            planfly.fly(mission)
+    with pytest.raises(planfly.ArgumentError, match=r"expected a Plan, text or a path; planfly.plan makes a plan"):
+        planfly.fly(small_scenario())  # type: ignore[arg-type]
+
+
+def test_an_export_of_a_plan_names_no_temporary_file(path: planfly.Plan, tmp_path: Path) -> None:
+    with pytest.raises(planfly.PlanflyError) as of_flight:
+        planfly.export(path, tmp_path / "p.csv")
+    assert str(of_flight.value) == (
+        f"{tmp_path / 'p.csv'}: only a flight log (.mcap) can be exported as .csv, not a plan or a mission"
+    )

@@ -95,9 +95,9 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
         ({"threats": np.array([[900.0, 90.0, 60j, 0.0]])}, "threats ndarray: expected a data frame"),
         (
             {"terrain": {"kind": "dem", "path": np.zeros((3, 3))}},
-            "terrain.path: expected a file's name, or a list of 1",
+            "terrain.path array of shape",
         ),
-        ({"terrain": np.zeros((3, 3))}, "terrain: expected a table"),
+        ({"terrain": np.zeros((3, 3))}, "terrain array of shape"),
         ({"terrain": {"kind": np.zeros((3, 3))}}, "terrain.kind: "),
         ({"area": {"east_m": np.array([-300.0, np.nan])}}, "area.east_m.1: nan: "),
         ({"threats": [{"kill_radius_m": 60.0}]}, r"threats\.0: position: missing; give east_m and north_m, or lat_deg"),
@@ -306,3 +306,11 @@ def test_a_campaign_flies_in_a_scenario_made_in_python(windy: planfly.Scenario, 
     assert f"--scenario {tmp_path / 'b' / 'scenario.toml'}" in (tmp_path / "b" / "report.html").read_text(
         encoding="utf-8"
     )
+
+
+def test_an_array_as_terrain_is_refused_with_the_way_to_a_file() -> None:
+    way = r"array of shape \(9, 9\): expected {\"kind\": \"dem\", \"path\": FILE}; np.savez\(.*rows from north to south"
+    with pytest.raises(planfly.ArgumentError, match=f"^terrain {way}"):
+        planfly.make_scenario("tight", terrain=np.zeros((9, 9)))
+    with pytest.raises(planfly.ArgumentError, match=f"^terrain.path {way}"):
+        planfly.make_scenario("tight", terrain={"kind": "dem", "path": np.zeros((9, 9))})

@@ -248,3 +248,16 @@ def test_the_number_of_evaluations_is_exact(model: str, evaluations: int) -> Non
     best = search.minimise(bowl, evaluations=evaluations)
     assert sum(calls) == search.evaluations == evaluations
     assert np.isfinite(best.value)
+
+
+def test_points_outside_the_box_and_less_than_one_evaluation_are_refused() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4)
+    for count in (0, -7):
+        with pytest.raises(planfly.ArgumentError, match=f"generations {count}: expected a whole number of gen"):
+            search.minimise(lambda points: points[:, 0], count)
+        with pytest.raises(planfly.ArgumentError, match=f"evaluations {count}: expected a whole number of eval"):
+            search.minimise(lambda points: points[:, 0], evaluations=count)
+    with pytest.raises(planfly.ArgumentError, match=r"initial row 2: \[2.0\]: outside the box"):
+        planfly.optimise([0.0], [1.0], population=4, initial=[[0.0], [0.5], [2.0], [1.0]])
+    # The edges belong to the box.
+    assert planfly.optimise([0.0], [1.0], population=4, initial=[[0.0], [0.5], [0.7], [1.0]]).ask().max() == 1.0

@@ -324,3 +324,18 @@ def test_planning_again_keeps_what_is_flown_and_goes_round_a_new_threat(tmp_path
 def test_a_search_stops_where_it_is_told(tmp_path: Path) -> None:
     made = planfly.plan("tight", algorithm="umda-smooth", stop=lambda: True)
     assert made.ended == "interrupted"
+
+
+def test_a_data_frame_of_waypoints_is_taken_by_the_names_of_its_columns() -> None:
+    import pandas as pd
+
+    scenario = small_scenario()
+    points = np.stack([scenario.start, 0.5 * (scenario.start + scenario.destination), scenario.destination])
+    expected = planfly.plan(scenario, waypoints=points).waypoints
+    for names in (("east_m", "north_m", "amsl_m"), ("east", "north", "amsl"), ("east_m", "north_m", "up_amsl_m")):
+        frame = pd.DataFrame(dict(zip(names, points.T, strict=True)) | {"speed": 25.0})
+        turned = frame[["speed", *reversed(names)]]
+        np.testing.assert_array_equal(planfly.plan(scenario, waypoints=turned).waypoints, expected)
+    np.testing.assert_array_equal(planfly.plan(scenario, waypoints=pd.DataFrame(points)).waypoints, expected)
+    with pytest.raises(planfly.ArgumentError, match=r"waypoints columns x, y, z: expected columns east_m, north_m and"):
+        planfly.plan(scenario, waypoints=pd.DataFrame(points, columns=["x", "y", "z"]))
