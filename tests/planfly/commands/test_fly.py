@@ -42,7 +42,7 @@ def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pyt
         assert (code == 2) == (message is not None)
         assert message is None or message in printed
     assert main(["check", str(log), "--airspeed", "20"]) == 2
-    assert "--airspeed: a log is judged" in capsys.readouterr().err
+    assert "--airspeed: not allowed with a log" in capsys.readouterr().err
 
 
 def test_a_thinner_log_is_judged_as_it_is(flight: Path, tmp_path: Path) -> None:

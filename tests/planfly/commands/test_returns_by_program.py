@@ -72,7 +72,7 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
 ) -> None:
     assert main([*ASKED, "--sitl", str(write_fake(mound, "dives-home")), "--out", "drawn"]) == 4
     out = capsys.readouterr().out
-    assert "returns 1 hits the ground" in out
+    assert "1 of 2 returns hits the ground" in out
     program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst returns flown"
     assert f"{program}, 0 of them agree with the simulation; 1 ended worse than in the simulation" in out
     assert "the program's outcome applies, because it is worse" in out

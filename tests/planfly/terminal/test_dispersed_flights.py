@@ -90,7 +90,7 @@ def test_a_run_flies_its_last_plan_within_the_limits_of_the_scenario(
     monkeypatch.setattr(planfly, "campaign", spy)
     out = tmp_path / "run"
     assert main(["run", "tight", "--refine", "1", "--flights", "2", "--out", str(out)]) == 4
-    assert "flights   holds in " in capsys.readouterr().out
+    assert "flights   the plan succeeds in " in capsys.readouterr().out
     (plan,) = flown
     written = read_plan(out / "plan.json")
     assert (plan.waypoints == written.waypoints).all()
