@@ -366,7 +366,8 @@ def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
 
 def _force_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
     """Return the XML of the coefficients of drag, lift and side force."""
-    lift_difference = f"<difference> <p> aero/lift-linear </p> <v> {number(aero.lift_at_least_drag)} </v> </difference>"
+    lift = "<product> <p> aero/lift-linear </p> <p> aero/flow-direction </p> </product>"
+    lift_difference = f"<difference> {lift} <v> {number(aero.lift_at_least_drag)} </v> </difference>"
     induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", factors))
     drag = add(
         scale(aero.drag_min, *_factor_property("zero-lift-drag", factors)),
@@ -429,6 +430,18 @@ def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
     difference = f"<difference> {flat_plate} <p> aero/lift-linear </p> </difference>"
     return f"""    <function name="aero/lift-linear">
       {straight_line}
+    </function>
+    <!-- Factor of the lift in the induced drag: 0 in flow from behind, where the straight line has no meaning. -->
+    <function name="aero/flow-direction">
+      <table>
+        <independentVar lookup="row"> {_ALPHA} </independentVar>
+        <tableData>
+          -3.141593  0.0
+          -1.400000  1.0
+          1.400000  1.0
+          3.141593  0.0
+        </tableData>
+      </table>
     </function>
     <!-- Share of separated flow: the book's blend of the straight line and of a flat plate. -->
     <function name="aero/separated">

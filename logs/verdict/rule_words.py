@@ -263,7 +263,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="touchdown",
             question="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles"
             " and zones?",
-            margin=Margin("strip left", "m", 20.0),
+            margin=Margin("distance from the strip's center", "m", 20.0),
             phrase=reason_phrase,
             unjudged="touchdown",
             explains_unjudged=True,
