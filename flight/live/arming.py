@@ -153,7 +153,10 @@ class ArmingState:
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _change_flight_mode(self, mode: int) -> CommandResult:
-        """Continue the flight in another mode; do nothing if this is already the mode."""
+        """Continue the flight in another mode, without the position of an earlier go-to.
+
+        MANUAL is denied, because there is no pilot. The current mode is accepted and changes nothing.
+        """
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:

@@ -11,7 +11,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
-from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
+from flight.mission.survey_layout import SurveyLayout, fixed_layout_reason, min_turn_around, with_layout
 from flight.mission.surveys import Survey, with_photo_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import GROUND_PATH, Finding
@@ -208,7 +208,7 @@ class _Trials:
         ]
         self._surveys = [all_surveys[number] for number in self._numbers]
         self._current_turn_around = min(min_turn_around(setup.route, survey) for survey in self._surveys)
-        reasons = (layout_obstacle(setup.mission, setup.route, survey) for survey in self._surveys)
+        reasons = (fixed_layout_reason(setup.mission, setup.route, survey) for survey in self._surveys)
         self.kept = next((reason for reason in reasons if reason), "")
         self.nearest: NearMiss | None = None
 

@@ -25,9 +25,9 @@ from logs.verdict.returns.glide_map import (
     GlideMap,
     PossibleWinds,
     exclude_zones,
-    glide_map,
     glide_slopes,
     landable_cells,
+    make_glide_map,
     search_glide_altitudes,
 )
 from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
@@ -240,7 +240,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     if not len(rows):
         return none
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
-    grid = glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
+    grid = make_glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
         return replace(none, not_judged="far")
     own_returns = _simulate_engine_out_returns(world, starts)
