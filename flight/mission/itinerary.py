@@ -641,7 +641,7 @@ class _ItineraryBuilder:
             self.add_open_item("autocontinue is 0: the flight continues, but PX4 would wait", item.seq, arduplane=False)
 
     def _fly_item(self, item: MissionItem) -> None:
-        """Process a navigation item."""
+        """Add the stops of a navigation item, or note that its command is not simulated."""
         if not item.autocontinue:
             self._note_wait(item)
         if item.command in TAKEOFFS:

@@ -606,8 +606,10 @@ class _ReturnBuilder:
         return node, (math.copysign(1.0, signed_radius) * (tangent - course)) % (2.0 * math.pi), tangent
 
     def _add_arc(self, node: RoutePoint, course: float, sweep: float, *, on_circle: bool = False) -> None:
-        """Add the corners of an arc.
+        """Add the corners of an arc, as in `circle_corners`.
 
+        node: center of the arc, with its radius.
+        course, sweep: course at the start of the arc and angle flown around its center, rad.
         on_circle: True for an arc of the loiter, on which no slope applies.
         """
         for east, north in circle_corners(node, course, sweep):

@@ -265,9 +265,9 @@ def find_winds(
     """Fly rounds of flights until the boundary of each direction is accurate enough, or `goal.flights` are flown.
 
     A new search starts with a few flights in calm air.  If none of them is flyable, the search ends there: the result
-    contains only these flights, and the table stays empty.  Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so
-    the result is the same for any number of workers and interruptions.  Flights completed before an error or Ctrl-C
-    stay in the table.
+    contains only these flights, and the table stays empty.  Flights in the table are not flown again.  The winds of a
+    round depend only on the earlier rounds, so the result is the same for any number of workers and interruptions.
+    Flights completed before an error or Ctrl-C stay in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """

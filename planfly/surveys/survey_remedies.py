@@ -391,7 +391,10 @@ class _Trials:
         return SurveyRemedy("every", "", 1.0, float(stride), "lines", *flight, shortest_length, lead_in)
 
     def find_course(self) -> SurveyRemedy | None:
-        """Try lines along and across the wind; return the shortest route that passes, or None."""
+        """Try lines along and across the wind; return the shortest route that passes, or None.
+
+        Without wind nothing is tried.
+        """
         wind = self._setup.scenario.wind
         if wind.speed <= 0.0:
             return None

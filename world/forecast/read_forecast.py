@@ -175,7 +175,10 @@ class _ForecastReader:
     # Times.
 
     def _decode_times(self, dataset: Any) -> Any:
-        """Return a dataset in which all times are datetime64."""
+        """Return a dataset in which all times are datetime64 and all coordinates are loaded.
+
+        Raises ForecastError for a calendar that is not supported.
+        """
         import xarray
 
         for name, variable in dataset.variables.items():
@@ -382,7 +385,11 @@ class _ForecastReader:
         return None
 
     def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
-        """Return the wind of one pair of variables, and the altitudes or heights of its levels."""
+        """Return the wind of one pair of variables, and the altitudes or heights of its levels.
+
+        Levels without any value around the mission are left out. Raises ForecastError for a level with only some
+        values, for no level at all, and for winds that are not plausible.
+        """
         level = self._level_of(east, east.name)
         if level is None:
             raise self._error(str(east.name), "its level is not stated: pressure, height above ground or altitude")

@@ -161,8 +161,8 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
     """Return the tolerance (rad) of an angle fitted over a distance (m) with an RMS residual (m).
 
-    The tolerance is ``floor`` (rad) plus an angle: the rotation of the line if both of its ends are off by twice the
-    RMS.
+    The tolerance is ``floor`` (rad) plus the rotation of the line if its ends differ by twice the RMS, and at most
+    `MAX_UNSTEADINESS_RAD`.
     """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 

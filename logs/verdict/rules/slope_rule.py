@@ -431,7 +431,7 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
 
 
 def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
-    """Return the measurements of a flown leg as facts."""
+    """Return the measurements of a flown leg as facts; [] for a leg that was not measured."""
     if measure is None:
         return []
     error_name = GROUND_FOLLOWING_ERROR if follows_ground(requirements, leg) else "height error"
