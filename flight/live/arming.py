@@ -109,7 +109,11 @@ class ArmingState:
         )
 
     def set_mode(self, mode: int) -> CommandResult:
-        """Change the mode to one of ArduPlane's modes."""
+        """Change the mode to one of ArduPlane's modes, or deny it.
+
+        Denied are modes that this vehicle lacks, RTL and GUIDED on the ground, MANUAL in flight, and AUTO without a
+        mission.
+        """
         if mode not in MODE_NAMES:
             plane_mode = mavlink.enums["PLANE_MODE"].get(mode)
             name = plane_mode.name.removeprefix("PLANE_MODE_") if plane_mode else f"mode {mode}"

@@ -722,7 +722,11 @@ class _ItineraryBuilder:
             self.stops.append(over_home)
 
     def _add_stop(self, item: MissionItem) -> None:
-        """Add the stop of a waypoint or loiter, and a note on each part that is not flown as written."""
+        """Add the stop of a waypoint or loiter, and a note on each part that is not flown as written.
+
+        An item without a position has no stop, only a note, unless it is a loiter after another stop. An endless loiter
+        ends the mission.
+        """
         name = command_name(item.command)
         is_later_loiter = stated_loiter(item) is not None and bool(self.stops)
         if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:
