@@ -469,7 +469,10 @@ def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
 
 
 def nominal_path(base: CampaignBase) -> BaseGeometry:
-    """Return the path of the flight without variations, and the lines of the route, m."""
+    """Return the path of the flight without variations, and the lines of the route, m.
+
+    Raises FlightError if the flight ends where it starts.
+    """
     setup = base.nominal_setup()
     track = fly_to_end(Flight(setup, base.airframe.aircraft)).track
     if len(track) < 2:

@@ -339,7 +339,8 @@ class SuggestionTrials:
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield a suggestion and then larger suggestions, each with its trial.
 
-        Each suggestion is applied to the unchanged mission in one step, as a user would apply it.
+        Each suggestion is applied to the unchanged mission in one step, as a user would apply it. The last is the one
+        that cannot be enlarged, or whose enlargement cannot be applied. Raises TrialAborted.
         """
         while True:
             if self.should_abort():
