@@ -644,7 +644,10 @@ class _ReturnBuilder:
         )
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction (0..1) of the slope to the target that is already flown at a position."""
+        """Return the fraction of the slope to the target that is already flown at a position.
+
+        It is negative before the start of the slope, and above 1 beyond the target.
+        """
         start_east, start_north, _ = self._slope_start
         slope_east, slope_north = self._circle.east - start_east, self._circle.north - start_north
         return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(

@@ -126,7 +126,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
 
 
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Return a leg's flown slope, or None if less than a second of the leg was flown.
+    """Return a leg's flown slope, or None if less than a second or less than a metre of the leg was flown.
 
     If a leg is too short for a fit between its blends, its slope is rough and has a larger tolerance.
     """
@@ -269,7 +269,7 @@ def _ground_following_error(requirements: RouteRequirements, leg: int, position:
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from the time at which its commanded airspeed can be reached, maybe none."""
+    """Return the rows of a leg from the time at which its commanded airspeed can be reached; there may be none."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
