@@ -201,8 +201,7 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
     The vertices are the point on the leg where the blend of slopes begins, points along the arc between its tangent
     points, and the point on the next leg where the blend ends. The height changes linearly along the arc. Where the
     slope decreases, the flight cuts the crest by (slope change) x (half length of the blend) / 4, and the vertices are
-    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the arc is the waypoint. If
-    the waypoint is at the place of one of its neighbours, it is the only vertex.
+    lowered by this amount. Without a radius, or if a leg is shorter than the tangent, the arc is the waypoint.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])

@@ -50,11 +50,7 @@ def energy_findings(
     """Compare the energy used with the battery's energy without its reserve.
 
     If a battery failsafe aborts the mission earlier, the energy used up to then is the limit.  An endless jump fails.
-    Otherwise the finding is undecided in four cases: the battery is guessed, the energy is unknown, a battery failsafe
-    may abort the mission, or the model's power is so uncertain that the energy may exceed the limit.
-
-    aligned: the flown track; None if nothing was flown.
-    geometric: True to judge the predicted energy of the plan, False to judge the flight.
+    Otherwise it is undecided if the battery is guessed, the energy unknown, a failsafe possible or the power uncertain.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)
