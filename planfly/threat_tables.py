@@ -51,7 +51,10 @@ def threat_tables(threats: Any) -> list[dict[str, Any]]:
 
 
 def _rows_of_columns(columns: Mapping[str, np.ndarray[Any, Any]]) -> list[dict[str, Any]]:
-    """Return the rows of a mapping of columns."""
+    """Return the rows of a mapping of columns, as dictionaries with the names of the columns.
+
+    Raises ArgumentError for columns of different lengths.
+    """
     distinct_shapes = {column.shape for column in columns.values()}
     if len(distinct_shapes) > 1 or any(len(shape) != 1 for shape in distinct_shapes):
         shapes = ", ".join(f"{name} of shape {column.shape}" for name, column in columns.items())
@@ -61,7 +64,10 @@ def _rows_of_columns(columns: Mapping[str, np.ndarray[Any, Any]]) -> list[dict[s
 
 
 def _rows_of_array(array: np.ma.MaskedArray[Any, Any]) -> list[dict[str, Any]]:
-    """Return the rows of an array (n, 4) of positions and radii, m."""
+    """Return the rows of an array (n, 4) as dictionaries with the keys `_ARRAY_COLUMNS`.
+
+    Raises ArgumentError for an array of another shape, unless it is empty.
+    """
     if array.size and array.shape[1:] != (len(_ARRAY_COLUMNS),):
         raise ArgumentError.of_argument("threats", array, _EXPECTED, shown=f"of shape {array.shape}")
     return [dict(zip(_ARRAY_COLUMNS, row, strict=True)) for row in array.tolist()]

@@ -87,11 +87,14 @@ class PlanflyError(Exception):
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
         """Convert an error to this class, with the location of the value that caused it.
 
-        file, field, value: location of the value that led to the error. It is added before the message; if it is empty,
-            the message is unchanged.
+        The message is "file: field: " and the message of the error; an empty file or field is left out. `allowed` is
+        copied from the error. The source of the other attributes depends on the fields that are named:
 
-        If the error names a field, its own field and value are kept, and also its file if it has one. Otherwise the
-        attributes are set to the location.
+        - The error has no field, and the argument `field` is not empty: file, field and value are the arguments.
+        - All other cases: field and value are copied from the error. So is the file, unless the error has none; then it
+          is the argument `file`.
+
+        file, field, value: location of the value that led to the error.
 
         >>> inner = FlightError("mine.toml: mass_kg = -1", file="mine.toml", field="mass_kg", value=-1)
         >>> found = ScenarioError.from_error(inner, "tight", "flight.aircraft", "./mine")

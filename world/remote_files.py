@@ -157,7 +157,8 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     """Find a file on a server; return it with its local copy, or None if the server does not have it.
 
     folder: cache folder for the copies.
-    Raises TerrainError if the server cannot be reached, and OSError if the cache cannot be written.
+    Raises TerrainError if the server cannot be reached or states a size that is not allowed, and OSError if the cache
+    cannot be written.
     """
     answer: http.client.HTTPResponse | None = None
     for attempt in range(_MAX_ATTEMPTS):

@@ -501,7 +501,7 @@ def _with_file_zones(
 
 
 def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
-    """Return the zones that may be active during the flight."""
+    """Return the zones that may be active during the flight; all zones if the scenario states no time."""
     if spec.at is None:
         return list(spec.zones or ())
     span = parse_span(spec.at)

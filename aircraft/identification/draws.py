@@ -20,6 +20,8 @@ _DRAWS_PER_AIRCRAFT = 20
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
     """Draw joint samples of all parameters, within the bounds of the parameters, (count, n).
 
+    If too few samples are within the bounds, samples that are clipped to the bounds complete them.
+
     The n columns are `aircraft.identification.parameters.PARAMETERS`.
     """
     generator = np.random.default_rng(seed)
@@ -28,7 +30,6 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
         estimate.values, estimate.covariance, _DRAWS_PER_AIRCRAFT * count, method="eigh"
     )
     within_bounds = samples[((samples >= lower) & (samples <= upper)).all(axis=1)]
-    # For an estimate close to its bounds too few samples lie within the bounds; clipped samples complete them.
     chosen = np.concatenate([within_bounds, np.clip(samples, lower, upper)])[:count]
     return np.asarray(chosen)
 

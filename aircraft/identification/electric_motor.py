@@ -78,6 +78,8 @@ class ElectricMotor:
     ) -> tuple[Floats, Floats]:
         """Return the thrust, N, and the current from the battery, A, two arrays (n,).
 
+        voltage: voltage of the battery, V; None for the motor's own `voltage`.
+
         >>> motor = ElectricMotor((4.48e-6, 5.27e-5, -2.18e-3), (1.58e-4, -1.26e-3, -2.78e-2), 0.0659, 0.042, 1.5, 44.4)
         >>> still, full, sea = np.zeros(1), np.ones(1), np.full(1, 1.225)
         >>> thrust, current = motor.thrust_and_current(still + 25.0, full, sea)

@@ -129,7 +129,7 @@ def _force_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
 
 
 def _surface_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a function that delays the control surfaces."""
+    """Return a function that delays the control surfaces by a number of seconds."""
     return lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, seconds)), base)
 
 

@@ -200,7 +200,7 @@ class ParameterSet:
     def restore(cls, stored: StoredParameters, *fields: Any) -> Self:
         """Return the parameters that a recording stores, under present or older names.
 
-        Missing parameters have their defaults.
+        Missing parameters have their defaults. Names that the table of parameters does not contain are left out.
 
         Raises ParameterError if a value is not allowed.
         """

@@ -397,7 +397,7 @@ def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
 
 @inner
 def _add_friction(frame: Record, contacts: Records, frictions: Records, count: int) -> None:
-    """Add the accelerations that are caused by friction at the contacts.
+    """Add the accelerations that friction causes at the contacts to the accelerations of the frame.
 
     count: number of friction records.
     """

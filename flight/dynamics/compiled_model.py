@@ -157,7 +157,7 @@ class CompiledModel:
         return self._register(name) if name else zero_register
 
     def _copy_state(self) -> None:
-        """Copy the state and the constants of the JSBSim instance to the registers."""
+        """Copy the state and the constants of the JSBSim instance to the frame and the registers."""
         read, numbers = self._fdm.properties.read, self.numbers
         for register, getter in self._getters.values():
             numbers[register] = getter()

@@ -121,7 +121,7 @@ class _Reader:
         self._declares = name == "property" and depth == (2 if self._main else 1)
 
     def _end_element(self, name: str) -> None:
-        """Record the property that the text of an element names, or the end of a removed channel."""
+        """Record the end of a removed channel, or the property that the text of an element creates or reads."""
         self._path.pop()
         match = _PROPERTY_NAME.fullmatch("".join(self._text).strip())
         self._text = []

@@ -293,7 +293,12 @@ class _Translator:
         return self.properties[name]
 
     def _translate_table(self, element: Element, target: int | None) -> int:
-        """Translate a table of one variable; return the register of its value."""
+        """Translate a table of one variable; return the register of its value.
+
+        Raises UnsupportedModel for any other table.
+
+        target: register of the value; None for a new register.
+        """
         _check_element(element, children={"independentVar", "tableData"})
         variables, data = element.findall("independentVar"), element.findall("tableData")
         if len(variables) != 1 or len(data) != 1:

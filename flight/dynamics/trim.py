@@ -315,7 +315,12 @@ def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near
 
 
 def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m), or None."""
+    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m).
+
+    Return None if no trim is found.
+
+    near: trim from which the iteration starts, as in `trim`.
+    """
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 

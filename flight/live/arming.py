@@ -109,7 +109,11 @@ class ArmingState:
         )
 
     def set_mode(self, mode: int) -> CommandResult:
-        """Change the mode to one of ArduPlane's modes."""
+        """Change the mode to one of ArduPlane's modes, or deny it.
+
+        Denied are modes that this vehicle lacks, RTL and GUIDED on the ground, MANUAL in flight, and AUTO without a
+        mission.
+        """
         if mode not in MODE_NAMES:
             plane_mode = mavlink.enums["PLANE_MODE"].get(mode)
             name = plane_mode.name.removeprefix("PLANE_MODE_") if plane_mode else f"mode {mode}"
@@ -153,7 +157,10 @@ class ArmingState:
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _change_flight_mode(self, mode: int) -> CommandResult:
-        """Continue the flight in another mode; do nothing if this is already the mode."""
+        """Continue the flight in another mode, without the position of an earlier go-to.
+
+        MANUAL is denied, because there is no pilot. The current mode is accepted and changes nothing.
+        """
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:

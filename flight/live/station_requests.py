@@ -394,7 +394,10 @@ class Requests:
         return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
 
     def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        """Set a parameter for a station; answer with its value, and with the reason if it is refused."""
+        """Set a parameter for a station; answer with its value, and with the reason if it is refused.
+
+        The parameter `FORCE` then applies to the next arming.
+        """
         number, problem = self.parameters.set(
             message.param_id, float(message.param_value), in_flight=self.arming.flying
         )

@@ -223,7 +223,10 @@ class MissionProgress:
             self._downlink.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
 
     def _waypoint_items(self) -> tuple[int, ...]:
-        """Return the item number (seq) at each waypoint of the flown mission; -1 without an item."""
+        """Return the item number (seq) at each waypoint of the flown mission; -1 without an item.
+
+        Before a flight they are the numbers of the judged mission; () if none was judged.
+        """
         if self._route_items is not None:
             return self._route_items
         return () if self._arming.last_verdict is None else self._arming.last_verdict.items

@@ -641,7 +641,7 @@ class _ItineraryBuilder:
             self.add_open_item("autocontinue is 0: the flight continues, but PX4 would wait", item.seq, arduplane=False)
 
     def _fly_item(self, item: MissionItem) -> None:
-        """Process a navigation item."""
+        """Add the stops of a navigation item, or note that its command is not simulated."""
         if not item.autocontinue:
             self._note_wait(item)
         if item.command in TAKEOFFS:
@@ -722,7 +722,11 @@ class _ItineraryBuilder:
             self.stops.append(over_home)
 
     def _add_stop(self, item: MissionItem) -> None:
-        """Add the stop of a waypoint or loiter, and a note on each part that is not flown as written."""
+        """Add the stop of a waypoint or loiter, and a note on each part that is not flown as written.
+
+        An item without a position has no stop, only a note, unless it is a loiter after another stop. An endless loiter
+        ends the mission.
+        """
         name = command_name(item.command)
         is_later_loiter = stated_loiter(item) is not None and bool(self.stops)
         if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:

@@ -606,8 +606,10 @@ class _ReturnBuilder:
         return node, (math.copysign(1.0, signed_radius) * (tangent - course)) % (2.0 * math.pi), tangent
 
     def _add_arc(self, node: RoutePoint, course: float, sweep: float, *, on_circle: bool = False) -> None:
-        """Add the corners of an arc.
+        """Add the corners of an arc, as in `circle_corners`.
 
+        node: center of the arc, with its radius.
+        course, sweep: course at the start of the arc and angle flown around its center, rad.
         on_circle: True for an arc of the loiter, on which no slope applies.
         """
         for east, north in circle_corners(node, course, sweep):
@@ -642,7 +644,10 @@ class _ReturnBuilder:
         )
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction (0..1) of the slope to the target that is already flown at a position."""
+        """Return the fraction of the slope to the target that is already flown at a position.
+
+        It is negative before the start of the slope, and above 1 beyond the target.
+        """
         start_east, start_north, _ = self._slope_start
         slope_east, slope_north = self._circle.east - start_east, self._circle.north - start_north
         return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(

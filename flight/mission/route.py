@@ -829,7 +829,8 @@ def _tightest_circle_radius(limits: Limits | None, airspeed: float, up: float) -
 def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
     """Return a function that computes the steepest climb and descent of a spiral, as tangents.
 
-    Both are a fraction of the aircraft's slope limit on the course of the spiral where this limit is lowest.
+    Both are a fraction of the aircraft's slope limit on the course of the spiral where this limit is lowest. A climb
+    or descent without a limit, or that the aircraft cannot fly, has the slope `DEFAULT_SPIRAL_SLOPE`.
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:

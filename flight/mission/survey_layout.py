@@ -93,7 +93,7 @@ def _lead_lengths(route: Route, survey: Survey) -> list[float]:
     return [math.dist(points[start], points[end]) for start, end in ends]
 
 
-def layout_obstacle(mission: Mission, route: Route, survey: Survey) -> str:
+def fixed_layout_reason(mission: Mission, route: Route, survey: Survey) -> str:
     """Return the reason why the layout of a survey cannot be changed, or "" if it can."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission contains jumps"
@@ -117,10 +117,10 @@ def with_layout(
 ) -> Mission | None:
     """Return the mission with a new layout of a survey, or None if that is impossible.
 
-    route: the mission's route, on the map about ``origin``. A survey with a `layout_obstacle` cannot be changed. A
+    route: the mission's route, on the map about ``origin``. A survey with a `fixed_layout_reason` cannot be changed. A
         change of course is possible only if all lines are straight and have the same altitude.
     """
-    if layout_obstacle(mission, route, survey):
+    if fixed_layout_reason(mission, route, survey):
         return None
     items, lines, flown = _survey_items(mission, route, survey), list[_Line](), _flown_items(route)
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):

@@ -483,8 +483,12 @@ def _update_wind(
     air: Record,
     dt: float,
 ) -> None:
-    """Set the mean wind and the next gust at the aircraft in ``air``, along true north, east and down.
+    """Write the mean wind and the next gust at the aircraft's position into the record ``air``.
 
+    The components are along true north, east and down.  The mean wind has no vertical component.  Without turbulence
+    (`wind.w20` is 0) the gust in the record stays as it is.
+
+    height_above_ground, up: height and altitude of the aircraft, m; the height is NaN over unknown ground.
     convergence_cos, convergence_sin: cosine and sine of the grid convergence, the map course of true north.
     """
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)

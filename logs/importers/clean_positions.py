@@ -195,7 +195,10 @@ def metres_between(lat: Floats, lon: Floats) -> Floats:
 
 
 def _usable_rows(time: Floats, values: Floats) -> Flags:
-    """Return a mask (n,): True for rows with a valid time, position and altitude."""
+    """Return a mask (n,): True for rows with a valid time, position and altitude.
+
+    Latitude and longitude 0 are no valid position. Rows without an altitude are valid only if no row has one.
+    """
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
         has_position = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))

@@ -226,7 +226,8 @@ class LoggedFlight:
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     """Extract one flight from a log.
 
-    The flight is the one that followed its mission for the longest time, or the one with a number from 1.
+    number: number of the flight in the log, from 1; None for the flight that followed its mission for the longest time.
+        A flight that followed several missions counts as several flights.
 
     Raises LogError for a vehicle other than an aeroplane, a log without a flight, and a number that is not in the log.
 

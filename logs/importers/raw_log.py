@@ -48,6 +48,8 @@ class LogSeries:
 def with_used_energy(battery: LogSeries) -> LogSeries:
     """Return the battery's current (A) and the energy used (Wh), (n, 2).
 
+    A charging current counts as 0.  A sample counts for at most `_MAX_SAMPLE_TIME_S`.
+
     battery: voltage (V) and current (A), (n, 2), from which the energy is computed.
 
     >>> battery = LogSeries("BAT", np.array([0.0, 1.0, 2.0]), np.array([[36.0, 0.0], [36.0, 100.0], [36.0, 100.0]]))

@@ -171,7 +171,7 @@ class RouteTable(SetupModel):
     @model_validator(mode="before")
     @classmethod
     def _columns_of_points(cls, value: Any) -> Any:
-        """Return the values of a route by name, with its points as columns."""
+        """Return the values of a route by name, with its points as columns; any other value unchanged."""
         if not isinstance(value, Route):
             return value
         columns = {name: value.points[name] for name in field_names(ROUTE_POINT)} | {"airspeed": value.leg_airspeeds}

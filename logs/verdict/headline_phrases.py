@@ -59,7 +59,10 @@ def slope_phrase(noun: str, finding: Finding) -> str:
 
 
 def small_circle_phrase(noun: str, finding: Finding) -> str:
-    """Return a phrase such as "loiter at waypoint 3 (radius 40 m < 76 m)"; else `excess_phrase`."""
+    """Return a phrase such as "loiter at waypoint 3 (radius 40 m < 76 m)".
+
+    Return `excess_phrase` instead if the planned radius is not below its limit.
+    """
     limit = finding.effective_limit
     if finding.planned is None or limit is None or finding.planned >= limit:
         return excess_phrase(noun, finding)

@@ -120,7 +120,10 @@ def suggest_passing_zone(
 def _smallest_shift(
     moves: Records, zone: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, max_shift: float
 ) -> float | None:
-    """Return the smallest shift (m) in one direction that ends a violation; None if it exceeds ``max_shift``.
+    """Return the smallest shift (m) in one direction that ends a violation.
+
+    Return None if the shift exceeds ``max_shift``, if it depends on unknown ground, or if it is not found within
+    `ZONE_SUGGESTION_TRIAL_COUNT` steps.
 
     Each step shifts the path by its present depth beyond the limit.  No smaller shift is missed, because a path needs a
     shift of at least its depth.  Ground that rises faster than the step may be missed.
@@ -415,7 +418,10 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest airspeed below the present command at which a turn fits its legs, m/s, or None."""
+    """Return the highest airspeed below the present command at which a turn fits its legs, m/s; None if none does.
+
+    corner: waypoint at which the aircraft turns.
+    """
     current_speed = float(max(requirements.setup.demanded_route.leg_airspeeds[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(
@@ -622,7 +628,10 @@ def suggest_using_less_energy(
 def suggest_flying_faster(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a higher airspeed, above the stall."""
+    """Suggest an airspeed above the stall on the slowest leg; () if its command is already as high.
+
+    finding: failed finding of the stall rule; without a limit there is no suggestion.
+    """
     if finding.limit is None:
         return ()
     leg = int(np.argmin(requirements.route.leg_airspeeds))

@@ -155,7 +155,7 @@ class Chart:
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
     def shown_axis_range(self) -> tuple[float, float]:
-        """Return `axis_range`, or else the range from the first to the last value along the axis."""
+        """Return `axis_range`, or else the range of the values along the axis; (0, 1) without values."""
         if self.axis_range is not None:
             return self.axis_range
         finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]

@@ -116,7 +116,12 @@ def _widen_bounds(bounds: Floats) -> Floats:
 
 
 def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: bool) -> Projection:
-    """Make the projection that looks across the route from its south side."""
+    """Make the projection that looks across the route from its south side, about the middle of the bounds.
+
+    route: waypoints, m, (w, 3).
+    stretch: factor on heights.
+    is_narrow: True to turn the view by `_NARROW_SCENE_AZIMUTH_RAD`.
+    """
     step = route[-1] - route[0]
     azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
     if math.sin(azimuth) > 0.0:

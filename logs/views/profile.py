@@ -49,7 +49,7 @@ def profile_chart(
     to destination.  Ground, spheres and zones are cut by the vertical plane along the route.  Flown altitudes are drawn
     at the progress of the flight along the route, which never decreases.
 
-    stops: displayed number of each waypoint of the route; None if each waypoint is a stop.
+    stops: number of each waypoint, (w,), shown at the first of those with the same number; None numbers all waypoints.
     above_ground: (w,) m, as in `flight.mission.route.Route`; None if no leg follows the ground.
 
     >>> from logs.recording.example_log import example_log

@@ -51,7 +51,10 @@ def judged_path(
     time_of: Callable[[Element], float],
     key_of: Callable[[Element], Key],
 ) -> list[tuple[Key, list[PathPoint[Element]]]]:
-    """Split the path into segments; the element nearest in time has the same key throughout a segment.
+    """Split the path into segments by the key of the judged element that is nearest in time.
+
+    Returns the key and the points of each segment, in order of time; [] without elements.  Each segment but the last
+    also has the first point of the next segment.
 
     track: the flown track; None for the planned path.
     elements: judged elements, in order of time; each time has one element.

@@ -42,7 +42,7 @@ class GroundGrid:
 
 
 def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
-    """Return the east and north range of area, route and flight, m, (2, 2)."""
+    """Return the range of area, route and flight, m, (2, 2): a row each for east and north, of minimum and maximum."""
     points = [setup.scenario.bounds.T, setup.route.positions[:, :2]]
     if track is not None:
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])

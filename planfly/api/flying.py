@@ -331,7 +331,7 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
-    """Judge a recorded flight again.
+    """Judge a recorded flight again; a flown mission without another terrain or fences keeps its verdict.
 
     terrain: elevation file that replaces the terrain of the flight; None keeps the terrain.
     fences: additional fences.

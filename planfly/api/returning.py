@@ -305,7 +305,10 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
 
 
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
-    """Simulate and judge returns from points of a flight, with glides and requested remedies and files."""
+    """Simulate and judge returns and glides from points of a flight.
+
+    The request states whether remedies are sought too, and the folder into which files are written, if any.
+    """
     world = make_return_world(setup)
     if request.program is not None:
         check_returns_as_arduplane(world, request.program)

@@ -233,7 +233,10 @@ def _parse_camera(numbers: tuple[float, ...] | None) -> Camera | None:
 
 
 def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
-    """Return a setup with a camera for its surveys; missing overlaps are taken from the mission."""
+    """Return a setup with a camera for all its surveys; unchanged if the camera is None.
+
+    Overlaps that the camera does not state, and the interval between photos, are taken from the mission's camera.
+    """
     if camera is None:
         return setup
     plans = []

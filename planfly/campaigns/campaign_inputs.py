@@ -58,7 +58,10 @@ def _differs_by_rounding(stored: Any, current: Any) -> bool:
 
 
 def _difference_text(name: str, stored: Any, current: Any) -> str:
-    """Describe one input that differs; a value is None if the input is not stated."""
+    """Describe one input that differs; only its name if the values are hashes.
+
+    stored, current: values of the input; None if it is not stated.
+    """
     if str(stored if current is None else current).startswith(_HASH_PREFIX):
         return name
     if current is None:

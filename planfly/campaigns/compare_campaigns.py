@@ -232,7 +232,10 @@ def comparison_lines(comparison: CampaignComparison) -> list[str]:
 
 
 def _change_text(first: int, second: int, comparison: CampaignComparison) -> str:
-    """Return the number of flights that failed a rule in each campaign, and the change of their share."""
+    """Return a text on the change of the share of flights that failed a rule.
+
+    first, second: numbers of these flights in both campaigns.
+    """
     first_count, second_count = comparison.compared_counts
     change = 100.0 * (second / second_count - first / first_count)
     word = "more often" if change > 0.0 else "less often" if change < 0.0 else "as often"

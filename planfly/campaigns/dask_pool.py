@@ -97,6 +97,8 @@ class DaskPool:
     def fly(self, next_request: Callable[[], FlightRequest | None]) -> Iterator[FinishedFlight]:
         """Fly the requests that `next_request` returns, and yield each flight when it is done, in any order.
 
+        A flight whose worker died `MAX_WORKER_DEATHS` times is yielded as lost.
+
         next_request: returns the next request, or None if there is none at present; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if the scheduler is lost.
         """

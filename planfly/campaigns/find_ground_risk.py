@@ -116,6 +116,8 @@ def fly_for_excursions(
     path: planned path, and that of the flight without variations, m.
     interval: time between two returns, s.
     glide: True to include the glide after an engine failure.
+
+    Without terrain, and for a flight that ends at its start, the row contains only the draw and how the flight ended.
     """
     draw = draw_flight(base.dispersions, base.seed, index)
     varied = vary_flight(base, draw, wind)
@@ -179,7 +181,12 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
 
 
 def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
-    """Return positions and ground velocities of a return with a position each second, m and m/s, (n, 3) each."""
+    """Return every `_RETURN_SAMPLE_ROWS`th position and the last of a return, m, and the ground velocities there, m/s.
+
+    path: positions of the return, one each second, m, (t, 3).
+
+    The results have the shape (n, 3).
+    """
     rows = np.union1d(np.arange(0, len(path), _RETURN_SAMPLE_ROWS), [len(path) - 1])
     return path[rows], np.gradient(path, axis=0)[rows]
 
@@ -462,7 +469,10 @@ def with_ground_class(result: GroundRiskResult) -> GroundRiskResult:
 
 
 def nominal_path(base: CampaignBase) -> BaseGeometry:
-    """Return the path of the flight without variations, and the lines of the route, m."""
+    """Return the path of the flight without variations, and the lines of the route, m.
+
+    Raises FlightError if the flight ends where it starts.
+    """
     setup = base.nominal_setup()
     track = fly_to_end(Flight(setup, base.airframe.aircraft)).track
     if len(track) < 2:

@@ -262,12 +262,12 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsResult:
-    """Fly rounds of flights until each boundary is accurate enough, or all flights are used.
+    """Fly rounds of flights until the boundary of each direction is accurate enough, or `goal.flights` are flown.
 
-    A search starts with a few flights in calm air.  If none of them is flyable, no wind is searched, and the table
-    stays empty.  Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so
-    the result is the same for any number of workers and interruptions.  Flights completed before an error or Ctrl-C
-    stay in the table.
+    A new search starts with a few flights in calm air.  If none of them is flyable, the search ends there: the result
+    contains only these flights, and the table stays empty.  Flights in the table are not flown again.  The winds of a
+    round depend only on the earlier rounds, so the result is the same for any number of workers and interruptions.
+    Flights completed before an error or Ctrl-C stay in the table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
@@ -430,7 +430,9 @@ class _Search:
 
 
 def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
-    """Fly the first draws in calm air; return the flights if none of them is flyable, otherwise [].
+    """Fly the first draws in calm air; return the flights if all of them were flown and none is flyable, otherwise [].
+
+    Nothing is flown, and [] is returned, if the goal permits fewer flights than this needs.
 
     There are enough flights to disprove the target: a mission that has the target probability fails all of them with a
     probability of at most 1 minus the confidence.
@@ -441,7 +443,10 @@ def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
     draws, rows = iter(range(count)), dict[int, FlightRow]()
 
     def next_request() -> FlightRequest | None:
-        """Return the request of the next flight in calm air; None once a flight was flyable."""
+        """Return the request of the next flight in calm air.
+
+        None if a flight was flyable or could not be flown, or if all flights are requested.
+        """
         has_none_flyable = not any(row.outcome in ("flyable", "lost") for row in rows.values())
         draw = next(draws, None) if has_none_flyable else None
         return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))

@@ -36,7 +36,7 @@ def remedies(summary: CampaignSummary, scenario: Scenario) -> tuple[str, ...]:
 
 
 def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) -> list[str]:
-    """Return the changes that would help against the failures of a rule.
+    """Return texts on the changes that would help against the failures of a rule; [] if none is known.
 
     low_margin: margin that 5 % of the flights fall below, m; None if it is unknown.
     """

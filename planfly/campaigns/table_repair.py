@@ -128,7 +128,10 @@ def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
-    """Separate undamaged from damaged rows by the checksum at the end of each row."""
+    """Separate undamaged from damaged flights by the checksum at the end of each row.
+
+    rows: each begins with the number of its flight.
+    """
     examination = Examination([], [])
     for *values, stored_checksum in rows:
         (examination.undamaged if stored_checksum == checksum(values) else examination.damaged).append(values[0])

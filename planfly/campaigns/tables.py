@@ -308,7 +308,7 @@ class LockedTable:
             self._connection.execute(f"INSERT INTO flights VALUES ({placeholders})", [*row, checksum(row)])
 
     def delete_later_flights(self, first_number: int) -> None:
-        """Delete the flights from this number on, because an earlier flight decided the campaign.
+        """Delete the flights from `first_number` on, because an earlier flight decided the campaign.
 
         Raises OSError for a table that was removed.
         """
@@ -692,7 +692,10 @@ def read_path_arrays(path: Path) -> dict[str, NDArray[np.float32]]:
 
 
 def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return the arrays of a column, (n, m, *entry_shape), where m is the length of the longest array."""
+    """Return the arrays of a column, (n, m, *entry_shape), where m is the length of the longest array.
+
+    Shorter arrays are padded with NaN.
+    """
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     arrays = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
     for row, (data,) in zip(arrays, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):

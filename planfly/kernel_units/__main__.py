@@ -15,7 +15,10 @@ from planfly.runtime.process_setup import prepare_process, with_large_stack
 
 
 def answer_requests() -> int:
-    """Compile the units named on standard input, one after another, until the input ends."""
+    """Compile the units named on standard input, one after another; the process ends when the input ends.
+
+    After each unit a line is printed: "done" or "failed", and the name of the unit.
+    """
     # Ctrl-C reaches all processes of a terminal: this process ends with the process that started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     requested: queue.Queue[str] = queue.Queue()

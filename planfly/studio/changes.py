@@ -121,14 +121,20 @@ def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
 
 
 def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bool:
-    """Return True if a leg was begun, or if the leg to a waypoint was begun."""
+    """Return True for a leg that was begun, and for a waypoint that was passed or to which the leg was begun.
+
+    Return True for all other places.
+    """
     if place.kind not in ("leg", "waypoint") or place.index is None or (place.kind, place.index) in places_reached:
         return True
     return place.kind == "waypoint" and ("leg", place.index - 1) in places_reached
 
 
 def _severity_key(result: PlaceResult) -> tuple[bool, int, float]:
-    """Return a key that sorts results from the worst to the best; places that were not reached come last."""
+    """Return a key that sorts results from the worst to the best.
+
+    Places that were not reached come last, unless they fail.
+    """
     is_last = result.level == _NOT_REACHED and result.ok is not False
     return is_last, _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
 

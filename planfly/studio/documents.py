@@ -445,7 +445,10 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
 
 
 def _have_same_items(mission_a: Mission, mission_b: Mission) -> bool:
-    """Return True if two missions have the same commands, at positions that differ only by rounding."""
+    """Return True if two missions have the same commands, at positions that differ only by rounding.
+
+    Commands without a position must also have the same parameters.
+    """
     commands = [
         [(item.command, item.has_position or item.params) for item in mission.items]
         for mission in (mission_a, mission_b)

@@ -11,7 +11,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
-from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
+from flight.mission.survey_layout import SurveyLayout, fixed_layout_reason, min_turn_around, with_layout
 from flight.mission.surveys import Survey, with_photo_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import GROUND_PATH, Finding
@@ -208,7 +208,7 @@ class _Trials:
         ]
         self._surveys = [all_surveys[number] for number in self._numbers]
         self._current_turn_around = min(min_turn_around(setup.route, survey) for survey in self._surveys)
-        reasons = (layout_obstacle(setup.mission, setup.route, survey) for survey in self._surveys)
+        reasons = (fixed_layout_reason(setup.mission, setup.route, survey) for survey in self._surveys)
         self.kept = next((reason for reason in reasons if reason), "")
         self.nearest: NearMiss | None = None
 
@@ -391,7 +391,10 @@ class _Trials:
         return SurveyRemedy("every", "", 1.0, float(stride), "lines", *flight, shortest_length, lead_in)
 
     def find_course(self) -> SurveyRemedy | None:
-        """Try lines along and across the wind; return the shortest route that passes, or None."""
+        """Try lines along and across the wind; return the shortest route that passes, or None.
+
+        Without wind nothing is tried.
+        """
         wind = self._setup.scenario.wind
         if wind.speed <= 0.0:
             return None
@@ -519,7 +522,7 @@ class _Trials:
         return remedies[-1]
 
     def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
-        """Try longer turn-around distances with the lowest of the reduced airspeeds."""
+        """Try longer turn-around distances with the lowest of the reduced airspeeds; return None if none passes."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
             remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe, self._longer_turn_arounds())
             if remedy is not None:

@@ -165,7 +165,7 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
 
     The scenario is None without a plan.json.
 
-    Raises LogError if neither the options nor the log contain the mission.
+    Raises LogError if the options name no mission, and the log contains none or too few of its items.
     """
     if (named_plan := options.get("plan")) is not None:
         plan_path, terrain = check_mission_exists(Path(named_plan)), options.get("terrain")

@@ -319,7 +319,7 @@ class SuggestionTrials:
         return is_passed(*self._compared_verdicts(trial, finding), finding)
 
     def _is_tried_by_flight(self, finding: Finding) -> bool:
-        """Return True if the suggestions of a finding are flown."""
+        """Return True if the suggestions of a finding are tried by flights: if the judged flight reached its place."""
         return self.judged.verdict.level == "flown" and not self._is_unreached(finding)
 
     def _is_unreached(self, finding: Finding) -> bool:
@@ -339,7 +339,8 @@ class SuggestionTrials:
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield a suggestion and then larger suggestions, each with its trial.
 
-        Each suggestion is applied to the unchanged mission in one step, as a user would apply it.
+        Each suggestion is applied to the unchanged mission in one step, as a user would apply it. The last is the one
+        that cannot be enlarged, or whose enlargement cannot be applied. Raises TrialAborted.
         """
         while True:
             if self.should_abort():

@@ -286,7 +286,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and beside them.
+    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and beside them; NaN over unknown ground.
 
     pieces: `TRACKED_PIECE` records.
     """

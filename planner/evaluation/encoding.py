@@ -104,7 +104,7 @@ def straight_frames(east: float, north: float, cosine: float, sine: float, edges
 
 
 def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return points (count, 3) at equal distances along a route (k, 3), and these distances, m.
+    """Return points (count, 3) at equal horizontal distances along a route (k, 3), and these distances, m.
 
     >>> points, along = sample_route(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
     >>> along.tolist(), points[:, 0].tolist(), points[:, 1].tolist()

@@ -200,6 +200,8 @@ def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: floa
 
     T solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
     derivative with respect to d is (d - w T) / D.
+
+    If the wind permits no such T, the leg is not flyable, and T is its time at `UNFLYABLE_SPEED_RATIO` of the airspeed.
     """
     length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
     tailwind_product = wind_east * dx + wind_north * dy
@@ -457,7 +459,8 @@ def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, floa
 def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions) -> None:
     """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D.
 
-    Here g is the gradient of the time, w is the wind, V is the airspeed, and D is as in `leg_time`.
+    Here g is the gradient of the time, w is the wind, V is the airspeed, and D is as in `leg_time`. For a
+    leg that is not flyable the curvature is 1 / D on the diagonal, and 0 elsewhere.
     """
     wind = (conditions.wind_east, conditions.wind_north, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)

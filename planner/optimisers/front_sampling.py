@@ -188,7 +188,10 @@ class FrontSampling:
             )
 
     def _archive_rows(self, values: Floats) -> Ints:
-        """Return the distinct non-dominated rows of objectives (n, m) that cover most of the hypervolume."""
+        """Return the numbers of the distinct non-dominated rows of objectives (n, m).
+
+        If there are more than the archive can hold, return those that cover most of the hypervolume.
+        """
         level = Level(tuple(range(values.shape[1])), (NO_GOAL,) * values.shape[1])
         front = np.flatnonzero(ranks(values, (level,)) == 0)
         _, first_rows = np.unique(values[front], axis=0, return_index=True)

@@ -52,9 +52,9 @@ def _non_dominated(points: Floats) -> Floats:
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Return up to `count` rows of points (n, m) in the order of a greedy choice.
+    """Return the row numbers of up to `count` of the points (n, m), in the order of a greedy choice.
 
-    reference: (m,) upper limit of the points.
+    reference: (m,) upper limit; a point that is not below it in every objective is left out.
     rng: random generator of the probes; None for the same probes in every call.
 
     The best point of each objective comes first. Each further point is the one that adds most to the covered volume.

@@ -123,9 +123,16 @@ class NicheSampling:
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, max_count: int
 ) -> tuple[Floats, Ints]:
-    """Select the elite, and in each group the best samples that are distinct from one another.
+    """Select the elite of each group, and then its best samples that are distinct from all selected ones.
 
     Returns the selected samples, (g, max_count, d), padded with zeros, and the number of samples of each group, (g,).
+
+    rows: (g, n, d) samples.
+    costs: (g, n) costs of the samples; inf for a sample that is never selected.
+    elite: (g, d) one sample per group.
+    clearing_radius: (d,) distances within which two samples are not distinct.
+    max_cost: maximum cost of a selected sample. It applies only after the first `MIN_SELECTED_COUNT` selections.
+    max_count: maximum number of selected samples of a group. Both counts include the elite.
     """
     groups, _, size = rows.shape
     selected, counts = np.zeros((groups, max_count, size)), np.ones(groups, dtype=np.int64)

@@ -108,7 +108,13 @@ class PartialResampling(BoxSearch):
             self._draw()
 
     def _replace_parents(self, scores: Floats) -> None:
-        """Replace parents by better samples, and adapt both parameters to the parameters of these samples."""
+        """Replace each parent by its sample if the sample ranks higher, and adapt the redrawn fraction and the width.
+
+        Both move towards the values with which the better samples were drawn. The generations in which no sample ranks
+        higher than the best parent are counted in `_stalled_generations`.
+
+        scores: (n, c) scores of the samples, one sample per parent.
+        """
         count = len(self._points)
         ranks = self._rank(np.concatenate([self._point_scores, scores]))
         gains = ranks[:count] - ranks[count:]

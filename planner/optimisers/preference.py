@@ -62,22 +62,22 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 def _rank_candidates(table: Floats, widths: Ints) -> Ints:
     """Rank candidates by the number of candidates that are preferred to each, level by level, (n,).
 
-    table: (c, n) one column of scores per candidate.
+    table: (c, n) scores, one column per candidate.
     widths: number of rows of the table in each priority level, highest priority first.
 
     A lower level only decides between candidates that are equal on all higher levels.
     """
     count = table.shape[1]
-    row_ranks = np.zeros(count, dtype=np.int64)
+    candidate_ranks = np.zeros(count, dtype=np.int64)
     order, scratch = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     for k in range(count):
         order[k] = k
     sorted_rows = np.empty((table.shape[0], count))
     marks = np.empty(count, dtype=np.int64)
-    # Groups of tied rows: the start of each group in the order, followed by the count.
+    # Groups of tied candidates: the start of each group in the order, followed by the count.
     group_starts, next_group_starts = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
     group_starts[0], group_starts[1], group_count = 0, count, 1
-    column = 0
+    first_row = 0
     for width in widths:
         next_group_count = 0
         for g in range(group_count):
@@ -86,14 +86,14 @@ def _rank_candidates(table: Floats, widths: Ints) -> Ints:
             next_group_count += 1
             if end - start == 1:
                 continue
-            _merge_sort(table, column, width, order, scratch, start, end)
+            _merge_sort(table, first_row, width, order, scratch, start, end)
             for c in range(width):
                 for k in range(start, end):
-                    sorted_rows[c, k] = table[column + c, order[k]]
+                    sorted_rows[c, k] = table[first_row + c, order[k]]
             if width == 2 and end - start > TREE_THRESHOLD:
-                _add_dominator_counts_by_tree(sorted_rows, start, end, order, row_ranks)
+                _add_dominator_counts_by_tree(sorted_rows, start, end, order, candidate_ranks)
             else:
-                _add_dominator_counts(sorted_rows, width, start, end, order, marks, row_ranks)
+                _add_dominator_counts(sorted_rows, width, start, end, order, marks, candidate_ranks)
             for k in range(start + 1, end):
                 for c in range(width):
                     if sorted_rows[c, k] != sorted_rows[c, k - 1]:
@@ -103,37 +103,37 @@ def _rank_candidates(table: Floats, widths: Ints) -> Ints:
         next_group_starts[next_group_count] = count
         group_count = next_group_count
         group_starts, next_group_starts = next_group_starts, group_starts
-        column += width
+        first_row += width
         if group_count == count:
             # No ties left for lower levels to decide.
             break
-    return row_ranks
+    return candidate_ranks
 
 
 @inner
-def _merge_sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
-    """Sort order[begin:end] lexicographically by `width` rows of the table, from row `column` on.
+def _merge_sort(table: Floats, first_row: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
+    """Sort order[begin:end] lexicographically by `width` rows of the table, from row `first_row` on.
 
     The merge sort is stable.
     """
     for k in range(begin + 1, end):
         # Insertion sort of short runs.
         run_begin = begin + (k - begin) // INSERTION_RUN * INSERTION_RUN
-        row, position = order[k], k
-        while position > run_begin and _precedes(table, column, width, row, order[position - 1]):
+        candidate, position = order[k], k
+        while position > run_begin and _precedes(table, first_row, width, candidate, order[position - 1]):
             order[position] = order[position - 1]
             position -= 1
-        order[position] = row
+        order[position] = candidate
     run_length = INSERTION_RUN
     while run_length < end - begin:
         for run_begin in range(begin, end - run_length, 2 * run_length):
             middle, run_end = run_begin + run_length, min(run_begin + 2 * run_length, end)
-            if not _precedes(table, column, width, order[middle], order[middle - 1]):
+            if not _precedes(table, first_row, width, order[middle], order[middle - 1]):
                 continue
             left, right = run_begin, middle
             for k in range(run_begin, run_end):
                 if right >= run_end or (
-                    left < middle and not _precedes(table, column, width, order[right], order[left])
+                    left < middle and not _precedes(table, first_row, width, order[right], order[left])
                 ):
                     scratch[k] = order[left]
                     left += 1
@@ -146,9 +146,9 @@ def _merge_sort(table: Floats, column: int, width: int, order: Ints, scratch: In
 
 
 @inner
-def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
+def _precedes(table: Floats, first_row: int, width: int, a: int, b: int) -> bool:
     """Return True if candidate a precedes candidate b in lexicographic order."""
-    for c in range(column, column + width):
+    for c in range(first_row, first_row + width):
         if table[c, a] != table[c, b]:
             return bool(table[c, a] < table[c, b])
     return False
@@ -156,11 +156,17 @@ def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
 
 @inner
 def _add_dominator_counts(
-    rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, row_ranks: Ints
+    rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, candidate_ranks: Ints
 ) -> None:
-    """Add the number of dominators of each candidate of a tied group to `row_ranks`.
+    """Add the number of dominators of each candidate of a tied group to `candidate_ranks`.
 
-    rows: (c, n), sorted, so that only earlier candidates can dominate.
+    rows: (c, n) scores, one column per candidate; only the first `width` rows are compared.
+    width: number of scores of the priority level.
+    begin, end: the group is the columns from begin to end - 1. They are sorted lexicographically, so that only earlier
+        candidates can dominate.
+    order: number of the candidate in each column, (n,).
+    scratch: working memory, (n,); its values do not matter, and are overwritten.
+    candidate_ranks: rank of each candidate by its number, (n,).
     """
     dominators = 0
     for k in range(begin + 1, end):
@@ -169,7 +175,7 @@ def _add_dominator_counts(
             is_equal = is_equal and rows[c, k] == rows[c, k - 1]
         if not is_equal:
             dominators = k - begin
-            # No earlier row is larger in the first column.
+            # No earlier candidate has a larger first score.
             if width == 2:
                 dominators = _count_at_most(rows[1, begin:k], rows[1, k])
             elif width > 2:
@@ -179,7 +185,7 @@ def _add_dominator_counts(
                 for c in range(1, width):
                     _clear_marks_above(rows[c, begin:k], rows[c, k], marks)
                 dominators = _count_marks(marks)
-        row_ranks[order[k]] += dominators
+        candidate_ranks[order[k]] += dominators
 
 
 @inner
@@ -227,8 +233,8 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 
 
 @inner
-def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, row_ranks: Ints) -> None:
-    """Add the number of dominators of each candidate of a group to `row_ranks`, in O(n log n).
+def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, candidate_ranks: Ints) -> None:
+    """Add the number of dominators of each candidate of a group to `candidate_ranks`, in O(n log n).
 
     Uses a Fenwick tree over the second of two rows of scores; it is faster for many candidates.
     """
@@ -244,7 +250,7 @@ def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Int
             dominators += tree[node]
             node -= node & -node
         while k < end and rows[0, k] == rows[0, group_begin] and rows[1, k] == rows[1, group_begin]:
-            row_ranks[order[k]] += dominators
+            candidate_ranks[order[k]] += dominators
             k += 1
         node = rank
         while node <= rank_count:

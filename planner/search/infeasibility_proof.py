@@ -225,9 +225,13 @@ def _close_sphere(
 def _close_range(
     range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
 ) -> None:
-    """Add an altitude range to the closed ranges of column j in a row of columns.
+    """Add the altitude range from `bottom` to `top` (m) to the closed ranges of column j in a row of columns.
 
-    If the column already has the maximum number of closed ranges, the range stays open.
+    The range is merged with those that it overlaps. If the column already has the maximum number of closed ranges, the
+    range stays open.
+
+    range_bottoms, range_tops: (c,) closed ranges of the column, m, in ascending order.
+    range_counts: number of closed ranges of each column in the row.
     """
     kept_count = 0
     for k in range(range_counts[j]):

@@ -298,7 +298,10 @@ def _with_map_error(limits: Limits) -> Limits:
 
 
 def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[float]:
-    """Interpolate the turn lengths (m) of a tracking error at a ratio of ground speed to airspeed."""
+    """Return the turn length (m) of each turn angle in `TURNS`, at a ratio of ground speed to airspeed.
+
+    length_table: lengths before or after a corner, m: a row per angle in `TURNS`, a column per ratio in `SPEED_RATIOS`.
+    """
     return [float(np.interp(speed_ratio, SPEED_RATIOS, row)) for row in length_table]
 
 

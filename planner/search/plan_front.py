@@ -367,7 +367,13 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
 
 
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield variants of the problem: with a larger clearance, with radars as obstacles, and with another cost."""
+    """Yield the problem and its stricter variants, one for each combination of obstacles, clearance and cost.
+
+    - Obstacles: each radar becomes a missile sphere whose radius is one of `RADAR_FRACTIONS` of its detection radius.
+    - Clearance: the buffer is at least one of `CLEARANCE_FRACTIONS` of the spare height above the required clearance,
+      which is the smaller one of both ends.
+    - Cost: the cost of the problem, and then the cost of the fourth objective, `task.travel`.
+    """
     data, scenario = task.problem.search, task.problem.scenario
     end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
     spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)

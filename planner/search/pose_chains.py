@@ -110,7 +110,10 @@ class TurnLengths(NamedTuple):
     after: tuple[float, ...]
 
     def lengths(self, turn: float) -> tuple[float, float]:
-        """Return the lengths that a turn (rad) takes up before and after its corner, m."""
+        """Return the lengths that a turn (rad) takes up before and after its corner, m.
+
+        A turn sharper than the table takes up about as much as the sharpest turn in it.
+        """
         position = min(turn / TURN_STEP_RAD, len(self.before) - 1.001)
         index = int(position)
         fraction = position - index

@@ -48,7 +48,10 @@ MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
-    """Return True if the straight line is safe; the search is then finished, because no path is shorter."""
+    """Return True if the straight line is safe; the search is then finished, because no path is shorter.
+
+    It is not tried, and the result is False, in an encoding other than the rotated one.
+    """
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()

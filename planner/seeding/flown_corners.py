@@ -78,6 +78,8 @@ def corners_near_ground(
 ) -> FlownCorners:
     """Find a path's corners that are flown close to the ground, or almost as steeply as allowed.
 
+    None is found on a path whose waypoints are flown over.
+
     path: (w, 3) m.
     corners: simulated turns at the waypoints.
     lags: altitude errors on the legs.

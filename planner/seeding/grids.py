@@ -308,6 +308,8 @@ def relax_stage(
     cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage.
     parents: (layers, across) cells of the previous stage from which the cheapest routes come.
     spans: `SPAN` records (layers,) of the cells with a finite cost in the previous stage.
+    step_layers: `STEP_LAYERS` records (sideways, layers): steepest climb and descent from the previous stage.
+    cell_costs: (layers, across) cost per m of the steps to the cells of this stage.
     step: length of a step along the line, m.
     layer_spacing: m.
     ratio: spacing across as a fraction of a step.

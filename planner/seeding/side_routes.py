@@ -77,7 +77,10 @@ def _relax_stage_back(
 
     goal_costs, previous_goal_costs: (layers, across) costs to the destination from the cells of the next stage, and of
         this stage.
+    successors: (layers, across) cells of the next stage to which the cheapest routes lead.
     spans: `SPAN` records (layers,) of this stage's cells that are within the bound.
+
+    The other arguments are the same as for `relax_stage`.
     """
     layer_count, width = goal_costs.shape
     flat_goal_costs = goal_costs.ravel()

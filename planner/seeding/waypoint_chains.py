@@ -154,7 +154,11 @@ def _advance_sweeps(
 
 @compiled
 def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
-    """Return the cost of the best path through each candidate, including its turn there; inf above the bound."""
+    """Return the cost of the best path through each candidate, including its turn there, (w, k); inf above the bound.
+
+    candidates: (w, k, 3) k candidates of each waypoint, m.
+    sweeps: costs of the best paths to and from each candidate, and the candidates before and after it on these paths.
+    """
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
     cost = sweeps.forward + sweeps.backward
     for i in range(1, candidates.shape[0] - 1):

@@ -227,7 +227,7 @@ def _read_corner(block: _Block, text: str) -> None:
 
 
 def _read_circle(block: _Block, text: str) -> None:
-    """Store a circle about the block's centre (DC)."""
+    """Store a circle about the block's centre (DC).  Raises ValueError for a second circle."""
     if block.circle is not None:
         raise ValueError("an airspace has one circle")
     block.circle = _required_centre(block), _parse_length(text)

@@ -268,7 +268,7 @@ def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
         return [zone_rings(zone)]
     rings = list(zip(zone_rings(zone), map(is_hole, zone.shape.rings), strict=True))
     # Smallest first: a hole belongs to the smallest outline around it.
-    outlines = sorted((ring for ring, is_ring_hole in rings if not is_ring_hole), key=_ring_area)
+    outlines = sorted((ring for ring, is_ring_hole in rings if not is_ring_hole), key=_doubled_ring_area)
     shapes = zone_records([Zone("", "exclusion", Polygon((_open_ring(ring),))) for ring in outlines])
     parts: list[list[Floats]] = [[ring] for ring in outlines]
     for ring, is_ring_hole in rings:
@@ -283,7 +283,7 @@ def _open_ring(ring: Floats) -> Ring:
     return tuple((east, north) for east, north in ring[:-1].tolist())
 
 
-def _ring_area(ring: Floats) -> float:
+def _doubled_ring_area(ring: Floats) -> float:
     """Return twice the area of a closed ring, m^2."""
     return abs(float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum()))
 

@@ -140,7 +140,7 @@ class _ForecastReader:
         self.times = self.latitudes = self.longitudes = np.empty(0)
         self.ground: Floats | None = None
 
-    def fail(self, field: str, allowed: str) -> ForecastError:
+    def _error(self, field: str, allowed: str) -> ForecastError:
         """Return the error for a variable of the file, with the allowed values."""
         return ForecastError(f"{self.path}: {field}: {allowed}", file=str(self.path), field=field, allowed=allowed)
 
@@ -149,13 +149,13 @@ class _ForecastReader:
         decoded = [self._decode_times(dataset) for dataset in datasets]
         pairs = [pair for dataset in decoded for pair in self._wind_pairs(dataset)]
         if not pairs:
-            raise self.fail("wind", "missing: no pair of an eastward and a northward wind was found")
+            raise self._error("wind", "missing: no pair of an eastward and a northward wind was found")
         self._set_axes([pair[0] for pair in pairs])
         self.ground = self._read_ground(decoded)
         groups = [self._group(decoded, *pair) for pair in pairs]
         members = {len(group.velocities) for group in groups} - {1}
         if len(members) > 1:
-            raise self.fail("members", f"{' and '.join(map(str, sorted(members)))}: allowed as many at all levels")
+            raise self._error("members", f"{' and '.join(map(str, sorted(members)))}: allowed as many at all levels")
         ground_source = ""
         if any(group.kind == "height" for group in groups):
             ground_source = "of the forecast's model" if self.ground is not None else "at the mission's start"
@@ -175,13 +175,16 @@ class _ForecastReader:
     # Times.
 
     def _decode_times(self, dataset: Any) -> Any:
-        """Return a dataset in which all times are datetime64."""
+        """Return a dataset in which all times are datetime64 and all coordinates are loaded.
+
+        Raises ForecastError for a calendar that is not supported.
+        """
         import xarray
 
         for name, variable in dataset.variables.items():
             calendar = variable.attrs.get("calendar")
             if calendar not in (None, "standard", "gregorian", "proleptic_gregorian"):
-                raise self.fail(str(name), f"calendar {calendar!r}: allowed standard, gregorian, proleptic_gregorian")
+                raise self._error(str(name), f"calendar {calendar!r}: allowed standard, gregorian, proleptic_gregorian")
         decoded = _call_library(self.path, lambda: xarray.decode_cf(dataset, decode_timedelta=False))
         for name in decoded.coords:
             _call_library(self.path, decoded.variables[name].load)
@@ -198,12 +201,12 @@ class _ForecastReader:
             if coordinate is None or (name != "valid_time" and coordinate.ndim == 0 and "step" in array.dims):
                 continue
             if coordinate.ndim > 1:
-                raise self.fail(str(name), "several times of issue in one file: allowed one")
+                raise self._error(str(name), "several times of issue in one file: allowed one")
             seconds = (coordinate.values.reshape(-1) - np.datetime64(0, "s")) / np.timedelta64(1, "s")
             if not np.isfinite(seconds).all() or (np.diff(seconds) <= 0.0).any():
-                raise self.fail(str(name), "the times are not in ascending order")
+                raise self._error(str(name), "the times are not in ascending order")
             return (str(coordinate.dims[0]) if coordinate.ndim else None), seconds.astype(np.float64)
-        raise self.fail("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
+        raise self._error("time", f"missing for {array.name}: a coordinate in hours or seconds since a date is needed")
 
     def _find_issue(self, decoded: Sequence[Any]) -> datetime | None:
         """Return the time of issue that a file states, or None.
@@ -228,7 +231,7 @@ class _ForecastReader:
         times = [self._valid_times(array)[1] for array in arrays]
         common = functools.reduce(np.intersect1d, times)
         if not len(common):
-            raise self.fail("time", "the levels have no time in common")
+            raise self._error("time", "the levels have no time in common")
         self.times = common
         self.latitudes, self.longitudes = self._axes(arrays[0])
 
@@ -241,7 +244,7 @@ class _ForecastReader:
                     found.append(coordinate)
                     break
             else:
-                raise self.fail(standard_name, f"missing for {array.name}")
+                raise self._error(standard_name, f"missing for {array.name}")
         return found[0], found[1]
 
     def _axes(self, array: Any) -> tuple[Floats, Floats]:
@@ -258,7 +261,7 @@ class _ForecastReader:
         """Return the axes of the regular grid to which a grid with two-dimensional coordinates is interpolated."""
         axes = regular_axes(latitudes, longitudes, self.box)
         if axes is None:
-            raise self.fail("latitude, longitude", "the mission is outside the forecast's grid")
+            raise self._error("latitude, longitude", "the mission is outside the forecast's grid")
         return axes
 
     def _node_indices(self, latitude: Any, longitude: Any) -> tuple[Any, Any]:
@@ -271,16 +274,16 @@ class _ForecastReader:
             ("longitude", near, self.box.west, self.box.east),
         ):
             if len(values) < 2:
-                raise self.fail(name, "one node: allowed at least two nodes around the mission")
+                raise self._error(name, "one node: allowed at least two nodes around the mission")
             if not np.isfinite(values).all() or (name == "latitude" and np.abs(values).max() > 90.0):
-                raise self.fail(name, "not numbers of degrees")
+                raise self._error(name, "not numbers of degrees")
             steps = np.diff(values)
             if name == "latitude" and not ((steps > 0.0).all() or (steps < 0.0).all()):
-                raise self.fail(name, "neither ascending nor descending")
+                raise self._error(name, "neither ascending nor descending")
             order = np.argsort(values, kind="stable")
             ordered = values[order]
             if (np.diff(ordered) <= 0.0).any():
-                raise self.fail(name, "two nodes at the same place")
+                raise self._error(name, "two nodes at the same place")
             first = max(0, int(np.searchsorted(ordered, low, side="right")) - 1)
             last = min(len(ordered), int(np.searchsorted(ordered, high, side="left")) + 1)
             first, last = min(first, len(ordered) - 2), max(last, 2)
@@ -288,7 +291,9 @@ class _ForecastReader:
             # Nodes at both ends of a file that does not close round the globe are no neighbours.
             gap = float(np.diff(ordered[around]).max())
             if gap > MAX_SPACING_DEG:
-                raise self.fail(name, f"nodes {gap:.3g}° apart around the mission: allowed up to {MAX_SPACING_DEG:g}°")
+                raise self._error(
+                    name, f"nodes {gap:.3g}° apart around the mission: allowed up to {MAX_SPACING_DEG:g}°"
+                )
             indices.append(order[around])
         return indices[0], indices[1]
 
@@ -308,7 +313,7 @@ class _ForecastReader:
                 first = array.isel(dict.fromkeys(dims, 0), drop=True)
                 heights: Floats = self._values(first.drop_vars(_time_coordinates(first)))[0, 0, ..., 0]
                 if not np.isfinite(heights).all():
-                    raise self.fail(str(name), "values are missing around the mission")
+                    raise self._error(str(name), "values are missing around the mission")
                 return heights * self._height_factor(array)
         return None
 
@@ -319,7 +324,7 @@ class _ForecastReader:
         if factor is None and str(units).replace(" ", "") in GEOPOTENTIAL_UNITS:
             factor = 1.0 / GRAVITY_STANDARD
         if factor is None:
-            raise self.fail(str(array.name), f"units {units!r}: allowed m, gpm, m2 s-2")
+            raise self._error(str(array.name), f"units {units!r}: allowed m, gpm, m2 s-2")
         return factor
 
     def _wind_pairs(self, dataset: Any) -> Iterator[tuple[Any, Any]]:
@@ -331,13 +336,13 @@ class _ForecastReader:
             if not partners and len(east) == len(north) == 1:
                 partners = list(north)
             if not partners:
-                raise self.fail(name, "its northward wind is missing")
+                raise self._error(name, "its northward wind is missing")
             partner = north.pop(partners[0])
             if set(partner.dims) != set(array.dims):
-                raise self.fail(str(partner.name), f"its dimensions differ from those of {name}")
+                raise self._error(str(partner.name), f"its dimensions differ from those of {name}")
             yield array, partner
         if north:
-            raise self.fail(next(iter(north)), "its eastward wind is missing")
+            raise self._error(next(iter(north)), "its eastward wind is missing")
 
     def _level_of(self, array: Any, name: Any) -> tuple[LevelKind, str | None, Floats] | None:
         """Return the kind of a variable's levels, their dimension, and their values.
@@ -353,7 +358,7 @@ class _ForecastReader:
             factor = unit_factor(coordinate.attrs.get("units"), units)
             if factor is None:
                 stated = coordinate.attrs.get("units")
-                raise self.fail(str(coordinate_name), f"units {stated!r}: allowed {', '.join(sorted(units))}")
+                raise self._error(str(coordinate_name), f"units {stated!r}: allowed {', '.join(sorted(units))}")
             values = coordinate.values.reshape(-1).astype(np.float64) * factor
             return kind, (str(coordinate.dims[0]) if coordinate.ndim else None), values
         if match := _HEIGHT_IN_NAME.search(str(name)):
@@ -380,17 +385,21 @@ class _ForecastReader:
         return None
 
     def _group(self, datasets: Sequence[Any], east: Any, north: Any) -> LevelGroup:
-        """Return the wind of one pair of variables, and the altitudes or heights of its levels."""
+        """Return the wind of one pair of variables, and the altitudes or heights of its levels.
+
+        Levels without any value around the mission are left out. Raises ForecastError for a level with only some
+        values, for no level at all, and for winds that are not plausible.
+        """
         level = self._level_of(east, east.name)
         if level is None:
-            raise self.fail(str(east.name), "its level is not stated: pressure, height above ground or altitude")
+            raise self._error(str(east.name), "its level is not stated: pressure, height above ground or altitude")
         kind, dim, values = level
         components = []
         for array in (east, north):
             factor = unit_factor(array.attrs.get("units"), SPEED_UNITS)
             if factor is None:
                 stated = array.attrs.get("units")
-                raise self.fail(str(array.name), f"units {stated!r}: allowed {', '.join(sorted(SPEED_UNITS))}")
+                raise self._error(str(array.name), f"units {stated!r}: allowed {', '.join(sorted(SPEED_UNITS))}")
             components.append(self._values(array, dim) * factor)
         velocities = np.stack(components, axis=-1)
         if self._is_grid_relative(east):
@@ -403,22 +412,22 @@ class _ForecastReader:
         is_missing = ~np.isfinite(velocities).all(axis=(0, -1)) | ~np.isfinite(altitudes)
         is_used = ~is_missing.all(axis=(0, 1, 2))
         if not is_used.any():
-            raise self.fail(str(east.name), "no value around the mission")
+            raise self._error(str(east.name), "no value around the mission")
         if is_missing[..., is_used].any():
             t, *_, k = (int(index) for index in np.argwhere(is_missing & is_used)[0])
             time = datetime.fromtimestamp(float(self.times[t]), UTC)
             unit = {"pressure": "hPa", "height": "m above ground", "altitude": "m"}[kind]
-            raise self.fail(
+            raise self._error(
                 f"{east.name}, {north.name}",
                 f"values are missing around the mission, the first at {values[k]:g} {unit}, {time:%Y-%m-%d %H:%M} UTC",
             )
         for fill in FILL_VALUES:
             if (velocities[..., is_used, :] == fill).any():
                 stated = f"values of {fill:g} around the mission: a fill value that the file does not declare"
-                raise self.fail(f"{east.name}, {north.name}", stated)
+                raise self._error(f"{east.name}, {north.name}", stated)
         if np.abs(velocities[..., is_used, :]).max() > MAX_WIND_MPS:
             largest = float(np.abs(velocities[..., is_used, :]).max())
-            raise self.fail(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {MAX_WIND_MPS:g} m/s")
+            raise self._error(f"{east.name}, {north.name}", f"{largest:.4g} m/s: allowed up to {MAX_WIND_MPS:g} m/s")
         return LevelGroup(kind, np.ascontiguousarray(altitudes[..., is_used]), velocities[..., is_used, :])
 
     @staticmethod
@@ -441,13 +450,15 @@ class _ForecastReader:
                 if level is None or level_kind is None or level[0] != "pressure":
                     continue
                 if not np.array_equal(level[2], level_kind[2]):
-                    raise self.fail(str(name), f"its pressure levels differ from those of {wind.name}")
+                    raise self._error(str(name), f"its pressure levels differ from those of {wind.name}")
                 heights: Floats = self._values(array, level[1]).mean(axis=0) * self._height_factor(array)
                 rises = np.diff(heights[..., np.argsort(-level[2])], axis=-1)
                 if (rises <= 0.0).any():
-                    raise self.fail(str(name), "the height of a pressure level is not above that of a higher pressure")
+                    raise self._error(
+                        str(name), "the height of a pressure level is not above that of a higher pressure"
+                    )
                 return heights
-        raise self.fail(
+        raise self._error(
             str(wind.name), "the geopotential height of its pressure levels is missing (gh, HGT, z): add it to the file"
         )
 
@@ -459,12 +470,12 @@ class _ForecastReader:
         latitude, longitude = self._horizontal(array)
         axes = self._axes(array)
         if any(not np.array_equal(*pair) for pair in zip(axes, (self.latitudes, self.longitudes), strict=True)):
-            raise self.fail(str(array.name), "its grid differs from the grid of the other variables")
+            raise self._error(str(array.name), "its grid differs from the grid of the other variables")
         time_dim = None
         if _time_coordinates(array):
             time_dim, times = self._valid_times(array)
             if not np.isin(self.times, times).all():
-                raise self.fail(str(array.name), "its times differ from the times of the winds")
+                raise self._error(str(array.name), "its times differ from the times of the winds")
             if time_dim is not None:
                 array = array.isel({time_dim: np.flatnonzero(np.isin(times, self.times))})
         member_dim = next((str(dim) for dim in array.dims if str(dim) in _MEMBER_DIMS), None)
@@ -472,7 +483,7 @@ class _ForecastReader:
         used = {time_dim, member_dim, level_dim, *space}
         extra = [str(dim) for dim in array.dims if dim not in used]
         if any(array.sizes[dim] > 1 for dim in extra):
-            raise self.fail(
+            raise self._error(
                 str(array.name), f"dimension {extra[0]!r} is not known: allowed time, level, member and place"
             )
         array = array.isel(dict.fromkeys(extra, 0))
@@ -482,7 +493,7 @@ class _ForecastReader:
             nodes = near_nodes(latitude.values, longitude.values, self.latitudes, self.longitudes)
         array = array.isel(dict(zip(space, nodes, strict=True)))
         if array.size > MAX_NODES:
-            raise self.fail(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
+            raise self._error(str(array.name), f"{array.size:,} values around the mission: allowed {MAX_NODES:,}")
         array = _call_library(self.path, array.load)
         for dim, name in ((member_dim, "_member"), (time_dim, "_time"), (level_dim, "_level")):
             array = array.expand_dims(name) if dim is None else array.rename({dim: name})

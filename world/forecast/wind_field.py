@@ -173,7 +173,7 @@ def interpolate_field(
 
     field: `WindField.packed`.
     seconds: s on the field's axis of time.
-    latitude, longitude: deg; the longitude in any turn.
+    latitude, longitude: deg; the longitude may differ by multiples of 360 deg.
     altitude: m AMSL.
     """
     times, rows = int(field[_TIME_COUNT]), int(field[_ROW_COUNT])
@@ -325,6 +325,8 @@ def fit_mean_profile(
 
 def limit_gradient(gradient: float, speed: float, heights: Floats) -> float:
     """Return a gradient (1/s) limited so that the speed of a mean profile is at least 0 at heights (m).
+
+    It is also limited to +-`_MAX_GRADIENT`.
 
     speed: m/s at height 0.
     """

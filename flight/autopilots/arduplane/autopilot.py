@@ -155,7 +155,10 @@ class ArduPlane(Autopilot):
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return ArduPlane with the parameters of a flight log, which any ArduPlane release may have written."""
+        """Return ArduPlane with the parameters of a flight log, written by any ArduPlane release, and notes.
+
+        Return None for the log of another program.
+        """
         if not program.startswith("ArduP"):
             return None
         law_parameters, notes = ArduPilotParameters.of_log(parameters, source, simulated_release(program))

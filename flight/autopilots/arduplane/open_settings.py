@@ -277,7 +277,10 @@ def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
 
 
 def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe each control (ailerons, elevator, motor) to which the user's file assigns no servo output."""
+    """Describe each control (ailerons, elevator, motor) to which the user's file assigns no servo output.
+
+    A file without any servo parameter is not described.
+    """
     if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
         return
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT

@@ -205,7 +205,7 @@ class SimulatorPort:
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
-        """Send packed messages to PX4.  Raises ValueError before PX4 has connected."""
+        """Send packed messages to PX4; do nothing if PX4 has ended.  Raises ValueError before PX4 has connected."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
         try:
@@ -241,9 +241,9 @@ class SimulatorPort:
         return answer
 
     def _receive_data(self, timeout: float) -> bool:
-        """Read data for up to ``timeout`` s; return True if any data arrived.
+        """Read data for up to ``timeout`` s, and append the outputs in it to `_answers`; return True if data arrived.
 
-        A single call waits at most `_CHECK_INTERVAL_S`.
+        A single call waits at most `_CHECK_INTERVAL_S`.  Raises ValueError before PX4 has connected.
         """
         if self._stream is None:
             raise ValueError("PX4 has not connected")
@@ -322,7 +322,10 @@ class HilLockstep(Lockstep):
         return self._answer_count >= _RUNNING_ANSWER_COUNT
 
     def _next_outputs(self) -> tuple[float, ...]:
-        """Return the answer to the last step; zeros before the first answer."""
+        """Return the last answer of PX4; zeros before the first answer.
+
+        If PX4 answers every step, the answer to the last step is awaited; otherwise only for `_EARLY_ANSWER_TIMEOUT_S`.
+        """
         if self._awaits_answer:
             answer = (
                 self._port.require_answer()

@@ -272,7 +272,10 @@ class Lockstep(ABC):
         """
 
     def _battery(self) -> tuple[float, float] | None:
-        """Return the voltage (V) and the current (A) of the battery; the voltage is constant."""
+        """Return the voltage (V) and the current (A) of the battery; None for an aircraft without a battery.
+
+        The voltage is constant.
+        """
         if not self._volts:
             return None
         current, factor = self._current

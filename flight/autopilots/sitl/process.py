@@ -163,7 +163,7 @@ class AutopilotProcess:
         self._kill()
 
     def keep_log(self, target: Path) -> bool:
-        """Move the program's log to a file; return True if there was a log."""
+        """Move the program's last log to a file; return True if there was a log."""
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:
             return False

@@ -26,7 +26,7 @@ from logs.importers.columns.quantities import (
     UNIT_ZEROS,
     UNITS,
     likelier_unit,
-    to_frame,
+    to_default_frame,
 )
 from world.arrays import Flags, Floats
 from world.errors import LogError
@@ -169,7 +169,7 @@ class ColumnLog:
             "pitch": lambda: np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
             "yaw": lambda: np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
         }
-        factor, offset = to_frame(angle, self.frame("quaternion_w"))
+        factor, offset = to_default_frame(angle, self.frame("quaternion_w"))
         return Series(time, factor * angles[angle]() + offset)
 
     def raw(self, quantity: str) -> tuple[Floats, Column]:
@@ -422,7 +422,7 @@ class ColumnLog:
     def _convert(self, quantity: str, entry: ColumnTable, raw: Floats) -> Floats:
         """Convert values of an entry to SI units, radians and the default frame."""
         factor = UNITS[QUANTITIES[quantity].dimension][entry.unit]
-        frame_factor, frame_offset = to_frame(quantity, entry.frame)
+        frame_factor, frame_offset = to_default_frame(quantity, entry.frame)
         stated = entry.sign * (entry.scale * raw + entry.offset)
         return np.asarray(frame_factor * (factor * stated + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
 

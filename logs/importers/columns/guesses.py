@@ -320,6 +320,8 @@ def _guess_entry(quantity: str, column: str, clock: _Clock, values: Column, stat
 def _plausible_unit(quantity: str, known: Floats) -> str | None:
     """Return the first unit in which the values of a quantity are plausible, or None.
 
+    They are plausible if at least 98 % of them lie in the range of the quantity, and their median is usual for it.
+
     known: finite values of the column.
     """
     entry = QUANTITIES[quantity]

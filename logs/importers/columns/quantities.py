@@ -119,12 +119,12 @@ _NEGATED_BY_FRAME = {
 }
 
 
-def to_frame(quantity: str, frame: str) -> tuple[float, float]:
+def to_default_frame(quantity: str, frame: str) -> tuple[float, float]:
     """Return the factor and the offset that convert a quantity from a frame to its default frame.
 
     The offset is in SI units and rad.
 
-    >>> to_frame("velocity_down", "ENU"), to_frame("velocity_down", "NED")
+    >>> to_default_frame("velocity_down", "ENU"), to_default_frame("velocity_down", "NED")
     ((-1.0, 0.0), (1.0, 0.0))
     """
     if quantity == "yaw" and frame == "ENU":

@@ -121,7 +121,10 @@ def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | No
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """Return the waypoint and the item of the mission's last NAV_LAND, or None if it has none."""
+    """Return the index of the last waypoint that belongs to a NAV_LAND, and this item.
+
+    Return None if no waypoint after the first belongs to a NAV_LAND.
+    """
     landings = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     landing_waypoints = [
         (k, landings[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in landings

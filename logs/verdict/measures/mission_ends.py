@@ -85,7 +85,9 @@ _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "b
 
 
 def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
-    """Describe why PX4 refuses a mission without a take-off or a landing; return "" if it has both.
+    """Describe why PX4 refuses a mission, which lacks the take-off or landing that the limits require.
+
+    Return "" if the mission has what they require.
 
     >>> missing_ends_text(Mission(None, ()), FeasibilityLimits(requires=2))
     "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"

@@ -596,7 +596,10 @@ def true_airspeed_route(setup: FlightSetup) -> Route:
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
-    """Return the fly-by path as a chain of points, with the time at each point."""
+    """Return the fly-by path as a chain of points, with the time at each point.
+
+    ground_speed: ground speed on each leg, m/s; on a leg without a finite one, the leg's airspeed is used.
+    """
     points, legs = path_polyline(path)
     speed = np.where(np.isfinite(ground_speed), ground_speed, route.leg_airspeeds)
     runs = np.hypot(*np.diff(points[:, :2], axis=0).T)

@@ -126,7 +126,7 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
 
 
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Return a leg's flown slope, or None if less than a second of the leg was flown.
+    """Return a leg's flown slope, or None if less than a second or less than a metre of the leg was flown.
 
     If a leg is too short for a fit between its blends, its slope is rough and has a larger tolerance.
     """
@@ -161,8 +161,8 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
     """Return the tolerance (rad) of an angle fitted over a distance (m) with an RMS residual (m).
 
-    The tolerance is ``floor`` (rad) plus an angle: the rotation of the line if both of its ends are off by twice the
-    RMS.
+    The tolerance is ``floor`` (rad) plus the rotation of the line if its ends differ by twice the RMS, and at most
+    `MAX_UNSTEADINESS_RAD`.
     """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 
@@ -269,7 +269,7 @@ def _ground_following_error(requirements: RouteRequirements, leg: int, position:
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from the time at which its commanded airspeed can be reached, maybe none."""
+    """Return the rows of a leg from the time at which its commanded airspeed can be reached; there may be none."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0

@@ -81,10 +81,13 @@ class GlideMap:
         return self.west + column * self.cell, self.south + row * self.cell
 
 
-def glide_map(
+def make_glide_map(
     terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = MAP_MARGIN_M
 ) -> GlideMap | None:
-    """Make a map of cells around positions; return None if it is so large that its cells are too coarse.
+    """Make the glide map of the area around some positions.
+
+    Each cell holds its ground, the minimum altitude of a glide in it, and the altitudes of the kill spheres in it.
+    Return None for an area so large that a map with at most `MAX_CELLS` cells would be too coarse.
 
     positions: east and north, m, (p, 2).
     margin: height above ground that a glide keeps, m.
@@ -93,7 +96,7 @@ def glide_map(
 
     >>> from world.terrain import make_flat_terrain
     >>> ground = make_flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
-    >>> made = glide_map(ground, np.zeros((1, 2)), 30.0, np.array([[0.0, 0.0, 100.0]]), np.array([500.0]))
+    >>> made = make_glide_map(ground, np.zeros((1, 2)), 30.0, np.array([[0.0, 0.0, 100.0]]), np.array([500.0]))
     >>> row, column = made.cell_at(0.0, 0.0)
     >>> float(made.floor[row, column]), bool(made.sphere_tops[row, column] > 590.0), made.cell
     (130.0, True, 100.0)

@@ -25,9 +25,9 @@ from logs.verdict.returns.glide_map import (
     GlideMap,
     PossibleWinds,
     exclude_zones,
-    glide_map,
     glide_slopes,
     landable_cells,
+    make_glide_map,
     search_glide_altitudes,
 )
 from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
@@ -240,7 +240,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     if not len(rows):
         return none
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
-    grid = glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
+    grid = make_glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
         return replace(none, not_judged="far")
     own_returns = _simulate_engine_out_returns(world, starts)
@@ -347,14 +347,17 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
 
 
 def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> PossibleWinds:
-    """Return a function that gives a forecast's winds around positions, m, (n, 2), from their times (s) on."""
+    """Return a function that samples a forecast's winds around positions, m, (n, 2).
+
+    The samples cover the times of the positions, s, (n,), and the longest glide after the last of them.
+    """
     low, high = positions.min(axis=0), positions.max(axis=0)
     first, last = float(times.min()), float(times.max()) + _MAX_GLIDE_TIME_S
     edges = ((low[0], high[0]), (low[1], high[1]), (first, last))
     axes = [np.linspace(*edge, count) for edge, count in zip(edges, _WIND_SAMPLES, strict=True)]
 
     def winds_at(altitudes: Floats) -> Floats:
-        """Return the forecast's winds at some altitudes (m AMSL), at all positions and times, m/s, (n, h, 2)."""
+        """Return the forecast's winds at h altitudes (m AMSL), at all sampled places and times, m/s, (s, h, 2)."""
         east, north, time, amsl = (axis.ravel() for axis in np.meshgrid(*axes, altitudes, indexing="ij"))
         return scenario.wind_velocities(np.column_stack([east, north, amsl]), time).reshape(-1, len(altitudes), 2)
 

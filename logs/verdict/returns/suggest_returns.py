@@ -389,7 +389,10 @@ def _ground_altitude(world: ReturnWorld, east: float, north: float) -> float:
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the altitude of the highest ground below a loiter around a point, m AMSL; NaN if partly unknown."""
+    """Return the altitude of the highest ground below a loiter around a point, m AMSL.
+
+    Without terrain it is the altitude of home.  It is NaN if any of the ground below the loiter is unknown.
+    """
     if world.scenario.terrain is None:
         return world.home.up
     angles = np.arange(16) * (math.pi / 8.0)

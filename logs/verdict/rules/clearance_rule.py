@@ -33,7 +33,11 @@ _CONTACT_DEPTH_M = 1.0
 def clearance_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum height above ground on each leg; without terrain data, return one unjudged finding."""
+    """Judge the minimum height above ground on each leg, except on a landing that another rule judges.
+
+    Without terrain data the legs are not judged, and one undecided finding states this.  Other findings are on the
+    altitude of home.
+    """
     terrain = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
     if terrain is None:

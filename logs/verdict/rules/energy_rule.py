@@ -50,7 +50,7 @@ def energy_findings(
     """Compare the energy used with the battery's energy without its reserve.
 
     If a battery failsafe aborts the mission earlier, the energy used up to then is the limit.  An endless jump fails.
-    Nothing is judged if the battery is guessed, or if the model's power is too uncertain.
+    Otherwise it is undecided if the battery is guessed, the energy unknown, a failsafe possible or the power uncertain.
     """
     setup, envelope = requirements.setup, requirements.setup.envelope
     limit, source, failsafe_text = _energy_limit(requirements)

@@ -189,7 +189,11 @@ def go_around_findings(
 def _find_landing(
     requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem
 ) -> _Landing | None:
-    """Return the landing at a waypoint; None if its glide or its go-around's climb height is not known."""
+    """Return the landing at a waypoint.
+
+    Return None if the climb height of its go-around, home's altitude or the ground at the landing is unknown, and if
+    the glide to the waypoint is too short or does not descend.
+    """
     setup, leg = requirements.setup, waypoint - 1
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])

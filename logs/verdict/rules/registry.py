@@ -87,7 +87,7 @@ RULES: dict[str, Rule] = {name: next(rule for rule in _RULES if rule.name == nam
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Return the findings on mission items, for any autopilot."""
+    """Return the findings of all rules that judge mission items."""
     return [finding for rule in RULES.values() if rule.judge_items is not None for finding in rule.judge_items(setup)]
 
 

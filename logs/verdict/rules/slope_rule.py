@@ -264,9 +264,11 @@ def _ability_text(requirements: RouteRequirements, leg: int, limit: float, sourc
 
 
 def _certain_limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """State the slope that an uncertain aircraft can certainly fly, which suggestions use as their limit.
+    """State how much of the limit of a slope is certain, because suggestions use only this part.
 
-    Return "" if the limit (rad) is certain, or is not a limit of the aircraft.
+    Return "" if the whole limit is certain, or if the limit does not come from the aircraft.
+
+    limit, source: limit of the slope, rad, and its source.
     """
     envelope, is_climb = requirements.setup.envelope, float(requirements.slopes[leg]) >= 0.0
     certain_limit = float((requirements.certain_climb if is_climb else requirements.certain_dive)[leg])
@@ -429,7 +431,7 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
 
 
 def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
-    """Return the measurements of a flown leg as facts."""
+    """Return the measurements of a flown leg as facts; [] for a leg that was not measured."""
     if measure is None:
         return []
     error_name = GROUND_FOLLOWING_ERROR if follows_ground(requirements, leg) else "height error"

@@ -130,7 +130,7 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
 
 
 def _window_means(values: NDArray[np.floating], width: int) -> Floats:
-    """Return the moving means of `values` over windows of `width` rows."""
+    """Return the moving means of n values over windows of `width` rows, (n + 1 - width,)."""
     sums = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
     return np.asarray((sums[width:] - sums[:-width]) / width)
 

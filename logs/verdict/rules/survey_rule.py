@@ -73,7 +73,10 @@ def survey_findings(
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the minimum front and side overlap of a survey's photos; return [] if the survey's camera is unknown."""
+    """Judge the minimum front and side overlap of a survey's photos.
+
+    An overlap that is not measured or not required has no finding.  Return [] if the survey's camera is unknown.
+    """
     measure = measure_overlap(requirements, aligned, survey)
     if measure is None:
         return []
@@ -347,7 +350,9 @@ def _line_finding(
 ) -> Finding:
     """Return the finding on a photo line.
 
-    ok, faults, facts: the result and its texts.
+    ok: result; None if the line was not flown, or, with faults, if it depends on unknown ground.
+    faults, facts: texts on the result.
+    geometric: True for the planned line, False for the flown one.
     usable_fraction: usable fraction of the line's length; NaN if it was not flown.
     measure: measurements of the flown line, which are reported as facts.
     """

@@ -97,9 +97,10 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the descent from the last waypoint to the landing; return [] for a mission without a landing item.
+    """Judge the descent from the last waypoint to the landing.
 
-    Return [] also if the landing was flown, because the touchdown rule then judges it.
+    The finding is undecided if no waypoint of the route belongs to the landing.  Return [] for a mission without a
+    landing item, and for a landing that was flown, because the touchdown rule judges it.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
@@ -206,7 +207,10 @@ def _not_flown_text(requirements: RouteRequirements, rule: str) -> str:
 
 
 def _flown_text(requirements: RouteRequirements, rule: str) -> str:
-    """Return a clause which states that a flight will judge the touchdown instead of the slope; else ""."""
+    """Return a clause which states that a flight is judged by its touchdown instead of by the slope.
+
+    Return "" for the rule "takeoff", and for a mission whose landing is not flown.
+    """
     is_flown = rule == "landing" and requirements.setup.ground_phases.approach is not None
     return " without gaining speed; a flight judges its touchdown instead" if is_flown else ""
 

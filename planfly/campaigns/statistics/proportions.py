@@ -23,7 +23,7 @@ class ProportionDifference(NamedTuple):
 
 
 def paired_difference(only_first: int, only_second: int, pairs: int, confidence: float = 0.95) -> ProportionDifference:
-    """Return the difference of the probabilities of success of paired trials.
+    """Return the probability of success of the second of paired trials, minus that of the first.
 
     The interval is Tango's score interval (Statistics in Medicine 17, 1998).  The p-value is from McNemar's exact test.
 

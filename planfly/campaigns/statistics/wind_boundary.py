@@ -348,7 +348,11 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
 
 
 def _bisect_speed(direction: Direction) -> float:
-    """Return the next wind while all outcomes are equal, m/s: between the flown winds and the range's end."""
+    """Return the next wind while all flights had the same result, m/s.
+
+    It is half of the weakest wind if all flights failed.  If all were flyable, it is halfway between the strongest wind
+    and the maximum, or the maximum itself if this is close.  The first wind is half of the maximum.
+    """
     max_speed = direction.max_speed
     if not direction.speeds:
         return _round_to_grid(0.5 * max_speed, max_speed)

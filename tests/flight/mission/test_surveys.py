@@ -10,7 +10,7 @@ import pytest
 from flight.mission import surveys as survey_module
 from flight.mission.items import Command, Mission, SurveyPlan
 from flight.mission.route import Route, RouteRules, make_route
-from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
+from flight.mission.survey_layout import SurveyLayout, fixed_layout_reason, min_turn_around, with_layout
 from flight.mission.surveys import LineAxis, Survey, camera_spacing, find_surveys, survey_plan
 from tests.mission_lines import ORIGIN, mission, wp
 from world.errors import MissionError
@@ -352,7 +352,7 @@ def test_gates_at_which_the_camera_is_switched_end_the_lines(in_turns: bool) -> 
 def test_lines_between_gates_are_laid_out_otherwise() -> None:
     read, route = gated_grid()
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert layout_obstacle(read, route, found) == ""
+    assert fixed_layout_reason(read, route, found) == ""
     made = with_layout(read, route, found, SurveyLayout(200.0, every=2), ORIGIN)
     assert made is not None
     assert [item.command for item in made.items] == [16, 4501, 206, 4501, 206, 16] * 3
@@ -510,7 +510,7 @@ def test_why_a_layout_is_kept(place: int, line: str, why: str) -> None:
     # The route of the plain grid, with the items of this mission: an endless loiter would end it.
     items = [item.seq for item in read.items if item.command == 16]
     route = route.with_fields(item=np.array(items))
-    assert layout_obstacle(read, route, found) == why
+    assert fixed_layout_reason(read, route, found) == why
 
 
 def test_a_line_with_a_waypoint_of_another_kind_on_it_is_kept() -> None:
@@ -520,7 +520,7 @@ def test_a_line_with_a_waypoint_of_another_kind_on_it_is_kept() -> None:
     read = mission(*items, home="36.5 -84.2 0")
     route = make_route(read, ORIGIN, None, 15.0, False)
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert layout_obstacle(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, lies on a line"
+    assert fixed_layout_reason(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, lies on a line"
 
 
 def test_a_take_off_where_the_first_line_begins_stays_before_it() -> None:
@@ -578,7 +578,7 @@ def test_a_mission_that_jumps_keeps_its_layout() -> None:
     assert Command.DO_JUMP in {item.command for item in read.items}
     found = find_surveys(route, camera_spacing(read, route))
     assert with_layout(read, route, found[0], SurveyLayout(50.0), ORIGIN) is None
-    assert layout_obstacle(read, route, found[0]) == "the mission contains jumps"
+    assert fixed_layout_reason(read, route, found[0]) == "the mission contains jumps"
 
 
 def test_a_gate_that_is_not_flown_is_no_point_of_a_line() -> None:
@@ -589,7 +589,7 @@ def test_a_gate_that_is_not_flown_is_no_point_of_a_line() -> None:
     read = mission(*items, home="36.5 -84.2 0")
     route = make_route(read, ORIGIN, None, 15.0, False)
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert layout_obstacle(read, route, found) == ""
+    assert fixed_layout_reason(read, route, found) == ""
     for turn_around, commands in ((0.0, [16, 4501, 206] * 2), (100.0, [16, 16, 4501, 206, 16, 4501, 206, 16])):
         made = with_layout(read, route, found, SurveyLayout(turn_around, every=2), ORIGIN)
         assert made is not None

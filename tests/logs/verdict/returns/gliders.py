@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from flight.autopilots.point_mass import POINT_MASS, PointMass
-from logs.verdict.returns.glide_map import GlideMap, glide_map
+from logs.verdict.returns.glide_map import GlideMap, make_glide_map
 from world.kernels import Record
 from world.terrain import Terrain, make_gridded_terrain
 
@@ -70,7 +70,7 @@ def map_of(terrain: Terrain, margin: float = 30.0) -> GlideMap:
     """The map of the ways to the middle of a ground; the plane's, which most of them ask for, is made once."""
     made = _maps.get(margin) if terrain is plane() else None
     if made is None:
-        made = glide_map(terrain, np.zeros((1, 2)), margin, NO_SPHERES, NO_RADII, 5900.0)
+        made = make_glide_map(terrain, np.zeros((1, 2)), margin, NO_SPHERES, NO_RADII, 5900.0)
         assert made is not None
         if terrain is plane():
             _maps[margin] = made

@@ -8,10 +8,10 @@ import pytest
 from logs.verdict.returns.glide_map import (
     GlideAltitudes,
     GlideMap,
-    glide_map,
     glide_slopes,
     glide_steps,
     landable_cells,
+    make_glide_map,
     search_glide_altitudes,
 )
 from tests.logs.verdict.returns.gliders import (
@@ -143,7 +143,7 @@ def test_more_margin_or_a_higher_wall_never_makes_it_lower() -> None:
 def test_a_sphere_is_flown_over_or_around() -> None:
     """At its middle the least is its top; behind it, it is around it: 2 tangents and an arc, or less by flying over."""
     radius, middle = 400.0, (1500.0, 0.0, 250.0)
-    made = glide_map(plane(), MIDDLE, MARGIN, np.array([middle]), np.array([radius]), 5900.0)
+    made = make_glide_map(plane(), MIDDLE, MARGIN, np.array([middle]), np.array([radius]), 5900.0)
     assert made is not None
     found = searched(plane(), made)
     assert need_at(found, 1500.0, 0.0) == pytest.approx(650.0, abs=5.0)
@@ -205,7 +205,7 @@ def test_each_cell_knows_its_nearest_place() -> None:
     ],
 )
 def test_ground_is_flat_by_its_slope_and_its_roughness(heights: object, flat: bool) -> None:
-    made = glide_map(ground(heights, 1500.0), MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 800.0)
+    made = make_glide_map(ground(heights, 1500.0), MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 800.0)
     assert made is not None
     assert made.cell == 25.0
     inside = landable_cells(made)[5:-5, 5:-5]
@@ -214,7 +214,7 @@ def test_ground_is_flat_by_its_slope_and_its_roughness(heights: object, flat: bo
 
 def test_ground_in_a_sphere_or_beyond_the_data_is_none_to_land_on() -> None:
     terrain = ground(lambda east, _north: np.where(east > 600.0, np.nan, 0.0), 1500.0)
-    made = glide_map(terrain, MIDDLE, MARGIN, np.array([[0.0, 0.0, 0.0]]), np.array([200.0]), 800.0)
+    made = make_glide_map(terrain, MIDDLE, MARGIN, np.array([[0.0, 0.0, 0.0]]), np.array([200.0]), 800.0)
     assert made is not None
     found = landable_cells(made)
     places = {(0.0, 0.0): False, (300.0, 0.0): True, (0.0, -150.0): False, (590.0, 300.0): False, (450.0, 300.0): True}
@@ -223,7 +223,7 @@ def test_ground_in_a_sphere_or_beyond_the_data_is_none_to_land_on() -> None:
 
 def test_a_map_that_would_hide_what_lies_in_its_cells_is_none() -> None:
     far = np.array([[0.0, 0.0], [400_000.0, 400_000.0]])
-    assert glide_map(ground(wall), far, MARGIN, NO_SPHERES, NO_RADII) is None
+    assert make_glide_map(ground(wall), far, MARGIN, NO_SPHERES, NO_RADII) is None
 
 
 @pytest.mark.parametrize("shift", some([17.0, 0.0, -8.0], 3))
@@ -232,7 +232,7 @@ def test_over_a_crest_of_one_row_of_pixels_it_is_the_crest(shift: float) -> None
     terrain = ground(
         lambda east, _north: np.where(np.abs(east - 1500.0 - shift) < 1.0, 560.0, 500.0), 18_000.0, 30.0, shift
     )
-    made = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 17_900.0)
+    made = make_glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 17_900.0)
     assert made is not None
     assert 40.0 < made.cell < 50.0
     column = made.cell_at(1500.0 + shift, 0.0)[1]
@@ -244,7 +244,7 @@ def test_over_a_crest_of_one_row_of_pixels_it_is_the_crest(shift: float) -> None
 def test_a_fine_elevation_file_gives_a_map_that_knows_each_pixel() -> None:
     """Pixels of 1 m and cells of 20 m: a mast of 90 m, one pixel wide."""
     terrain = ground(lambda east, north: np.where((east == 203.0) & (north == -118.0), 90.0, 0.0), 600.0, 1.0)
-    made = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 580.0)
+    made = make_glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 580.0)
     assert made is not None
     assert made.cell == 20.0
     assert made.floor[made.cell_at(203.0, -118.0)] == 90.0 + MARGIN
@@ -274,11 +274,11 @@ def test_no_way_cuts_into_a_sphere(far: float, radius: float) -> None:
     It is about the corner of four cells, where ways from behind it come by: one of 28 m holds none of their middles.
     """
     terrain = ground(lambda east, _north: 0.0 * east, 18_000.0)
-    bare = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, far)
+    bare = make_glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, far)
     assert bare is not None
     corner = np.array(bare.cell_center(*bare.cell_at(1510.0, 7.0))) + 0.5 * bare.cell
     middle = np.array([*corner, height_needed(*corner, MARGIN)])
-    made = glide_map(terrain, MIDDLE, MARGIN, middle[None, :], np.array([radius]), far)
+    made = make_glide_map(terrain, MIDDLE, MARGIN, middle[None, :], np.array([radius]), far)
     assert made is not None
     found = searched(terrain, made)
     deepest, near = -math.inf, 0
@@ -294,7 +294,7 @@ def test_no_way_cuts_into_a_sphere(far: float, radius: float) -> None:
 def test_no_step_flies_lower_than_what_it_crosses_or_than_what_comes_next() -> None:
     """Over hills of some 300 m: from its least height each cell's own step is flown, and looked at 50 times."""
     hills = ground(lambda east, north: 150.0 * (2.0 + np.sin(east / 170.0) + np.cos(north / 130.0)), 3000.0)
-    made = glide_map(hills, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 2800.0)
+    made = make_glide_map(hills, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 2800.0)
     assert made is not None
     found = searched(hills, made)
     moves = glide_steps()[0]

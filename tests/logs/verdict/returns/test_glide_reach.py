@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.simulated_returns import RETURN_START, ReturnEnvironment
-from logs.verdict.returns.glide_map import glide_map, glide_slopes, search_glide_altitudes
+from logs.verdict.returns.glide_map import glide_slopes, make_glide_map, search_glide_altitudes
 from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND, jacksboro
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde
@@ -53,7 +53,7 @@ def left_of(
 ) -> tuple[float, tuple[float, float, float]]:
     """What is left of a start's height to reach a place 3 km north of the middle, and which place that is."""
     spheres, radii = (np.array([sphere[:3]]), np.array([sphere[3]])) if sphere else (NO_SPHERES, NO_RADII)
-    made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0) if sphere else map_of(terrain)
+    made = make_glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0) if sphere else map_of(terrain)
     assert made is not None
     aircraft = glider(wind, blows_to, fast_sink, induced, growth)
     needs = search_glide_altitudes(
@@ -230,7 +230,7 @@ def test_home_is_in_reach_from_where_arduplane_glided_to_it() -> None:
     terrain = jacksboro().terrain
     assert terrain is not None
     places = np.concatenate([np.stack([starts["east"], starts["north"]], axis=1), [HOME[:2]]])
-    made = glide_map(terrain, places, MARGIN, NO_SPHERES, NO_RADII)
+    made = make_glide_map(terrain, places, MARGIN, NO_SPHERES, NO_RADII)
     assert made is not None
     aircraft, top = aerosonde(WIND), float(starts["up"].max())
     slopes = glide_slopes(aircraft, AIRSPEED, float(np.nanmin(made.ground)), top)
