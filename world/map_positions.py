@@ -54,7 +54,7 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats, origin: 
         if not min_coordinate <= point[axis] <= max_coordinate:
             outside = max(min_coordinate - point[axis], point[axis] - max_coordinate)
             allowed = (
-                f"outside the area {min_coordinate:.0f}..{max_coordinate:.0f} by {outside:.0f} m"
+                f"outside the area {min_coordinate:.0f}..{max_coordinate:.0f} m, {outside:.0f} m from its edge"
                 f" (the area covers {_area_text(bounds, origin)})"
             )
             raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=f"{name} {point[axis]:.0f} m")

@@ -416,5 +416,5 @@ def _count_problem(item: MissionItem) -> ItemProblem | None:
         if not (p1 >= 3 and p1 == int(p1)):
             return ItemProblem("p1", p1, "a fence polygon has a whole number of corners, at least 3")
     elif item.command in FENCES and not p1 > 0:
-        return ItemProblem("p1", p1, "a fence circle's radius is above 0 m")
+        return ItemProblem("p1", p1, "a fence circle's radius must be above 0 m")
     return None

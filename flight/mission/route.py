@@ -792,7 +792,7 @@ def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint
     """
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is only an estimate of the ground station:"
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is only the ground station's planning value:"
             f" the flight starts at {airspeed:g} m/s"
         )
         if abs(mission.cruise_speed - airspeed) > MAX_CRUISE_SPEED_DIFFERENCE * airspeed:

@@ -185,14 +185,14 @@ def _world_line(conditions: Conditions) -> str:
     """Return the line on wind, turbulence, navigation, terrain and the number of zones."""
     wind_text = "no wind"
     if conditions.wind_mps is None:
-        wind_text = "wind from each direction"
+        wind_text = "wind from every direction in turn"
     elif conditions.wind_mps > 0.0:
         wind_text = f"wind {conditions.wind_mps:.3g} m/s from {conditions.wind_from_deg:.0f} degrees"
     if conditions.wind_amsl_m is not None:
         gradient = f"{100.0 * conditions.wind_gradient_per_s:+.3g} m/s per 100 m of height"
         wind_text += f" at {conditions.wind_amsl_m:.0f} m AMSL, {gradient}"
     if conditions.forecast:
-        wind_text = f"wind of {conditions.forecast}; {wind_text} at the start"
+        wind_text = f"wind from {conditions.forecast}; {wind_text} at the start"
     turbulence_text = ""
     if conditions.turbulence is not None:
         turbulence_text = (

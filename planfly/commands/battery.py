@@ -20,7 +20,7 @@ def add_battery_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly battery``."""
     parser = command_line.add_command(
         "battery",
-        "find the smallest battery with which a mission and all its returns keep the reserve, by many flights",
+        "find the smallest battery with which a mission and all its returns keep the reserve, by flying it many times",
         "planfly battery mission.waypoints --terrain jacksboro --specific-energy 180",
         extra="campaigns",
     )
@@ -35,7 +35,7 @@ def add_battery_parser(command_line: LineParser) -> None:
             "energy per battery mass: the aircraft becomes heavier with a larger battery (default: its"
             " mass stays the same)",
         ),
-        ("every", "S", "time between the starts of two returns, s (default: 10)"),
+        ("every", "S", "interval along the flight between the starts of two returns, s (default: 10)"),
         ("confidence", "C", "confidence level of the interval of the capacity (default: 0.95)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)

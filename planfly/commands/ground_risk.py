@@ -47,7 +47,7 @@ def add_ground_risk_parser(command_line: LineParser) -> None:
     for name, unit, text in (
         ("max_speed", "M/S", "highest speed of the aircraft (default: the highest airspeed of its model)"),
         ("probability", "P", "fraction of the flights that stay inside the flight geography (default: 0.95)"),
-        ("every", "S", "time between the starts of two returns, s (default: 10)"),
+        ("every", "S", "interval along the flight between the starts of two returns, s (default: 10)"),
     ):
         group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
     group.add_argument(

@@ -45,8 +45,9 @@ def add_predict_parser(command_line: LineParser) -> None:
         dest="start",
         metavar="S",
         type=number_parser("start"),
-        help="with --by controls: start of the judged part, in seconds from the start of the log; the rows before it"
-        " calibrate the bands (default: the --until with which the aircraft was identified, or the middle of the log)",
+        help="with --by controls: start of the prediction, in seconds from the start of the log; the log before it only"
+        " sets the width of the bands (default: the end of the part from which the aircraft was identified, or the"
+        " middle of the log)",
     )
     add_imported_log_options(parser)
     add_world_options(parser)

@@ -46,7 +46,7 @@ def add_returns_parser(command_line: LineParser) -> None:
         metavar="S",
         type=number_parser("every"),
         default=1.0,
-        help="time between the starts of two returns, s (default: 1)",
+        help="interval along the flight between the starts of two returns, s (default: 1)",
     )
     group.add_argument(
         "--suggest",

@@ -24,7 +24,7 @@ from planfly.terminal.options import (
 # Help text on mouse and keyboard.
 _CONTROLS_HELP = """
 Waypoints are dragged on the map, heights on the profile below it; a diamond on a leg inserts one.  During a drag
-the geometry is judged; when it ends, the simulated autopilot flies the mission.  Keys: arrows move a waypoint by
+only the geometry is judged; after the drag the simulated autopilot flies the mission.  Keys: arrows move a waypoint by
 10 m (with Shift 100 m), Page Up and Page Down by 5 m of height, Delete deletes it, Ctrl+Z and Ctrl+Shift+Z undo and
 redo, Escape cancels a drag.
 The page can be reached only from this machine, at the printed address."""

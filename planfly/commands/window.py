@@ -20,7 +20,7 @@ def add_window_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly window``."""
     parser = command_line.add_command(
         "window",
-        "find the times of take-off at which a mission is flyable in a weather forecast, by many flights",
+        "find the times of take-off at which a mission is flyable in a weather forecast, by flying it many times",
         "planfly window mission.waypoints --terrain jacksboro --forecast tomorrow.nc --at 2026-12-01T09:00+01:00",
         extra="campaigns",
     )

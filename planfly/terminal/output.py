@@ -639,7 +639,7 @@ def _check_named_once(name: str, target: Path, args: argparse.Namespace) -> None
             continue
         for other in value if isinstance(value, list) else [value]:
             if isinstance(other, str) and other != STANDARD_OUTPUT and _is_same_path(target, Path(other)):
-                reason = f"is named by another argument, too; name another file for --{name}"
+                reason = f"is already named by another argument; name another file for --{name}"
                 raise PlanflyError(f"{target}: {reason}", file=target, field=f"--{name}")
 
 

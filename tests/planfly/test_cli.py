@@ -133,7 +133,7 @@ def test_two_outputs_are_two_files(
     monkeypatch.chdir(tmp_path)
     Path("well.waypoints").write_text(WELL)
     assert main([*argv, "--overwrite"]) == 2
-    assert "is named by another argument, too; name another file for --" in capsys.readouterr().err
+    assert "is already named by another argument; name another file for --" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["well.waypoints"]
     assert Path("well.waypoints").read_text() == WELL
 

@@ -57,7 +57,7 @@ def test_a_point_outside_the_area_says_by_how_far_and_where_the_area_is() -> Non
         check_in_area("start", np.array([1250.0, 0.0, 400.0]), "s.toml", BOUNDS, ORIGIN)
     # A degree of latitude at 46 degrees on WGS84 is 111.15 km, one of longitude 77.46 km.
     assert str(caught.value) == (
-        "s.toml: start: east 1250 m: outside the area -1000..1000 by 250 m"
+        "s.toml: start: east 1250 m: outside the area -1000..1000 m, 250 m from its edge"
         " (the area covers latitude 45.9820..46.0180, longitude 7.9871..8.0129)"
     )
 

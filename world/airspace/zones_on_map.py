@@ -198,7 +198,7 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
     for key, point in ends:
         zone = _first_violated_by_records(zones, records, point, ground)
         if zone is not None:
-            location_text = "inside the exclusion" if zone.kind == "exclusion" else "outside the inclusion"
+            location_text = "inside this exclusion zone" if zone.kind == "exclusion" else "outside this inclusion zone"
             raise ScenarioError.at(source, "zones", zone.name, f"{key} lies {location_text}")
 
 

@@ -166,7 +166,7 @@ class ForecastFacts:
         >>> ForecastFacts("a.nc", noon, noon, noon, 2.2, 3, 10.0, 900.0, (0.0, 0.0, 1.0, 1.0)).describe()
         'forecast a.nc, issued 2026-05-01 12:00 UTC (0 h before take-off), grid 2.2 km, 3 levels to 900 m AMSL'
         """
-        issue = "time of issue not stated"
+        issue = "issue time unknown"
         if self.issued is not None and self.age is not None:
             hours = self.age.total_seconds() / 3600.0
             order = "before" if hours >= 0.0 else "after"

@@ -283,7 +283,7 @@ def test_a_home_off_the_ground_is_noted() -> None:
 def test_cruise_speed_is_no_command() -> None:
     flown = make_route(read_mission(SAMPLES / "qgc_amsl.plan"), ORIGIN, None, 25.0, False)
     assert set(flown.leg_airspeeds.tolist()) == {25.0}
-    assert "cruiseSpeed 15 m/s is only an estimate of the ground station" in flown.notes[-1]
+    assert "cruiseSpeed 15 m/s is only the ground station's planning value" in flown.notes[-1]
 
 
 def test_stops_at_one_position_are_merged() -> None:

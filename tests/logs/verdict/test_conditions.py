@@ -69,7 +69,9 @@ def test_the_gradient_of_the_wind_is_stated_with_its_altitude() -> None:
     said = "wind 4 m/s from 0 degrees at 445 m AMSL, +5 m/s per 100 m of height"
     assert condition_lines(found)[1].startswith(f"Conditions: {said}, ")
     any_wind = condition_lines(replace(found, wind_mps=None))[1]
-    assert any_wind.startswith("Conditions: wind from each direction at 445 m AMSL, +5 m/s per 100 m of height, ")
+    assert any_wind.startswith(
+        "Conditions: wind from every direction in turn at 445 m AMSL, +5 m/s per 100 m of height, "
+    )
     slower = replace(setup.scenario, wind=replace(wind, gradient=-0.004))
     assert " m AMSL, -0.4 m/s per 100 m of height" in lines_of(setup.in_scenario(slower))[1]
     even = judging_conditions(setup.in_scenario(replace(setup.scenario, wind=replace(wind, gradient=0.0))))

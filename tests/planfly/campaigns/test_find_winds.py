@@ -84,7 +84,7 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     # The wind is what is asked for: none is stated, whatever the scenario's is.
     aircraft, world, pilot = wind_lines(found)[1:4]
     assert aircraft.startswith("Aircraft: aerosonde, 11 kg, 25 m/s")
-    assert world.startswith("Conditions: wind from each direction, light turbulence; ")
+    assert world.startswith("Conditions: wind from every direction in turn, light turbulence; ")
     assert pilot.startswith("Flown by: ")
     # No draw is flown twice in a direction, and those of least index are among them.
     rows = table(tmp_path / WINDS_DATABASE)

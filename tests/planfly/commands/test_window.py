@@ -83,7 +83,7 @@ def test_the_exit_code_answers_for_the_time_that_is_asked_about(
     assert main([*WORDS, *times, "--workers", "1"]) == code
     printed = capsys.readouterr().out
     assert printed.startswith(f"window    {words}")
-    assert "wind of forecast winds.nc" in printed
+    assert "wind from forecast winds.nc" in printed
 
 
 def test_no_open_departure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

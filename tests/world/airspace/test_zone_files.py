@@ -553,7 +553,7 @@ def test_an_inclusion_counts_however_far_it_is(tmp_path: Path) -> None:
     away = square_at("away", 46.4, 8.0, kind="inclusion")
     (tmp_path / "away.geojson").write_text(json.dumps(away), encoding="utf-8")
     (tmp_path / "small.toml").write_text(f'zones_file = "away.geojson"\n{SMALL}', encoding="utf-8")
-    with pytest.raises(ScenarioError, match="start lies outside the inclusion"):
+    with pytest.raises(ScenarioError, match="start lies outside this inclusion zone"):
         load_scenario(str(tmp_path / "small.toml"))
 
 

@@ -43,7 +43,10 @@ FAULTS = {
     "no ring": ([], "no corners"),
     "two corners": ([SQUARE[:2]], "2 corners: at least three"),
     "three of which two are one": ([[(0.0, 0.0), (0.0, 0.0), (9.0, 9.0)]], "2 corners: at least three"),
-    "a bow tie": ([[(0.0, 0.0), (100.0, 100.0), (100.0, 0.0), (0.0, 100.0)]], "crosses or touches itself"),
+    "a bow tie": (
+        [[(0.0, 0.0), (100.0, 100.0), (100.0, 0.0), (0.0, 100.0)]],
+        r"crosses or touches itself \(Self-intersection at east 50.0 m, north 50.0 m\)",
+    ),
     "a line": ([[(0.0, 0.0), (100.0, 0.0), (50.0, 0.0)]], "crosses or touches itself|nothing inside"),
     "a sliver": ([[(0.0, 0.0), (100.0, 0.0), (100.0, 0.0199)]], "nothing inside: 0.995 m2"),
     "not a number": ([[(0.0, 0.0), (100.0, math.nan), (50.0, 9.0)]], "not a number"),

@@ -94,16 +94,16 @@ def test_a_scenario_without_zones_writes_none() -> None:
 # The start of the small scenario is at east -4000, north 0, 400 m AMSL and 200 m above its level ground.
 AT_START = "polygon_m = [[-4500, -500], [-3500, -500], [-3500, 500], [-4500, 500]]"
 ENDS = {
-    "start inside": (zone(AT_START), "zones: town: start lies inside the exclusion"),
+    "start inside": (zone(AT_START), "zones: town: start lies inside this exclusion zone"),
     "start inside by a metre": (zone(f"{AT_START}\nceiling_amsl_m = 401"), "zones: town: start lies inside"),
     "start inside above ground": (zone(f"{AT_START}\nfloor_agl_m = 199"), "zones: town: start lies inside"),
     "destination outside": (
         zone(AT_START, kind="inclusion"),
-        "zones: town: destination lies outside the inclusion",
+        "zones: town: destination lies outside this inclusion zone",
     ),
     "destination above": (
         zone("east_m = 0\nnorth_m = 0\nradius_m = 9000\nceiling_amsl_m = 399.9", kind="inclusion"),
-        "zones: town: start lies outside the inclusion",
+        "zones: town: start lies outside this inclusion zone",
     ),
 }
 
