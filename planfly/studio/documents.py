@@ -22,7 +22,8 @@ from planfly.api.imported import read_imported
 from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, load_scenario_with_options
 from planfly.studio.edit_context import EditContext
-from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
+from planfly.studio.settings import changed_settings, settings_json
+from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
@@ -256,10 +257,9 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
     mission, name = judged_mission.mission, f"{document.stem}{SAVED_SUFFIXES[kind]}"
     if kind == "parm":
         return _saved_parameters(name, context)
-    opened_scenario = document.setup.scenario
-    has_same_world = kind != "plan.json" or context.scenario is opened_scenario
+    has_same_world = kind != "plan.json" or context.scenario is document.setup.scenario
     if kind == document.kind and mission is document.setup.mission and has_same_world:
-        return SavedFile(name, document.data, _lost_settings(opened_scenario, context))
+        return SavedFile(name, document.data, _lost_settings(document.setup, context))
     if kind == "plan.json":
         return _saved_plan(name, context, judged_mission)
     if kind == "kml":
@@ -271,7 +271,7 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
         mission = replace(mission, cruise_speed=start_airspeed)
     mission = replace(mission, autopilot=judged_mission.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
-    losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(opened_scenario, context))
+    losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(document.setup, context))
     return SavedFile(name, text.encode(), losses)
 
 
@@ -303,18 +303,19 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
     return tuple(losses)
 
 
-def _lost_settings(opened_scenario: Scenario, context: EditContext) -> tuple[str, ...]:
+def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str, ...]:
     """Return lines on settings and parameters that a ground station's file cannot store.
 
-    Only those changed in the studio are included.
+    Only settings whose values differ from those at the opening are included.
     """
-    scenario = context.scenario
-    differences = {
-        "wind": opened_scenario.spec.wind != scenario.spec.wind,
-        "aircraft, autopilot or airspeed": opened_scenario.spec.flight != scenario.spec.flight,
-        "limits": opened_scenario.spec.limits != scenario.spec.limits or opened_scenario.ceiling != scenario.ceiling,
-    }
-    names = [name for name, is_different in differences.items() if is_different]
+    opened, current = (
+        settings_json(scenario, airframe, context.parameters, {})
+        for scenario, airframe in (
+            (opened_setup.scenario, airframe_for_setup(opened_setup)),
+            (context.scenario, context.airframe),
+        )
+    )
+    names = changed_settings(opened, current)
     losses = (f"the settings changed here: {', '.join(names)}",) if names else ()
     return (*losses, *_lost_parameters(context))
 

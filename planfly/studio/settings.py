@@ -26,6 +26,25 @@ from world.scenario_tables import names_folder
 PARAMETER_FILES = (".parm", ".param", ".params")
 # Maximum number of unused names of a file that are listed.
 _MAX_LISTED_NAMES = 8
+# Names of the settings by their keys in the page data, for messages.
+_SETTING_NAMES = {
+    "aircraft": "aircraft",
+    "autopilot": "autopilot",
+    "autopilot_title": "autopilot",
+    "airspeed": "airspeed",
+    "wind_speed": "wind",
+    "wind_from": "wind",
+    "forecast": "wind",
+    "turbulence": "turbulence",
+    "min_clearance_m": "minimum clearance",
+    "max_height_m": "maximum height above ground",
+    "ceiling": "ceiling",
+    "corridor_m": "corridor",
+    "max_turn_deg": "sharpest turn",
+    "max_climb_deg": "steepest climb",
+    "max_dive_deg": "steepest descent",
+    "surveys": "photo lines",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,3 +204,12 @@ def settings_json(
         "unused": ", ".join(changed_parameters.unused[:_MAX_LISTED_NAMES]) + remainder_text,
         "known": {} if parameters is None else {name: value for name, value, _ in parameters.values},
     }
+
+
+def changed_settings(opened: Mapping[str, Any], current: Mapping[str, Any]) -> list[str]:
+    """Return the names of the settings whose values differ, except the autopilot's parameters.
+
+    opened, current: settings as page data (`settings_json`).
+    """
+    opened, current = ({**settings, **settings["limits"]} for settings in (opened, current))
+    return list(dict.fromkeys(name for key, name in _SETTING_NAMES.items() if opened[key] != current[key]))

@@ -36,7 +36,30 @@ def test_settings_are_judged_at_once() -> None:
     assert session.settings_json()["ceiling"] == session.judged.setup.scenario.ceiling == 1300.0
     set_in(session, autopilot="px4", aircraft="aerosonde")
     assert session.settings_json()["autopilot"] == "px4"
-    assert any("limits" in line for line in session.save("waypoints").losses)
+    changed = "the settings changed here: autopilot, wind, minimum clearance, ceiling"
+    assert changed in session.save("waypoints").losses
+
+
+def test_only_settings_that_differ_from_the_opening_are_lost(tmp_path: Path) -> None:
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(6, 14).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(terrain="jacksboro"))
+    shown = session.settings_json()
+    for change, name in (
+        ({"limits": {"corridor_m": 90.0}}, "corridor"),
+        ({"limits": {"min_clearance_m": 11.0}}, "minimum clearance"),
+        ({"wind_speed": 4.0}, "wind"),
+        ({"airspeed": 26.0}, "airspeed"),
+        ({"turbulence": "light"}, "turbulence"),
+    ):
+        set_in(session, **change)
+        assert session.save("waypoints").losses == (f"the settings changed here: {name}",)
+        # Changed back, nothing differs, although the scenario now states the value.
+        values = change.get("limits", change)
+        own = shown["limits"] if "limits" in change else shown
+        back = {key: own[key] for key in values}
+        set_in(session, **({"limits": back} if "limits" in change else back))
+        assert session.save("waypoints").losses == ()
 
 
 def test_parameters_are_flown_with_and_saved() -> None:
