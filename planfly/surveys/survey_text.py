@@ -99,16 +99,13 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     if measure.side is None:
         texts[1] = "side overlap not judged: no usable photos lie side by side"
     faults = overlap_faults(measure)
-    needs = (
-        ("photos at most {:.0f} m apart", measure.needed_photo_spacing),
-        (
-            "lines at most {:.0f} m apart",
-            measure.needed_line_spacing,
-        ),
-    )
-    for number, (check, (text, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
-        if check in faults and spacing:
-            texts[number] += f": this requires {text.format(spacing)} there"
+    needs = (("photos", measure.needed_photo_spacing), ("lines", measure.needed_line_spacing))
+    for number, (check, (name, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
+        if check in faults and spacing is not None and spacing >= 1.0:
+            texts[number] += (
+                f": this requires {name} at most {math.floor(spacing)} m apart, because the lowest photos are taken"
+                f" {measure.min_height:.0f} m above ground"
+            )
     if measure.unusable_fraction > MIN_STATED_FRACTION:
         unusable_text = f"{100.0 * measure.unusable_fraction:.0f} % of the lines' length, where no photo can be used"
         texts.append(f"overlap not judged on {unusable_text}")

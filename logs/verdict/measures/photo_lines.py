@@ -333,7 +333,7 @@ def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) 
 
 @dataclass(frozen=True, slots=True)
 class OverlapMeasure:
-    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 if they do not touch.
+    """Minimum overlap of a survey's usable photos, as fractions of a photo; 0 if there is a gap between them.
 
     camera: the camera that takes them.
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
@@ -366,17 +366,27 @@ class OverlapMeasure:
 
     @property
     def needed_photo_spacing(self) -> float | None:
-        """Largest photo spacing with the required front overlap at the lowest height, m; None if unknown."""
+        """Largest photo spacing with the required front overlap for the lowest photos, m; None if unknown."""
         if self.front is None or self.camera.front is None:
             return None
-        return (1.0 - self.camera.front) * self.camera.along * self.height
+        return (1.0 - self.camera.front) * self.camera.along * self.min_height
 
     @property
     def needed_line_spacing(self) -> float | None:
-        """Largest line spacing with the required side overlap at the lowest height, m; None if unknown."""
+        """Largest line spacing with the required side overlap for the lowest photos, m; None if unknown."""
         if self.side is None or self.camera.side is None:
             return None
-        return (1.0 - self.camera.side) * self.camera.across * self.side_height
+        return (1.0 - self.camera.side) * self.camera.across * self.min_height
+
+    @property
+    def front_gap(self) -> float:
+        """Gap between the photos with the minimum front overlap, m; 0 if they touch."""
+        return max(0.0, self.photo_spacing - self.camera.along * self.height)
+
+    @property
+    def side_gap(self) -> float:
+        """Gap between the photos with the minimum side overlap, m; 0 if they touch."""
+        return max(0.0, self.line_spacing - self.camera.across * self.side_height)
 
     @property
     def ground_sampling(self) -> tuple[float, float] | None:
@@ -473,7 +483,7 @@ def _line_strip(
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
     """Return the measure with the minimum overlap along the lines."""
-    camera = measure.camera
+    camera, lowest_overlap = measure.camera, math.inf
     for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
         if strip is None or line.photo <= 0.0 or not strip.is_usable.any():
             continue
@@ -481,12 +491,13 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
         heights = strip.heights[strip.is_usable]
         overlaps = _overlaps(spacing, camera.along, heights)
         lowest_index = int(np.argmin(overlaps))
-        if measure.front is None or overlaps[lowest_index] < measure.front:
+        if overlaps[lowest_index] < lowest_overlap:
+            lowest_overlap = float(overlaps[lowest_index])
             lowest_spacing = float(spacing[lowest_index])
             is_slow = bool(spacing[lowest_index] > line.photo)
             measure = replace(
                 measure,
-                front=float(overlaps[lowest_index]),
+                front=max(0.0, lowest_overlap),
                 line=number,
                 photo_spacing=lowest_spacing,
                 height=max(0.0, float(heights[lowest_index])),
@@ -496,13 +507,13 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
 
 
 def _overlaps(distances: Floats, width: float, heights: Floats) -> Floats:
-    """Return the overlap of photos at distances from each other, as fractions of a photo, (n,); at least 0.
+    """Return the overlap of photos at distances from each other, as fractions of a photo, (n,); negative for a gap.
 
     distances: m, (n,).
     width: width of a photo in units of the height.
     heights: heights above ground, m, (n,); a photo from the ground shows nothing.
     """
-    return np.maximum(0.0, 1.0 - distances / (width * np.maximum(heights, 1e-9)))
+    return 1.0 - distances / (width * np.maximum(heights, 1e-9))
 
 
 def _with_side_overlap(
@@ -521,7 +532,7 @@ def _with_side_overlap(
     length = max(float(along.max()) for along in end_distances) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
     step_middles = (np.arange(count) + 0.5) * length / count
-    previous_line = np.full((4, count), np.nan)
+    previous_line, lowest_overlap = np.full((4, count), np.nan), math.inf
     for number in np.argsort(survey.offsets).tolist():
         strip, along = strips[number], end_distances[number] - min_along
         on_line = (step_middles >= along.min()) & (step_middles <= along.max())
@@ -549,11 +560,12 @@ def _with_side_overlap(
         overlaps = np.where(is_neighbor, _overlaps(gaps, measure.camera.across, heights), np.nan)
         if np.isfinite(overlaps).any():
             lowest_index = int(np.nanargmin(overlaps))
-            if measure.side is None or overlaps[lowest_index] < measure.side:
+            if overlaps[lowest_index] < lowest_overlap:
+                lowest_overlap = float(overlaps[lowest_index])
                 pair = (int(previous_line[3, lowest_index]), number)
                 measure = replace(
                     measure,
-                    side=float(overlaps[lowest_index]),
+                    side=max(0.0, lowest_overlap),
                     line_pair=pair,
                     line_spacing=float(gaps[lowest_index]),
                     side_height=max(0.0, float(heights[lowest_index])),

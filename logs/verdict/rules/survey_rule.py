@@ -48,6 +48,8 @@ from world.wording import count_text
 
 # Limit of a slope where neither the aircraft nor the scenario has one.
 _MAX_SLOPE_RAD = math.radians(89.0)
+# Smallest gap between photos that is stated; it is printed as 1 m.
+_MIN_STATED_GAP_M = 0.5
 
 
 def survey_findings(
@@ -121,14 +123,14 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
     check: `FRONT_OVERLAP` or `SIDE_OVERLAP`.
     """
     if check == FRONT_OVERLAP:
-        overlap, required = measure.front, measure.camera.front
+        overlap, required, gap = measure.front, measure.camera.front, measure.front_gap
         spacing_text = f" apart, one every {measure.camera.interval:g} s" if measure.is_camera_limited else " apart"
         lines_text = (
             f"line {measure.line + 1}: photos {measure.photo_spacing:.0f} m{spacing_text},"
             f" {measure.height:.0f} m above ground"
         )
     else:
-        overlap, required = measure.side, measure.camera.side
+        overlap, required, gap = measure.side, measure.camera.side, measure.side_gap
         first, second = sorted(measure.line_pair)
         lines_text = (
             f"lines {first + 1} and {second + 1}: {measure.line_spacing:.0f} m apart,"
@@ -136,7 +138,8 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
         )
     if overlap is None:
         return ""
-    text = f"{check} {100.0 * overlap:.0f} % at the lowest ({lines_text})"
+    gap_text = f", a gap of {gap:.0f} m between the photos," if gap >= _MIN_STATED_GAP_M else ""
+    text = f"{check} {100.0 * overlap:.0f} %{gap_text} at the lowest ({lines_text})"
     return text if required is None else f"{text}, {100.0 * required:.0f} % required"
 
 

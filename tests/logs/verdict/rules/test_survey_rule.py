@@ -335,6 +335,27 @@ def in_order(*strips: tuple[float, float, float]) -> FlightSetup:
     return replace(setup, mission=replace(setup.mission, survey_plans=(SurveyPlan(50.0, LEAD, CAMERA),)))
 
 
+def test_the_largest_gap_between_photos_is_named_with_the_spacing_that_has_none() -> None:
+    """Lines of three heights, 200 m apart, photos 50 m apart of 5 m across and 2 m along for each of their height.
+
+    At 30 m, 20 m and 10 m the middles of neighbours are at 25 m and 15 m: photos of 125 m and 75 m leave gaps of 75 m
+    and 125 m.  Photos of 20 m along leave 30 m between them.  From 10 m a quarter of 20 m along and 40 % of 50 m across
+    leave the overlaps required.
+    """
+    setup = photographed()
+    low = np.array(lines())
+    low[:, 2] = 100.0 + np.repeat([30.0, 20.0, 10.0], 4)
+    setup = replace(setup, route=setup.route.with_fields(position=low))
+    front, side = (overlaps(judge_geometry(setup))[check] for check in ("front overlap", "side overlap"))
+    assert (front.planned, side.planned) == (0.0, 0.0)
+    assert "0 %, a gap of 30 m between the photos, at the lowest (line 3: photos 50 m apart, 10 m" in front.reason
+    assert "0 %, a gap of 125 m between the photos, at the lowest (lines 2 and 3: 200 m apart, 15 m" in side.reason
+    requirements = route_requirements(setup)
+    measure = measure_overlap(requirements, None, requirements.surveys[0])
+    assert measure is not None
+    assert (measure.needed_photo_spacing, measure.needed_line_spacing) == pytest.approx((5.0, 20.0))
+
+
 def test_lines_on_both_sides_of_a_notch_are_no_neighbors() -> None:
     """Lines 3 and 4 begin 600 m further north: south of them lines 2 and 5 are 600 m apart, beside a notch."""
     setup = in_order(
