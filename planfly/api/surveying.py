@@ -266,6 +266,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
             airframe_for_setup(setup),
             flight.verdict,
             lambda text: advance(next(step_counter), 0.0, text),
+            result.overlaps,
         )
     return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
 

@@ -15,9 +15,10 @@ from flight.mission.survey_layout import SurveyLayout, fixed_layout_reason, min_
 from flight.mission.surveys import Survey, with_photo_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import GROUND_PATH, Finding
-from logs.verdict.measures.photo_lines import measure_overlap
+from logs.verdict.measures.photo_lines import OverlapMeasure, measure_overlap
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
-from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS
+from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP
+from logs.verdict.tolerances import PHOTO_OVERLAP_FRACTION
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.airframe import Airframe, load_airframe
@@ -37,6 +38,10 @@ INTERLEAVE_STRIDES = (2, 3, 4)
 AIRSPEED_FACTORS = (0.95, 0.9, 0.85, 0.8, 0.7)
 # Minimum airspeed that is tried, as a ratio to the minimum airspeed of the aircraft.
 _MIN_AIRSPEED_RATIO = 1.1
+# Step of the airspeeds that are tried, m/s.
+_AIRSPEED_STEP_MPS = 0.1
+# Reserve for the variation of the ground speed: the ratio of the ground speed aimed at to the highest allowed.
+_GROUND_SPEED_RATIO = 0.98
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +107,11 @@ class TriedRemedies:
 
 
 def find_survey_remedies(
-    setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
+    setup: FlightSetup,
+    airframe: Airframe,
+    verdict: Verdict,
+    on_trial: Callable[[str], None] = lambda _: None,
+    overlaps: Sequence[OverlapMeasure | None] = (),
 ) -> TriedRemedies:
     """Find changes with which all photo lines of a survey can be used, by trial flights.
 
@@ -114,11 +123,12 @@ def find_survey_remedies(
 
     verdict: verdict on the flight of the setup.
     on_trial: called before each flight with a description of the change.
+    overlaps: overlap of the photos of each survey on this flight, if measured.
     A change passes if no photo line fails, and no other rule fails that did not fail before.
     """
     if _all_lines_usable(verdict) or not judged_surveys(setup):
         return TriedRemedies()
-    trials = _Trials(setup, airframe, verdict, on_trial)
+    trials = _Trials(setup, airframe, verdict, on_trial, overlaps)
     longer_turn_around = trials.find_turn_around()
     gates = trials.try_gates()
     candidates = [
@@ -163,14 +173,20 @@ def _line_findings(verdict: Verdict) -> list[Finding]:
     return [finding for finding in verdict.findings if finding.rule == "survey" and finding.check in ("", GROUND_PATH)]
 
 
-def _success_key(verdict: Verdict) -> tuple[int, float, int]:
+def _success_key(verdict: Verdict) -> tuple[int, float, int, float]:
     """Return a sort key that is larger for a flight closer to success.
 
-    Its parts are the number of usable lines, the mean usable part of the lines in whole %, and the negative number of
-    failed findings.
+    Its parts are the number of usable lines, the mean usable part of the lines in whole %, the negative number of
+    failed findings, and the sum of the margins of photo overlaps that fail, %.
     """
     parts = _usable_parts(verdict)
-    return _count_usable(verdict)[0], round(sum(parts) / max(1, len(parts))), -len(verdict.failed)
+    margins = [finding.margin or 0.0 for finding in verdict.failed if finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)]
+    return (
+        _count_usable(verdict)[0],
+        round(sum(parts) / max(1, len(parts))),
+        -len(verdict.failed),
+        round(sum(margins), 1),
+    )
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
@@ -192,7 +208,12 @@ class _Trials:
     """
 
     def __init__(
-        self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None]
+        self,
+        setup: FlightSetup,
+        airframe: Airframe,
+        verdict: Verdict,
+        on_trial: Callable[[str], None],
+        overlaps: Sequence[OverlapMeasure | None],
     ) -> None:
         self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
         self._original_worst_margins, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
@@ -207,6 +228,7 @@ class _Trials:
             if not lost_legs.isdisjoint(range(survey.first, survey.last))
         ]
         self._surveys = [all_surveys[number] for number in self._numbers]
+        self._overlaps = [measure for measure in overlaps if measure is not None]
         self._current_turn_around = min(min_turn_around(setup.route, survey) for survey in self._surveys)
         reasons = (fixed_layout_reason(setup.mission, setup.route, survey) for survey in self._surveys)
         self.kept = next((reason for reason in reasons if reason), "")
@@ -558,18 +580,41 @@ class _Trials:
         )
 
     def _slower_airspeeds(self) -> Iterator[tuple[float, Airframe]]:
-        """Yield each reduced airspeed (m/s) with its airframe, the fastest first.
+        """Yield each reduced airspeed (m/s) with its airframe, the fastest first, down to the lowest allowed.
 
         Yields nothing if the mission itself sets an airspeed.
         """
         if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
             return
-        min_speed = _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min
-        for speed in (round(2.0 * factor * self._airframe.airspeed) / 2.0 for factor in AIRSPEED_FACTORS):
-            if speed < min_speed:
-                break
-            with suppress(PlanflyError):
-                yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
+        limits, steps = self._airframe.autopilot.speeds.limits, 1.0 / _AIRSPEED_STEP_MPS
+        min_speed = max(
+            _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min, -math.inf if limits is None else limits.min
+        )
+        lowest = math.ceil(min_speed * steps - 1e-6) / steps
+        speeds = {lowest, *(round(2.0 * factor * self._airframe.airspeed) / 2.0 for factor in AIRSPEED_FACTORS)}
+        max_speed = self._max_airspeed_for_photos()
+        if math.isfinite(max_speed):
+            speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
+        for speed in sorted(speeds, reverse=True):
+            if lowest <= speed <= max(lowest, max_speed) and speed < self._airframe.airspeed:
+                with suppress(PlanflyError):
+                    yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
+
+    def _max_airspeed_for_photos(self) -> float:
+        """Return the highest airspeed at which a slow camera takes photos with the required front overlap, m/s.
+
+        It follows from the ground speed flown at the place with the minimum overlap.  Infinity without such a camera.
+        """
+        speeds, autopilot = [math.inf], self._airframe.autopilot
+        altitude = float(self._setup.route.positions[self._surveys[0].first, 2])
+        for measure in self._overlaps:
+            if measure.is_camera_limited and measure.front is not None and measure.camera.front is not None:
+                ground_speed = measure.photo_spacing / measure.camera.interval
+                overlap = measure.camera.front - PHOTO_OVERLAP_FRACTION
+                needed_speed = (1.0 - overlap) * measure.camera.along * measure.height / measure.camera.interval
+                change = _GROUND_SPEED_RATIO * needed_speed - ground_speed
+                speeds.append(self._airframe.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
+        return min(speeds)
 
 
 def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:

@@ -146,7 +146,7 @@ def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
     >>> count_line_photos([None])
     0
     """
-    return sum(0 if measure is None else measure.photos - measure.missed_photos for measure in lines)
+    return sum(0 if measure is None else measure.taken_photos for measure in lines)
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:

@@ -41,6 +41,7 @@ class LineMeasure:
     max_height_error: maximum height error, m, positive above; NaN if unknown everywhere.
     photos, missed_photos: number of planned photos, and of those not taken, also because the camera is too slow; 0 if
         no distance between photos is stated.
+    taken_photos: number of photos that the camera takes on the line, counted from where it is switched on.
     lateral_tolerance: tolerance of the lateral offset, m.
     min_height_tolerance: smallest height tolerance anywhere along the line, m.
     lost_spans, unknown_spans: start and end of each lost part and of each unknown part, m from the line's start.
@@ -63,6 +64,7 @@ class LineMeasure:
     lost_spans: tuple[tuple[float, float], ...] = ()
     unknown: float = 0.0
     unknown_spans: tuple[tuple[float, float], ...] = ()
+    taken_photos: int = 0
 
     @property
     def ok(self) -> bool | None:
@@ -174,6 +176,7 @@ def measure_line(
         min_height_tolerance=float(np.fmin.reduce(rows.height_tolerance, initial=math.inf)),
         lost_spans=_runs_of_set_steps(~is_kept, step),
         unknown_spans=_runs_of_set_steps(is_kept & ~is_good, step),
+        taken_photos=_count_taken_photos(requirements, aligned, line, rows),
     )
 
 
@@ -298,32 +301,57 @@ def _photo_spacing(mission: Mission, photo_spacing: float, speeds: Floats) -> Fl
 def _switch_row(requirements: RouteRequirements, aligned: AlignedTrack, waypoint: int) -> int:
     """Return the row at which the items after a waypoint switch the camera.
 
-    It is the row of the waypoint's passage if no earlier row is within the switching distance.
+    At a gate it is the first row behind its plane.  Otherwise it is the row of the waypoint's passage, if no earlier
+    row is within the switching distance.
     """
     first, last = int(aligned.rows[max(0, waypoint - 1)]), int(aligned.rows[waypoint]) + 1
     offsets = aligned.track.position[first:last, :2] - requirements.points[waypoint, :2]
+    if _is_gate(requirements, waypoint) and waypoint < requirements.legs:
+        course = requirements.points[waypoint + 1, :2] - requirements.points[waypoint, :2]
+        rows_before = np.flatnonzero(offsets @ course < 0.0)
+        return min(last - 1, first + int(rows_before[-1]) + 1) if rows_before.size else last - 1
     indices = np.flatnonzero(np.hypot(*offsets.T) <= _switch_radius(requirements, waypoint))
     return first + int(indices[0]) if indices.size else last - 1
 
 
 def count_flight_photos(requirements: RouteRequirements, aligned: AlignedTrack) -> int:
-    """Return the number of photos that the camera takes on a whole flight, on and between the photo lines.
+    """Return the number of photos that the camera takes on a whole flight, on and between the photo lines."""
+    return len(_photo_rows(requirements, aligned, range(requirements.legs)))
+
+
+def _count_taken_photos(
+    requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoLine, rows: _LineRows
+) -> int:
+    """Return the number of a flight's photos that are taken on a photo line, up to `PHOTO_STEP_M` beyond its ends."""
+    photo_rows = _photo_rows(requirements, aligned, range(line.first, line.last)) - rows.track_rows.start
+    photo_rows = photo_rows[(photo_rows >= 0) & (photo_rows < len(rows.along))]
+    is_between_ends = (rows.along >= -PHOTO_STEP_M) & (rows.along <= rows.axis.length + PHOTO_STEP_M)
+    return int(np.count_nonzero((rows.is_ahead & rows.conditions["off_line"] & is_between_ends)[photo_rows]))
+
+
+def _photo_rows(requirements: RouteRequirements, aligned: AlignedTrack, legs: range) -> NDArray[np.int64]:
+    """Return the row at which the camera takes each photo, (n,), while it stays switched as on any of some legs.
 
     The camera takes the first photo where it is switched on.  Items that state no distance between photos add no
     photos.
     """
-    setup, track, photo_count = requirements.setup, aligned.track, 0
+    setup, track, photo_rows = requirements.setup, aligned.track, [np.empty(0, dtype=np.int64)]
     spacings = camera_spacing(setup.mission, setup.route)[:-1].tolist()
     for spacing, group in itertools.groupby(range(len(spacings)), spacings.__getitem__):
-        legs = list(group)
-        rows = slice(*(_switch_row(requirements, aligned, waypoint) for waypoint in (legs[0], legs[-1] + 1)))
+        own_legs = list(group)
         # A distance of NaN is not positive.
-        if not spacing > 0.0 or not aligned.passed[legs[0]] or rows.stop - rows.start < 2:
+        if not spacing > 0.0 or not aligned.passed[own_legs[0]] or set(legs).isdisjoint(own_legs):
+            continue
+        rows = slice(*(_switch_row(requirements, aligned, waypoint) for waypoint in (own_legs[0], own_legs[-1] + 1)))
+        if rows.stop - rows.start < 2:
             continue
         lengths = np.hypot(*np.diff(track.position[rows, :2], axis=0).T)
         speeds = np.hypot(*track.velocity[rows, :2].T)[1:]
-        photo_count += int(float((lengths / _photo_spacing(setup.mission, spacing, speeds)).sum()) + 1e-6) + 1
-    return photo_count
+        photos_before_row = np.cumsum(lengths / _photo_spacing(setup.mission, spacing, speeds))
+        # A millionth of a photo is rounding.
+        numbers = np.arange(int(photos_before_row[-1] + 1e-6) + 1)
+        photo_rows.append(rows.start + np.searchsorted(np.concatenate([[0.0], photos_before_row]), numbers - 1e-6))
+    return np.concatenate(photo_rows)
 
 
 # ----------------------------------------------------------------------

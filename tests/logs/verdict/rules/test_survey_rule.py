@@ -18,7 +18,7 @@ from flight.mission.route import RouteRules, make_route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.photo_lines import measure_overlap
+from logs.verdict.measures.photo_lines import count_flight_photos, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import judged_surveys, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.verdict import Verdict
@@ -390,6 +390,33 @@ def test_a_gate_switches_the_camera_at_its_plane() -> None:
     first = photo_lines(judge(setup, fly_path(setup, radius=FITS)))[0]
     assert first.flown == pytest.approx(100.0, abs=0.3)
     assert "photo line 1 of 3 (items 2 to 4): 100 % of its 1000 m can be used" in first.reason
+
+
+def test_a_gate_that_is_passed_at_an_angle_costs_no_photo() -> None:
+    """Photos 49.9 m apart: of 21 on 1,000 m the last is at 998 m.
+
+    The first line is begun 20 m beside its gate, 0.2 m nearer with each metre: nearest to it 4 m behind its plane.
+    """
+    items = []
+    for k, (east, north, _) in enumerate(lines()):
+        is_gate = k % 4 in (1, 2)
+        items.append(wp(east, north, 100.0, command=4501 if is_gate else 16))
+        if is_gate:
+            items.append(f"2 206 {49.9 if k % 4 == 1 else 0} 0 1 0 0 0 0")
+    setup = setup_of(*items, home="36.5 -84.2 100")
+    law = Px4(Px4Parameters.defaults("1.17"))
+    route = make_route(
+        setup.mission, ORIGIN, setup.scenario.terrain, 25.0, False, setup.limits, rules=RouteRules(reads_as_px4=True)
+    )
+    setup = replace(setup, route=route, autopilot=law, nav="perfect")
+    requirements = route_requirements(setup)
+    beside = fly_path(setup, radius=FITS, across=lambda s: np.clip(0.2 * (LEAD + 100.0 - s), 0.0, 40.0))
+    aligned = align_track(requirements, beside)
+    assert aligned is not None
+    (found,) = requirements.surveys
+    measures = [measure_line(requirements, aligned, found, line) for line in found.lines]
+    assert [measure and measure.taken_photos for measure in measures] == [21] * 3
+    assert count_flight_photos(requirements, aligned) == 63
 
 
 def test_lines_that_bend_are_measured_along_their_bends() -> None:
