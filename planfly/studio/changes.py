@@ -39,6 +39,7 @@ class PlaceResult(NamedTuple):
     scale: smallest noticeable difference of the margin.
     level: "flown" or "planned", according to the value, or "not reached" if the flight ended before the place; only
         values of the same level are compared.
+    planned: value of the planned path at a place that was flown; None elsewhere.
     """
 
     ok: bool | None
@@ -49,6 +50,7 @@ class PlaceResult(NamedTuple):
     scale: float | None = None
     level: str = _FLOWN
     cause: str = ""
+    planned: float | None = None
 
     @property
     def text(self) -> str:
@@ -84,8 +86,8 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
     places_reached = _places_reached(findings)
     for finding in findings:
         key, description = _place_key(finding.place, route.items.tolist(), order)
-        value = finding.planned if finding.flown is None else finding.flown
-        level = _PLANNED if finding.flown is None else _FLOWN
+        is_planned = finding.flown is None or _is_decided_by_plan(finding)
+        value, level = (finding.planned, _PLANNED) if is_planned else (finding.flown, _FLOWN)
         if places_reached and not _is_reached(finding.place, places_reached):
             level = _NOT_REACHED
         result = PlaceResult(
@@ -97,11 +99,23 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
             RULE_WORDS[finding.rule].scale,
             level,
             _other_cause(finding, value),
+            None if finding.flown is None else finding.planned,
         )
         previous = results.get((finding.rule, key))
         if previous is None or _severity_key(result) < _severity_key(previous):
             results[finding.rule, key] = result
     return FlightResults(item_contents, results, seconds)
+
+
+def _is_decided_by_plan(finding: Finding) -> bool:
+    """Return True if the margin of a flown place is that of its planned value, which then decides."""
+    if finding.margin is None or finding.limit is None or finding.planned is None or finding.flown is None:
+        return False
+    planned_error, flown_error = (
+        abs((value - finding.limit if finding.at_least else finding.limit - value) - finding.margin)
+        for value in (finding.planned, finding.flown)
+    )
+    return planned_error < flown_error
 
 
 def _other_cause(finding: Finding, value: float | None) -> str:
@@ -275,14 +289,25 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
     causes = [shown.cause for shown in (result, old_result) if shown is not None and shown.cause]
     if causes:
         return f"{result.place}: {RULE_WORDS[rule].word} ({causes[0]}), {state_text}"
+    # The failure decides which values are compared; a better flown value does not explain a failure of the plan.
+    level = next(
+        (shown.level for shown in (result, old_result) if shown is not None and shown.ok is False), result.level
+    )
     values = dict.fromkeys(
-        shown_result.text
-        for shown_result in (old_result, result)
-        if shown_result is not None and shown_result.text and shown_result.level == result.level
+        text for shown in (old_result, result) if shown is not None and (text := _value_text(shown, level))
     )
     values_text = " \u2192 ".join(values)
     name = _quantity_name(rule) if values else RULE_WORDS[rule].word
-    return f"{result.place}: {name} {values_text}".rstrip() + f", {state_text}"
+    was_flown = any(shown is not None and shown.planned is not None for shown in (old_result, result))
+    planned_text = " planned" if values and level == _PLANNED and was_flown else ""
+    return f"{result.place}: {name}{planned_text} {values_text}".rstrip() + f", {state_text}"
+
+
+def _value_text(result: PlaceResult, level: str) -> str:
+    """Return the value of a level with its unit, or "" if the place has none."""
+    if result.level != level and level == _PLANNED and result.planned is not None:
+        return quantity_text(result.planned, result.unit)
+    return result.text if result.level == level else ""
 
 
 def _quantity_name(rule: str) -> str:

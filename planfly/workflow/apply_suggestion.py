@@ -16,11 +16,12 @@ from flight.mission.altitude_frames import misread_altitudes
 from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude, set_loiter_radius
 from flight.mission.items import LANDINGS, OVER_TERRAIN, Command, Frame, Mission
 from flight.mission.route import Route
-from logs.verdict.findings import Finding
+from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.measures.violated_legs import violated_legs
-from logs.verdict.places import Change, ItemMove, Suggestion
+from logs.verdict.places import Change, ItemMove, Place, Suggestion
 from logs.verdict.tolerances import HEIGHT_ERROR_LIMIT_M, MIN_LEG_LENGTH_M
 from logs.verdict.trials import first_that_passes
+from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from world.arrays import Floats
 from world.errors import MissionError
@@ -32,6 +33,9 @@ _SIDE_DIRECTIONS = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0
 _TURN_STEPS = 40
 # Distance from a sphere's surface that a step aims at, m, as in the planner; the navigation error may be a third of it.
 _SPHERE_MARGIN_M = 15.0
+# Shares of a change of a leg's rise that are made at its end, in the order in which they are tried; the first leaves it
+# to the leg's place in the route.
+_END_FRACTIONS = (None, 1.0, 0.0, 0.5, 0.05, 0.1, 0.2, 0.8, 0.9, 0.95)
 # Smallest share of a move of waypoints that is taken to move the nearest point of their legs.
 _MIN_MOVE_SHARE = 0.2
 
@@ -53,22 +57,26 @@ def apply_suggestion(
 ) -> Mission:
     """Return the mission with one suggestion of a finding applied.
 
-    If a suggestion can be applied in several ways, the mission with the fewest failed findings is returned.
+    If a suggestion can be applied in several ways, the mission with the fewest failed findings is returned, and
+    of these the one with the fewest findings that pass or are absent without the change.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
     """
     source = judged_mission.mission.source
     if not can_apply(suggestion):
         raise MissionError(f"{source}: this suggestion cannot be made by moving items", field="suggestion")
-    missions, errors = [], []
+    best_mission, errors = None, []
     # Away from a missile, try a single waypoint and all waypoints, because each moved waypoint may fail elsewhere; both
     # in the direction of the nearest point, and each in its own direction, for a path that bends around the missile.
-    # To reduce the rise of one leg, try both of its ends, and either of them, because the neighbouring legs may fail.
+    # To reduce the rise of one leg, try both of its ends, either of them, and other shares of the two, because the
+    # neighbouring legs may fail.
     choices = [_Choice()]
     if any(change.what == "distance" for change in suggestion):
         choices = [_Choice(max_moves, radially) for max_moves, radially in product((1, None), (False, True))]
     elif [change.what for change in suggestion] == ["rise"]:
-        choices = [_Choice(end_fraction=end_fraction) for end_fraction in (None, 1.0, 0.0, 0.5)]
+        choices = [_Choice(end_fraction=end_fraction) for end_fraction in _END_FRACTIONS]
+    open_places = _open_places(judged_mission.verdict)
+    fewest_open = math.inf, math.inf
     for choice in choices:
         edited_mission = _EditedMission(context, judged_mission, choice)
         try:
@@ -77,19 +85,29 @@ def apply_suggestion(
         except MissionError as error:
             errors.append(error)
             continue
-        if edited_mission.is_changed:
-            missions.append(edited_mission.mission)
-    if not missions and errors:
+        if not edited_mission.is_changed:
+            continue
+        if len(choices) == 1:
+            return edited_mission.mission
+        new_open_places = _open_places(context.judge(edited_mission.mission).verdict)
+        key = sum(new_open_places.values()), len(new_open_places.keys() - open_places.keys())
+        if key < fewest_open:
+            best_mission, fewest_open = edited_mission.mission, key
+        if fewest_open[1] == 0 and (finding.rule, finding.place) not in new_open_places:
+            break
+    if best_mission is not None:
+        return best_mission
+    if errors:
         raise errors[0]
-    if not missions:
-        raise MissionError(
-            f"{source}: the mission has no item at the place of this suggestion: change it by hand", field="suggestion"
-        )
-    return (
-        min(missions, key=lambda mission: len(context.judge(mission).verdict.failed))
-        if len(missions) > 1
-        else missions[0]
+    raise MissionError(
+        f"{source}: the mission has no item at the place of this suggestion: change it by hand", field="suggestion"
     )
+
+
+def _open_places(verdict: Verdict) -> dict[tuple[str, Place], bool]:
+    """Return rule and place of each failed or undecided finding of a verdict, with True for a failed one."""
+    open_findings = (*undecided_findings(verdict.findings), *verdict.failed)
+    return {(finding.rule, finding.place): finding.ok is False for finding in open_findings}
 
 
 def item_moves(context: MissionContext, before: Mission, after: Mission) -> tuple[ItemMove, ...]:

@@ -146,3 +146,36 @@ def test_a_value_that_is_within_its_limit_is_not_named_for_a_failure_of_another_
     assert describe_changes(flew, flight_results(mission, route, [bank(45.0)], 100.0)) == [
         "closest to its limit: loss of control, largest bank 40.4\u00b0 \u2192 45\u00b0 (flight)"
     ]
+
+
+def slope(planned: float, flown: float, *, ok: bool | None) -> Finding:
+    """A descent of at most 3.92 degrees; the plan decides if it is steeper, and otherwise the flight."""
+    decisive = planned if planned < -3.92 else flown
+    return make_finding(
+        "slope",
+        Place("leg", 1),
+        ok=ok,
+        reason="",
+        faults=[message("descends")] if ok is False else [],
+        planned=planned,
+        flown=flown,
+        limit=-3.92,
+        at_least=True,
+        tolerance=0.01,
+        margin=decisive + 3.92,
+        unit="deg",
+    )
+
+
+def test_a_failure_of_the_plan_is_shown_by_planned_values() -> None:
+    """The flown descent becomes gentler, from 4.02 to 3.96 degrees, while the planned one becomes too steep."""
+    session = drawn_session(5, 12)
+    mission, route = session.mission, session.judged.setup.route
+    undecided, steep = (
+        flight_results(mission, route, [one], 100.0)
+        for one in (slope(-3.90, -4.02, ok=None), slope(-4.10, -3.96, ok=False))
+    )
+    values = "-3.9\u00b0 \u2192 -4.1\u00b0"
+    assert describe_changes(undecided, steep) == [f"leg to item 4: slope planned {values}, fails now"]
+    back = "-4.1\u00b0 \u2192 -3.9\u00b0"
+    assert describe_changes(steep, undecided) == [f"leg to item 4: slope planned {back}, is not judged now"]

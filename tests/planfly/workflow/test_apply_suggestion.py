@@ -14,6 +14,7 @@ from logs.verdict.wording import suggestion_text
 from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from planfly.workflow.suggestion_trials import SuggestionTrials
+from tests.mission_lines import setup_of, wp
 from tests.planfly.studio.drafts import drawn_session, world_of
 from world.errors import MissionError
 from world.frames import to_geo
@@ -90,6 +91,25 @@ def test_a_gentler_landing_moves_the_waypoint_before_it(change: Change, offset: 
     [move] = item_moves(context, judged.mission, apply_suggestion(context, judged, finding, (change,)))
     assert move.item == 7
     assert (move.east, move.north, move.up) == pytest.approx(offset, abs=0.5)
+
+
+def test_a_rise_is_shared_between_its_ends_as_their_other_legs_allow() -> None:
+    """Of 100 m item 2 can be lowered by 97 m and item 3 raised by 17 m, because the legs before and after fail beyond.
+
+    A descent of 5 degrees loses 87.5 m on 1000 m; one of 4.9 degrees 85.7 m, so that 185 m have to become 85 m.
+    """
+    altitudes = (800.0, 810.0, 625.0, 555.0, 555.0)
+    lines = [wp(0.0, 1000.0 * k - 2000.0, up - 300.0) for k, up in enumerate(altitudes)]
+    setup = setup_of(*lines, limits={"max_dive_deg": 5.0, "min_clearance_m": 30.0})
+    context = MissionContext.from_setup(setup)
+    judged = context.judge(setup.mission)
+    [finding] = judged.verdict.failed
+    [trial] = [one for one in SuggestionTrials(context, judged).find_passing() if one.suggestion[0].what == "rise"]
+    moves = {move.item: move.up for move in trial.suggestion[0].moves}
+    assert (finding.rule, finding.place.index, list(moves)) == ("slope", 1, [2, 3])
+    assert moves[3] - moves[2] == pytest.approx(100.0, abs=0.01)
+    assert moves[2] > -97.5
+    assert moves[3] < 17.5
 
 
 def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did() -> None:
