@@ -124,7 +124,9 @@ def test_a_flight_is_judged_as_it_was_flown(flown: planfly.FlownMission) -> None
     assert planfly.check(log) == planfly.check(flown.log) == flown.verdict
     assert planfly.check(flown) is flown.verdict
     for source in (log, flown):
-        with pytest.raises(planfly.ScenarioError, match="wind: not allowed with a log, which is judged with the aircraft") as caught:
+        with pytest.raises(
+            planfly.ScenarioError, match="wind: not allowed with a log, which is judged with the aircraft"
+        ) as caught:
             planfly.check(source, wind=(3, 0))
         assert (caught.value.field, caught.value.value) == ("wind", (3, 0))
 
