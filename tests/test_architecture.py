@@ -45,7 +45,6 @@ LONGER = {
     "logs/views/exports/log_files.py:_make_topics": 91,
     "logs/views/profile.py:profile_chart": 64,
     "planfly/api/drafting.py:new_scenario": 61,
-    "planfly/api/optimising.py:optimise": 66,
     "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
     "planner/evaluation/threat_index.py:kill_density": 73,
     "planner/search/plan_path.py:plan_path": 67,

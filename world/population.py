@@ -283,7 +283,10 @@ class _Window:
         return f"the file covers latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
     def density_bands(self, densities: Floats) -> tuple[tuple[int, BaseGeometry], ...]:
-        """Return the number of each band that occurs, lowest first, and the parts of the area with densities in it."""
+        """Return the number of each band that occurs, and the parts of the area in it.
+
+        The band of the lowest densities comes first.
+        """
         from rasterio.features import shapes
 
         bands = np.searchsorted(DENSITY_LIMITS_PER_KM2, densities, side="right").astype(np.int16)

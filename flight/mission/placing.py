@@ -523,7 +523,10 @@ class _AltitudeConverter:
 
 
 def _is_vertical(previous: RoutePoint, stop: RoutePoint) -> bool:
-    """Return True if a stop at the same place on the map lies above or below the previous stop, and is no take-off."""
+    """Return True if a stop lies above or below the previous stop, and is no take-off.
+
+    Both stops are at the same place on the map.
+    """
     return (
         abs(stop.map_position[2] - previous.map_position[2]) >= SAME_POSITION_DISTANCE_M
         and stop.command not in TAKEOFFS

@@ -418,7 +418,9 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the highest airspeed below the present command at which a turn fits its legs, m/s; None if none does.
+    """Return the highest airspeed below the present command at which a turn fits its legs, m/s.
+
+    Return None if it fits at no lower airspeed.
 
     corner: waypoint at which the aircraft turns.
     """

@@ -42,7 +42,10 @@ class GroundGrid:
 
 
 def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
-    """Return the range of area, route and flight, m, (2, 2): a row each for east and north, of minimum and maximum."""
+    """Return the range of area, route and flight, m, (2, 2).
+
+    The rows are east and north, the columns minimum and maximum.
+    """
     points = [setup.scenario.bounds.T, setup.route.positions[:, :2]]
     if track is not None:
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])

@@ -93,7 +93,7 @@ def _survey_panel(
 
 
 def _usable_spans(measure: LineMeasure | None) -> list[tuple[float, float]]:
-    """Return the start and end of each usable part of a photo line, m; [] for a line that was not measured."""
+    """Return the start and end of each usable part of a photo line, m; [] for an unmeasured line."""
     if measure is None:
         return []
     gaps = sorted((*measure.lost_spans, *measure.unknown_spans))

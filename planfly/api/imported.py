@@ -191,7 +191,9 @@ def refly(
 
 
 def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
-    """Draw the charts that compare a logged with a simulated flight as PNG files in a folder, and return their paths.
+    """Draw the charts that compare a logged with a simulated flight, and return the files.
+
+    The files are PNG files in the folder.
 
     ending: added to the stem of each file name.
     """

@@ -181,11 +181,11 @@ def _sampled_flight(track: Track) -> tuple[Floats, Floats, Floats]:
 
 
 def _sampled_return(path: Floats) -> tuple[Floats, Floats]:
-    """Return every `_RETURN_SAMPLE_ROWS`th position and the last of a return, m, and the ground velocities there, m/s.
+    """Sample positions of a return, m, and ground velocities, m/s, (n, 3) each.
+
+    The samples are every `_RETURN_SAMPLE_ROWS`th position and the last.
 
     path: positions of the return, one each second, m, (t, 3).
-
-    The results have the shape (n, 3).
     """
     rows = np.union1d(np.arange(0, len(path), _RETURN_SAMPLE_ROWS), [len(path) - 1])
     return path[rows], np.gradient(path, axis=0)[rows]

@@ -262,7 +262,9 @@ def find_winds(
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
 ) -> WindsResult:
-    """Fly rounds of flights until the boundary of each direction is accurate enough, or `goal.flights` are flown.
+    """Fly rounds of flights until the boundary of each direction is accurate enough.
+
+    At most `goal.flights` flights are flown.
 
     A new search starts with a few flights in calm air.  If none of them is flyable, the search ends there: the result
     contains only these flights, and the table stays empty.  Flights in the table are not flown again.  The winds of a
@@ -430,7 +432,9 @@ class _Search:
 
 
 def _fly_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> list[FlightRow]:
-    """Fly the first draws in calm air; return the flights if all of them were flown and none is flyable, otherwise [].
+    """Fly the first draws in calm air; return the flights if none of them is flyable, otherwise [].
+
+    [] is also returned if a flight could not be flown.
 
     Nothing is flown, and [] is returned, if the goal permits fewer flights than this needs.
 

@@ -135,9 +135,9 @@ def _places_reached(findings: Iterable[Finding]) -> set[tuple[str, int | None]]:
 
 
 def _is_reached(place: Place, places_reached: set[tuple[str, int | None]]) -> bool:
-    """Return True for a leg that was begun, and for a waypoint that was passed or to which the leg was begun.
+    """Return True unless a place is a leg or a waypoint that the flight did not reach.
 
-    Return True for all other places.
+    A leg is reached if it was begun, and a waypoint also if the leg to it was begun.
     """
     if place.kind not in ("leg", "waypoint") or place.index is None or (place.kind, place.index) in places_reached:
         return True

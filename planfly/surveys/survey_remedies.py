@@ -544,7 +544,10 @@ class _Trials:
         return remedies[-1]
 
     def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
-        """Try longer turn-around distances with the lowest of the reduced airspeeds; return None if none passes."""
+        """Try longer turn-around distances with the lowest of the reduced airspeeds.
+
+        Return None if none of them passes.
+        """
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
             remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe, self._longer_turn_arounds())
             if remedy is not None:

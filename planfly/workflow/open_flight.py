@@ -315,7 +315,7 @@ def _capacity_notes(failsafes: Iterable[BatteryFailsafe], battery: float, volts:
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
-    """Return a note on each commanded airspeed beyond the autopilot's limits; () for an autopilot without limits.
+    """Return a note on each commanded airspeed beyond the autopilot's limits; () without limits.
 
     ArduPlane interprets DO_CHANGE_SPEED as an airspeed only if the speed type is 0, and ignores values beyond its
     limits.  PX4 interprets it as an airspeed for any type, and flies the nearest limit.

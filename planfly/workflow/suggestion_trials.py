@@ -319,7 +319,10 @@ class SuggestionTrials:
         return is_passed(*self._compared_verdicts(trial, finding), finding)
 
     def _is_tried_by_flight(self, finding: Finding) -> bool:
-        """Return True if the suggestions of a finding are tried by flights: if the judged flight reached its place."""
+        """Return True if the suggestions of a finding are tried by flights.
+
+        This is the case if the judged flight reached the place of the finding.
+        """
         return self.judged.verdict.level == "flown" and not self._is_unreached(finding)
 
     def _is_unreached(self, finding: Finding) -> bool:

@@ -286,7 +286,9 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and beside them; NaN over unknown ground.
+    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and beside them.
+
+    The height is NaN over unknown ground.
 
     pieces: `TRACKED_PIECE` records.
     """

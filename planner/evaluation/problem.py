@@ -444,9 +444,10 @@ def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable
 
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
-    """Return how much the buffer may grow with the distance from an end, m per m, so that the aircraft can follow.
+    """Return the growth of the buffer with the distance from an end, m per m.
 
-    Without reserves above or below the path it is `BUFFER_GROWTH_RATIO`, which is also the maximum.
+    The aircraft can follow this growth. Without reserves above or below the path it is `BUFFER_GROWTH_RATIO`, which is
+    also the maximum.
     """
     if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH_RATIO

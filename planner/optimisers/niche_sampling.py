@@ -130,7 +130,7 @@ def _select(
     rows: (g, n, d) samples.
     costs: (g, n) costs of the samples; inf for a sample that is never selected.
     elite: (g, d) one sample per group.
-    clearing_radius: (d,) distances within which two samples are not distinct.
+    clearing_radius: (d,) two samples are distinct if they differ by at least this in one variable.
     max_cost: maximum cost of a selected sample. It applies only after the first `MIN_SELECTED_COUNT` selections.
     max_count: maximum number of selected samples of a group. Both counts include the elite.
     """

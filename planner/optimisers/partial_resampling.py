@@ -108,7 +108,7 @@ class PartialResampling(BoxSearch):
             self._draw()
 
     def _replace_parents(self, scores: Floats) -> None:
-        """Replace each parent by its sample if the sample ranks higher, and adapt the redrawn fraction and the width.
+        """Replace each parent whose sample ranks higher; adapt the redrawn fraction and the width.
 
         Both move towards the values with which the better samples were drawn. The generations in which no sample ranks
         higher than the best parent are counted in `_stalled_generations`.

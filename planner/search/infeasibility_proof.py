@@ -225,7 +225,7 @@ def _close_sphere(
 def _close_range(
     range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
 ) -> None:
-    """Add the altitude range from `bottom` to `top` (m) to the closed ranges of column j in a row of columns.
+    """Add the range from `bottom` to `top` (m) to the closed ranges of column j in a row of columns.
 
     The range is merged with those that it overlaps. If the column already has the maximum number of closed ranges, the
     range stays open.

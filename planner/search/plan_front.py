@@ -367,7 +367,7 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
 
 
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield the problem and its stricter variants, one for each combination of obstacles, clearance and cost.
+    """Yield the problem and stricter variants: combinations of obstacles, clearance and cost.
 
     - Obstacles: each radar becomes a missile sphere whose radius is one of `RADAR_FRACTIONS` of its detection radius.
     - Clearance: the buffer is at least one of `CLEARANCE_FRACTIONS` of the spare height above the required clearance,

@@ -154,7 +154,9 @@ def _advance_sweeps(
 
 @compiled
 def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
-    """Return the cost of the best path through each candidate, including its turn there, (w, k); inf above the bound.
+    """Return the cost of the best path through each candidate, (w, k); inf above the bound.
+
+    The cost includes the turn at the candidate.
 
     candidates: (w, k, 3) k candidates of each waypoint, m.
     sweeps: costs of the best paths to and from each candidate, and the candidates before and after it on these paths.

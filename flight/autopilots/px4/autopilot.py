@@ -603,7 +603,9 @@ class Px4(Autopilot):
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
-    """Start a new leg at ``start``, as after a change of mode; keep the state of TECS and the airspeed filter.
+    """Start a new leg at ``start``, as after a change of mode.
+
+    The state of TECS and of the airspeed filter is kept.
 
     previous_record, record: records of the control law before and after the change; the memory of the second is set.
     start: position, (3,) m.

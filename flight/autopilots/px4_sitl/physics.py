@@ -205,7 +205,10 @@ class SimulatorPort:
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
-        """Send packed messages to PX4; do nothing if PX4 has ended.  Raises ValueError before PX4 has connected."""
+        """Send packed messages to PX4; do nothing if PX4 has ended.
+
+        Raises ValueError before PX4 has connected.
+        """
         if self._stream is None:
             raise ValueError("PX4 has not connected")
         try:
@@ -241,7 +244,9 @@ class SimulatorPort:
         return answer
 
     def _receive_data(self, timeout: float) -> bool:
-        """Read data for up to ``timeout`` s, and append the outputs in it to `_answers`; return True if data arrived.
+        """Read data for up to ``timeout`` s; return True if any data arrived.
+
+        The actuator outputs in the data are appended to `_answers`.
 
         A single call waits at most `_CHECK_INTERVAL_S`.  Raises ValueError before PX4 has connected.
         """

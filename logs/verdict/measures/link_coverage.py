@@ -73,7 +73,9 @@ def link_coverage(
     height: FlightHeight,
     extent: tuple[tuple[float, float], tuple[float, float]],
 ) -> LinkCoverage:
-    """Compute the margin of a radio link in every cell of a map, except in the ground and above unknown ground.
+    """Compute the margin of a radio link in every cell of a map.
+
+    In the ground and above unknown ground there is no margin (NaN).
 
     antenna: position of the station's antenna, m, (3,).
     extent: east and north range of the map, m.

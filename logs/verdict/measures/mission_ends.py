@@ -85,7 +85,7 @@ _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "b
 
 
 def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
-    """Describe why PX4 refuses a mission, which lacks the take-off or landing that the limits require.
+    """Describe why PX4 refuses a mission without the take-off or landing that the limits require.
 
     Return "" if the mission has what they require.
 

@@ -269,7 +269,10 @@ def _ground_following_error(requirements: RouteRequirements, leg: int, position:
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from the time at which its commanded airspeed can be reached; there may be none."""
+    """Return the rows of a leg from the time at which its commanded airspeed can be reached.
+
+    There may be no such rows.
+    """
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.leg_airspeeds
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0

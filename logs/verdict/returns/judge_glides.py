@@ -357,7 +357,7 @@ def _possible_winds(scenario: Scenario, positions: Floats, times: Floats) -> Pos
     axes = [np.linspace(*edge, count) for edge, count in zip(edges, _WIND_SAMPLES, strict=True)]
 
     def winds_at(altitudes: Floats) -> Floats:
-        """Return the forecast's winds at h altitudes (m AMSL), at all sampled places and times, m/s, (s, h, 2)."""
+        """Return the winds at h altitudes (m AMSL), at all sampled places and times, m/s, (s, h, 2)."""
         east, north, time, amsl = (axis.ravel() for axis in np.meshgrid(*axes, altitudes, indexing="ij"))
         return scenario.wind_velocities(np.column_stack([east, north, amsl]), time).reshape(-1, len(altitudes), 2)
 
