@@ -73,8 +73,8 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
     assert main([*ASKED, "--sitl", str(write_fake(mound, "dives-home")), "--out", "drawn"]) == 4
     out = capsys.readouterr().out
     assert "1 of 2 returns hits the ground" in out
-    program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst returns flown"
-    assert f"{program}, 0 of them agree with the simulation; 1 ended worse than in the simulation" in out
+    program = "1 of the worst returns also flown by ArduPlane V0.0-fake (0badc0de) itself"
+    assert f"{program}: 0 of them agree with the simulation; 1 ended worse than in the simulation" in out
     assert "the program's outcome applies, because it is worse" in out
     answer = json.loads((mound / "a.json").read_text(encoding="utf-8"))
     (one,) = answer["by_program"]["returns"]
