@@ -1,6 +1,7 @@
 """Describe the conditions of a verdict: aircraft, speed, weather and world, in the lines after the answer."""
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -12,6 +13,7 @@ from aircraft.catalog import find_logged_aircraft
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import judged_airspace, judged_surveys
 from world.errors import FlightError
 from world.json_schema import DocumentConfig
@@ -216,12 +218,14 @@ _PARALLEL_ANGLE_RAD = math.radians(15.0)
 _SAME_LINE_DISTANCE_M = 1.0
 
 
-def corridor_line(setup: FlightSetup) -> str:
+def corridor_line(setup: FlightSetup, findings: Sequence[Finding]) -> str:
     """Return a line on a corridor whose width the scenario does not state; "" if the scenario states it.
 
-    The line states the width of the corridor and where it comes from.  It warns if the corridor is wider than the
-    distance between legs: a flight within such a corridor may never have followed the legs' lines.  Surveys also get
-    "", because their photo lines are judged one by one.
+    The line states the width of the corridor, where it comes from, and the legs along which turns or loiters make it
+    wider.  It warns if the corridor is wider than the distance between legs: a flight within such a corridor may never
+    have followed the legs' lines.  Surveys also get "", because their photo lines are judged one by one.
+
+    findings: findings of the verdict, which contain the corridor of each leg.
     """
     half_width, radius = setup.corridor, setup.autopilot.turns.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or judged_surveys(setup):
@@ -229,7 +233,19 @@ def corridor_line(setup: FlightSetup) -> str:
     origin = "planfly's default"
     if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
-    line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} (set [limits] corridor_m to change it)"
+    wider = [
+        finding.limit
+        for finding in findings
+        if finding.rule == "corridor" and finding.limit is not None and finding.limit > half_width
+    ]
+    wider_text = ""
+    if wider:
+        legs_text = count_text(len(wider), "leg")
+        wider_text = f"; up to {max(wider):.0f} m along {legs_text} with turns or loiters that need more"
+    line = (
+        f"Corridor: {half_width:.0f} m to either side of the legs, {origin}{wider_text}"
+        " (set [limits] corridor_m to change it)"
+    )
     closest_legs = min_leg_spacing(setup.route.positions)
     if closest_legs is None or closest_legs[0] >= half_width:
         return line

@@ -318,7 +318,7 @@ def summary_lines(
     if setup.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":
-        lines += [line] if (line := corridor_line(setup)) else []
+        lines += [line] if (line := corridor_line(setup, findings)) else []
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for answer in other_answers:

@@ -65,7 +65,7 @@ def imported_lines(
         f"{autopilot_line(conditions, is_flown=True)} ({source.format} {source.file}{_start_time_text(source)})"
     )
     lines += [*_judged_lines(source, flown_stretches, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
-    lines += [line] if (line := corridor_line(setup)) else []
+    lines += [line] if (line := corridor_line(setup, findings)) else []
     if source.mission:
         lines.append(f"Mission: {source.mission}")
     lines.append(f"Heights: {heights_text(source)}")

@@ -153,7 +153,7 @@ def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     verdict = judge_flight(setup, make_track(), "")
     assert list(verdict.lines[1:3]) == lines
     assert verdict.lines[3].startswith("Flown by: ArduPlane V4.6.0 (ArduPilot dataflash log a.BIN")
-    assert corridor_line(setup) in verdict.lines
+    assert corridor_line(setup, verdict.findings) in verdict.lines
 
 
 def lines(gap: float, *, overlap: float = 1.0) -> np.ndarray:
@@ -184,18 +184,18 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     survey = replace(setup, route=setup.route.with_fields(position=lines(20.0)))
     assert setup.corridor == 30.0
     default = "Corridor: 30 m to either side of the legs, planfly's default (set [limits] corridor_m to change it)"
-    assert corridor_line(survey) == (
+    assert corridor_line(survey, ()) == (
         f"{default}; the corridor is wider than the 20 m between legs 0 and 2, so a flight within the corridor may"
         " not have followed the lines"
     )
-    assert corridor_line(replace(setup, route=setup.route.with_fields(position=lines(31.0)))) == default
-    assert corridor_line(setup) == default
-    assert corridor_line(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))) == (
+    assert corridor_line(replace(setup, route=setup.route.with_fields(position=lines(31.0))), ()) == default
+    assert corridor_line(setup, ()) == default
+    assert corridor_line(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())), ()) == (
         "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m"
         " (set [limits] corridor_m to change it)"
     )
     stated = setup.scenario.limits.model_copy(update={"corridor_m": 30.0})
-    assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated))) == ""
+    assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated)), ()) == ""
 
 
 def test_all_names_of_a_parameter_file_without_effect_are_data() -> None:

@@ -294,7 +294,7 @@ def test_the_surveys_of_a_setup_are_searched_once(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(route_requirements, "find_surveys", lambda *args: searches.append(args) or search(*args))
     setup = opened(FIELD)
     found = route_requirements.route_requirements(setup).surveys
-    assert corridor_line(setup) == ""
+    assert corridor_line(setup, ()) == ""
     assert judged_surveys(setup) is found
     assert len(searches) == 1
     assert judged_surveys(opened(FIELD)) == found

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
+from logs.verdict.conditions import corridor_line
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
 from tests.synthetic import bank_radius, bump, edited, fly_path, make_setup, waypoint_stations
@@ -88,6 +89,20 @@ def test_a_turn_that_starts_at_its_waypoint_swings_out_by_its_own_arc() -> None:
     """Flown over, a corner of 60 degrees leads R (1 - cos 60) = R / 2 beyond the next leg."""
     setup = make_setup(corner(60.0), fly_over=(1,))
     assert of(judge_geometry(setup), "corridor", leg(1)).planned == pytest.approx(bank_radius() / 2, abs=0.01)
+
+
+def test_the_line_on_the_corridor_states_where_it_is_wider() -> None:
+    """Flown over, a corner of 60 degrees needs R / 2 + 10 m = 65.2 m, on both legs beside it; 30 m are the rest's."""
+    points = [*corner(60.0), [6000 * math.sin(math.pi / 3), 3000 + 6000 * math.cos(math.pi / 3), 300]]
+    setup = make_setup(points, fly_over=(1,))
+    verdict = judge(setup, fly_path(setup))
+    [line] = [one for one in verdict.lines if one.startswith("Corridor: ")]
+    assert line == (
+        "Corridor: 30 m to either side of the legs, planfly's default; up to 65 m along 2 legs with turns or loiters"
+        " that need more (set [limits] corridor_m to change it)"
+    )
+    straight = make_setup(STRAIGHT)
+    assert "up to" not in corridor_line(straight, judge(straight, fly_path(straight)).findings)
 
 
 def test_the_leg_that_is_flown_counts_not_one_that_happens_to_be_near() -> None:
