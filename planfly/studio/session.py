@@ -23,7 +23,13 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
-from planfly.studio.settings import apply_parameter_settings, apply_scenario_settings, own_aircraft, settings_json
+from planfly.studio.settings import (
+    apply_parameter_settings,
+    apply_scenario_settings,
+    error_in_page_words,
+    own_aircraft,
+    settings_json,
+)
 from planfly.studio.view_model import Json, mission_json, windows_json, world_json
 from planfly.studio.worker_process import INTERNAL
 from planfly.workflow.apply_suggestion import item_moves
@@ -409,14 +415,15 @@ class Session:
     def change_settings(self, settings: Settings) -> None:
         """Change the settings of the flight.
 
-        Raises PlanflyError for a value that is not allowed in a scenario.
+        Raises PlanflyError, which names settings by their labels on the page, for a value that is not allowed.
         """
-        scenario = apply_scenario_settings(self.context.scenario, settings, self.aircraft_folders)
-        context = self.context.with_settings(
-            scenario, apply_parameter_settings(self.context.parameters, scenario, settings)
-        )
-        mission = self.mission
-        judged_mission = context.judge(mission)
+        try:
+            scenario = apply_scenario_settings(self.context.scenario, settings, self.aircraft_folders)
+            parameters = apply_parameter_settings(self.context.parameters, scenario, settings)
+            context = self.context.with_settings(scenario, parameters)
+            judged_mission = context.judge(self.mission)
+        except PlanflyError as error:
+            raise error_in_page_words(error, settings, self.context.scenario.name) from error
         self.context, self.judged, self.plans = context, judged_mission, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
 

@@ -3,6 +3,7 @@
 Values are checked by the same code as in scenarios and parameter files, and refused with the same messages.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from aircraft.catalog import aircraft_names
 from flight.autopilots.autopilot import Parameters
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.parameter_files import parameters_text, parse_parameters
+from planfly.arguments import is_valid_wind
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
 from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
@@ -26,24 +28,36 @@ from world.scenario_tables import names_folder
 PARAMETER_FILES = (".parm", ".param", ".params")
 # Maximum number of unused names of a file that are listed.
 _MAX_LISTED_NAMES = 8
-# Names of the settings by their keys in the page data, for messages.
-_SETTING_NAMES = {
-    "aircraft": "aircraft",
-    "autopilot": "autopilot",
-    "autopilot_title": "autopilot",
-    "airspeed": "airspeed",
-    "wind_speed": "wind",
-    "wind_from": "wind",
-    "forecast": "wind",
-    "turbulence": "turbulence",
-    "min_clearance_m": "minimum clearance",
-    "max_height_m": "maximum height above ground",
-    "ceiling": "ceiling",
-    "corridor_m": "corridor",
-    "max_turn_deg": "sharpest turn",
-    "max_climb_deg": "steepest climb",
-    "max_dive_deg": "steepest descent",
-    "surveys": "photo lines",
+# Labels of the settings on the page, by their keys in the page data; messages name a setting by its label.
+_LABELS = {
+    "aircraft": "Aircraft",
+    "autopilot": "Autopilot",
+    "airspeed": "Airspeed",
+    "wind_speed": "Wind",
+    "wind_from": "Wind from",
+    "turbulence": "Turbulence",
+    "min_clearance_m": "Minimum clearance",
+    "max_height_m": "Maximum above ground",
+    "ceiling": "Ceiling",
+    "corridor_m": "Corridor each side",
+    "max_turn_deg": "Sharpest turn",
+    "max_climb_deg": "Steepest climb",
+    "max_dive_deg": "Steepest descent",
+    "surveys": "Photo lines",
+    "parameter": "Parameter",
+}
+# Keys whose change is stated as a change of another setting.
+_CHANGED_WITH = {"autopilot_title": "autopilot", "wind_from": "wind_speed", "forecast": "wind_speed"}
+# Names of the settings in scenarios and options, in the patterns of their messages, by the settings' keys.
+_NAME_PATTERNS = {
+    **{name: rf"(?:\blimits(?:\.|: ))?\b{name}\b" for name in LIMITS},
+    "wind_from": r"\bwind_from\b",
+    "wind_speed": r"\bwind(?:: |\.)speed_mps\b",
+    "airspeed": r"^airspeed(?= )|\bflight\.airspeed_mps\b",
+    "ceiling": r"\barea\.ceiling_amsl_m\b|^ceiling\b",
+    "aircraft": r"^aircraft\b",
+    "autopilot": r"^autopilot\b",
+    "parameter": r"^parameter(?::1)?:",
 }
 
 
@@ -85,6 +99,28 @@ def own_aircraft(scenario: Scenario) -> dict[str, str]:
     return {Path(folder).name: folder} if names_folder(folder) else {}
 
 
+def error_in_page_words(error: PlanflyError, settings: Settings, scenario_name: str) -> PlanflyError:
+    """Return an error of a change of settings that names the settings by their labels on the page.
+
+    The scenario's name, which may be that of the mission's file, is omitted.
+
+    >>> error = PlanflyError("m.waypoints: limits: max_height_m: 20: must be above min_clearance_m 30")
+    >>> str(error_in_page_words(error, Settings(kind="settings"), "m.waypoints"))
+    'Maximum above ground: 20: must be above Minimum clearance 30'
+    """
+    text = str(error).removeprefix(f"{scenario_name}: ").removeprefix(": ")
+    for key, pattern in _NAME_PATTERNS.items():
+        text = re.sub(pattern, _LABELS[key], text)
+    asked = settings.model_dump(exclude_none=True)
+    asked |= asked.get("limits", {})
+    changed = [key for key in _LABELS if key in asked]
+    # An error at another place of the scenario is a consequence of the changed setting.
+    if len(changed) == 1 and not any(label in text for label in _LABELS.values()):
+        value = "" if changed[0] == "parameter" else f": {asked[changed[0]]}:"
+        text = f"{_LABELS[changed[0]]}{value} {text}"
+    return PlanflyError(re.sub(r"(?<=: )(-?\d+)\.0(?=: )", r"\1", text), field=error.field, value=error.value)
+
+
 def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Mapping[str, str]) -> Scenario:
     """Return a scenario with the requested settings. Raises PlanflyError for an invalid value.
 
@@ -94,7 +130,9 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings, folders: Map
     if settings.wind_speed is not None or settings.wind_from is not None:
         speed = scenario.wind.speed if settings.wind_speed is None else settings.wind_speed
         from_deg = float(np.degrees(scenario.wind.from_course)) if settings.wind_from is None else settings.wind_from
-        wind = (float(speed), from_deg)
+        if not is_valid_wind(0.0, from_deg):
+            raise PlanflyError(f"wind_from: {from_deg:g}: allowed -360..360", field="wind_from", value=from_deg)
+        wind = (float(speed), from_deg % 360.0)
     if settings.aircraft is not None and ("/" in settings.aircraft or "\\" in settings.aircraft):
         raise PlanflyError("aircraft: expected an aircraft listed by 'planfly aircraft'", field="aircraft")
     options: FlightOptions = {
@@ -194,7 +232,7 @@ def settings_json(
         "airspeed": round(airframe.airspeed, 1),
         "airspeed_kind": "equivalent" if airframe.autopilot.speeds.equivalent else "true",
         "wind_speed": float(scenario.wind.speed),
-        "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1),
+        "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1) % 360.0,
         "turbulence": scenario.wind.turbulence,
         "forecast": "" if scenario.wind.forecast is None else scenario.wind.forecast.describe(),
         "limits": {name: limits.get(name) for name in LIMITS} | {"min_clearance_m": scenario.limits.min_clearance_m},
@@ -202,6 +240,7 @@ def settings_json(
         "parameters": dict(changed_parameters.values),
         "parameter_file": changed_parameters.file,
         "unused": ", ".join(changed_parameters.unused[:_MAX_LISTED_NAMES]) + remainder_text,
+        "labels": _LABELS,
         "known": {} if parameters is None else {name: value for name, value, _ in parameters.values},
     }
 
@@ -212,4 +251,5 @@ def changed_settings(opened: Mapping[str, Any], current: Mapping[str, Any]) -> l
     opened, current: settings as page data (`settings_json`).
     """
     opened, current = ({**settings, **settings["limits"]} for settings in (opened, current))
-    return list(dict.fromkeys(name for key, name in _SETTING_NAMES.items() if opened[key] != current[key]))
+    keys = (key for key in (*_LABELS, *_CHANGED_WITH) if key in opened and opened[key] != current[key])
+    return list(dict.fromkeys(_LABELS[_CHANGED_WITH.get(key, key)].lower() for key in keys))

@@ -1,5 +1,6 @@
 """Convert the world, the mission with its states, and the profile to the data that the page draws, in m."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -42,6 +43,8 @@ _MAX_LISTED_FINDINGS = 60
 # Maximum number of zones and threats whose cross-sections the profile shows.
 _MAX_CUTS = 120
 _OK_STATE = State("ok")
+# Closeness of a failure without a margin, which is infinite, in page data.
+_MIN_CLOSENESS = -1e6
 # Ratio of the drawn ground to the area, along each side.
 _GROUND_RATIO = 1.2
 # Minimum ratio of the width of the drawn ground to the longer side of the area.
@@ -253,16 +256,20 @@ def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return page data of the legs and corners between two waypoints, each as a pair of state and text."""
+    """Return page data of the legs and corners between two waypoints, each as its state, text and closeness."""
     return {
-        "legs": [_state_pair(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
-        "corners": [_state_pair(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
+        "legs": [_state_data(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
+        "corners": [_state_data(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
     }
 
 
-def _state_pair(state: State) -> list[str]:
-    """Return a state as page data: its name and its text."""
-    return [state.state, state.text]
+def _state_data(state: State) -> list[str | float | None]:
+    """Return a state as page data: its name, its text, and its closeness, or None if no limit is near.
+
+    By the closeness the page finds the worst of the laps that pass the same item.
+    """
+    closeness = None if state.closeness == math.inf else max(_MIN_CLOSENESS, round(state.closeness, 3))
+    return [state.state, state.text, closeness]
 
 
 # ----------------------------------------------------------------------

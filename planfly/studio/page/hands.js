@@ -1,7 +1,7 @@
 // Mouse, touch, wheel and keys on the map and on the profile.
 
 import { plain } from "/axes.js";
-import { heightWords, legStates } from "/map.js";
+import { byWorst, heightWords, legStates } from "/map.js";
 
 const STEP = 10, FAR = 100, UP = 5;
 // Legs that are named where several lie over one another.
@@ -63,6 +63,7 @@ export class Hands {
     if (this.pointers.has(event.pointerId)) this.pointers.set(event.pointerId, [x, y]);
     if (this.spread && this.pointers.size === 2) return this.pinching();
     const { drag } = this;
+    if (event.pointerType !== "touch") app.showPlace(map.view.eastAt(x), map.view.northAt(y));
     if (!drag) return this.hover(x, y, event.pointerType);
     if (!drag.moved && Math.hypot(x - drag.from[0], y - drag.from[1]) < 3) return;
     drag.moved = true;
@@ -147,7 +148,6 @@ export class Hands {
   hover(x, y, kind) {
     const { app } = this, model = app.model();
     if (!model || kind === "touch") return;
-    app.showPlace(app.map.view.eastAt(x), app.map.view.northAt(y));
     const hit = app.map.hit(x, y, false);
     app.map.root.classList.toggle("on-item", hit?.item !== undefined);
     app.map.root.classList.toggle("on-middle", hit?.after !== undefined);
@@ -164,14 +164,15 @@ export class Hands {
     this.said = [k, x, y, place];
     const { app } = this, model = app.model(), item = model.items.find((one) => one.k === k);
     if (!item) return;
+    // What is dragged over the ground may rise and fall with it: its height is that of the newest route.
+    const passed = place ? model.of.indexOf(k) : -1, up = place?.up ?? (passed < 0 ? item.at[2] : model.route[passed][2]);
     const [east, north] = place ? [place.east, place.north] : item.at;
     const unseen = model.of.includes(k) || item.at[2] === null ? [] : ["not flown"];
     const rows = model.states.corners.filter((_, i) => model.of[i] === k).concat(legStates(model, k));
-    const order = ["fail", "open", "near", "ok"];
-    const worst = rows.reduce((a, b) => (order.indexOf(b[0]) < order.indexOf(a) ? b[0] : a), "ok");
-    const lines = [...new Set(rows.filter((row) => row[1]).sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0])).map((row) => row[1]))];
+    rows.sort(byWorst);
+    const worst = rows.length ? rows[0][0] : "ok", lines = [...new Set(rows.filter((row) => row[1]).map((row) => row[1]))];
     const fault = app.dragFault();
-    app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, place?.up ?? item.at[2])}`, ...(fault ? [fault] : unseen.concat(lines.slice(0, 3)))], x, y, fault ? "fail" : worst);
+    app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, up)}`, ...(fault ? [fault] : unseen.concat(lines.slice(0, 3)))], x, y, fault ? "fail" : worst);
   }
 
   // The numbers of a drag anew, when its verdict has come.

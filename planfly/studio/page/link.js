@@ -52,10 +52,10 @@ export class Link {
   }
 
   lost(code) {
-    if (code === 4403) return this.handlers.lost("This key belongs to another run of the studio: open the address that this run printed.", true);
+    if (code === 4403) return this.handlers.lost("This key belongs to another run of the studio: open the address that this run printed in this tab.", true);
     if (code === 4429) return this.handlers.lost("Four pages are already open: close one, then reload this one.", true);
     this.tries += 1;
-    this.handlers.lost("The studio does not answer. Your edits are saved: start it again with the same file.", false);
+    this.handlers.lost("The studio does not answer: start it again with the same file.", false);
     setTimeout(() => this.connect(), Math.min(5000, 300 * this.tries));
   }
 

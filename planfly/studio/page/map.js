@@ -3,6 +3,8 @@
 import { Labels, View, clear, groundAt, plain, step, svg } from "/axes.js";
 
 const DENSE = 80;
+// Closeness of a state that no limit is near to, which is sent as null.
+const FAR = 1e9;
 // Legs of the straight line between the waypoints that are one shape: what is dragged has its own drawn anew.
 const CHUNK = 6;
 // Pixels that legend, compass and scale take at the lower edge.
@@ -308,7 +310,7 @@ export class MapView {
 
   // The legs below the pointer, the worst first: those of all laps that are as near as the nearest one.
   legsAt(x, y) {
-    const found = [], { legs } = this.model.states, rank = (k) => ORDER.indexOf(legs[k][0]);
+    const found = [], { legs } = this.model.states;
     this.model.path.forEach((flat, k) => {
       let least = REACH;
       for (let i = 0; i + 5 < flat.length; i += 3) {
@@ -320,7 +322,7 @@ export class MapView {
       if (least < REACH) found.push({ k, away: least });
     });
     const nearest = Math.min(...found.map((one) => one.away));
-    return found.filter((one) => one.away <= nearest + SAME).map((one) => one.k).sort((a, b) => rank(a) - rank(b));
+    return found.filter((one) => one.away <= nearest + SAME).map((one) => one.k).sort((a, b) => byWorst(legs[a], legs[b]));
   }
 
   extentOf(points) {
@@ -358,14 +360,19 @@ function renew(part, name, value) {
 
 const ORDER = ["fail", "open", "near", "ok"];
 
+// Orders states, [name, text, closeness], with the one that decides first: the worst, and of two alike the closer to its limit.
+export function byWorst(a, b) {
+  return ORDER.indexOf(a[0]) - ORDER.indexOf(b[0]) || Math.sign((a[2] ?? FAR) - (b[2] ?? FAR));
+}
+
 // The worst state of the corners at each item, by its number, and with the legs to and from it; none where no stop is.
 export function cornerStates(model, withLegs) {
   const found = new Map(), { corners, legs } = model.states;
   model.of.forEach((k, i) => {
     const states = [corners[i] || ["ok", ""], ...(withLegs ? [legs[i - 1], legs[i]] : [])];
     for (const mine of states.filter(Boolean)) {
-      const old = found.get(k);
-      if (!old || ORDER.indexOf(mine[0]) < ORDER.indexOf(old[0]) || (mine[0] === old[0] && mine[1] && !old[1])) found.set(k, mine);
+      const old = found.get(k), by = old ? byWorst(mine, old) : -1;
+      if (by < 0 || (by === 0 && mine[1] && !old[1])) found.set(k, mine);
     }
   });
   return found;

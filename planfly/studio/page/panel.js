@@ -45,7 +45,11 @@ export class Panel {
     // A number that was entered gives way to what comes of it; one that is being typed stays.
     for (const box of Object.values(this.boxes)) {
       box.addEventListener("input", (event) => { event.target.entered = false; });
-      box.addEventListener("change", (event) => { event.target.entered = true; });
+      box.addEventListener("change", ({ target }) => {
+        target.entered = true;
+        // A number that there has to be is as it was where it is cleared.
+        if (target.required && target.value === "") target.value = target.defaultValue;
+      });
     }
     this.shown = "verdict";
     this.files = [];
@@ -204,7 +208,7 @@ export class Panel {
 
   buildItems() {
     const { now, app } = this, { rev } = now;
-    const by = element("input", { type: "number", value: this.raiseBy || "10", step: "5", onchange: () => { this.raiseBy = by.value; }, "aria-label": "Metres to raise or lower by", id: "raise-by" });
+    const by = element("input", { type: "number", required: true, value: this.raiseBy || "10", step: "5", onchange: () => { this.raiseBy = by.value || by.defaultValue; }, "aria-label": "Metres to raise or lower by", id: "raise-by" });
     const raise = (sign, all) => () => {
       const value = sign * Math.abs(Number(by.value));
       if (!Number.isFinite(value) || !value) return;
@@ -227,10 +231,10 @@ export class Panel {
   row(item, worst, grid) {
     const { app, now } = this, ground = groundAt(grid, item.at[0], item.at[1]);
     const { rev } = now, [state, text] = worst.get(item.k) || ["open", "not flown"];
-    const height = element("input", { type: "number", step: "1", value: item.at[2] === null ? "" : Math.round(item.at[2] * 10) / 10, "aria-label": `Height of item ${item.seq}, metres above mean sea level` });
+    const height = element("input", { type: "number", required: true, step: "1", value: item.at[2] === null ? "" : Math.round(item.at[2] * 10) / 10, "aria-label": `Height of item ${item.seq}, metres above mean sea level` });
     height.addEventListener("change", () => {
       const up = Number(height.value), [low, high] = RANGES.up;
-      if (height.value === "" || !Number.isFinite(up)) return undefined;
+      if (height.value === "") return undefined;
       if (up >= low && up <= high) return app.commit({ kind: "move", rev, k: item.k, up });
       height.value = height.defaultValue;
       return app.complain(`Item ${item.seq}: ${up} m: a height is from ${low} to ${high} m above mean sea level.`);
@@ -248,7 +252,7 @@ export class Panel {
   drawPlan() {
     const box = clear(this.boxes.plan), { offered, app } = this;
     if (!offered) return;
-    this.seed = element("input", { type: "number", min: "0", value: "1", id: "plan-seed" });
+    this.seed = element("input", { type: "number", required: true, min: "0", value: "1", id: "plan-seed" });
     this.algorithm = element("select", { id: "plan-algorithm" }, element("option", { value: "" }, "the default"), ...Object.keys(offered.algorithms).map((name) => element("option", { value: name, title: offered.algorithms[name] }, name)));
     this.first = element("select", { id: "plan-first" });
     this.last = element("select", { id: "plan-last" });
@@ -407,7 +411,11 @@ function keepFocus(box, build) {
   build();
   const all = tools(), alike = all.filter((one) => one.localName === had.localName && name(one) === name(had));
   const next = alike.sort((a, b) => Math.abs(all.indexOf(a) - at) - Math.abs(all.indexOf(b) - at))[0];
-  if (next && typed !== null && !had.entered) next.value = typed;
+  if (next && typed !== null && !had.entered) {
+    next.value = typed;
+    // The browser tells of no change of a field that it did not type in itself.
+    next.addEventListener("blur", () => { if (next.value === typed && !next.entered) next.dispatchEvent(new Event("change", { bubbles: true })); }, { once: true });
+  }
   (next || box).focus({ preventScroll: true });
   return undefined;
 }

@@ -2,8 +2,8 @@
 
 import { clear, element } from "/axes.js";
 
-// Entries of a scenario's [limits]: words, and what counts where there is none.
-const LIMITS = [["min_clearance_m", "Minimum clearance, m", ""], ["max_height_m", "Maximum above ground, m", "no limit"], ["corridor_m", "Corridor each side, m", "the autopilot's"], ["max_turn_deg", "Sharpest turn, °", "the aircraft's"], ["max_climb_deg", "Steepest climb, °", "the aircraft's"], ["max_dive_deg", "Steepest descent, °", "the aircraft's"]];
+// Entries of a scenario's [limits]: the unit, and what counts where there is none.
+const LIMITS = [["min_clearance_m", "m", ""], ["max_height_m", "m", "no limit"], ["corridor_m", "m", "the autopilot's"], ["max_turn_deg", "°", "the aircraft's"], ["max_climb_deg", "°", "the aircraft's"], ["max_dive_deg", "°", "the aircraft's"]];
 const SURVEYS = [["", "as the mission says"], ["lines", "judged as lines"], ["path", "judged as any path"]];
 const PARAMETERS = /\.(parm|param|params)$/i;
 const MOST = 240 * 1024;
@@ -32,10 +32,10 @@ function list(id, values, chosen, change) {
   return element("select", { id, onchange: (event) => change(event.target.value) }, ...values.map(([value, words]) => element("option", { value, selected: value === chosen }, words)));
 }
 
-// A number as it is typed; an empty field is null.
-function number(id, value, step, change, placeholder = "") {
+// A number as it is typed; an empty field is null, unless there has to be one.
+function number(id, value, step, change, placeholder = "", required = false) {
   const shown = typeof value === "number" ? value : "";
-  return element("input", { id, type: "number", step, value: shown, placeholder, onchange: ({ target }) => {
+  return element("input", { id, type: "number", step, value: shown, placeholder, required, onchange: ({ target }) => {
     if (target.value === "" && target.validity.badInput) target.value = shown;
     else change(target.value === "" ? null : Number(target.value));
   } });
@@ -43,23 +43,25 @@ function number(id, value, step, change, placeholder = "") {
 
 function flown(settings, offered, send) {
   const same = (values, own) => [...new Set([own, ...values])].filter(Boolean).map((one) => [one, one]);
-  const need = (name) => (value) => value !== null && send({ [name]: value });
+  const need = (name) => (value) => send({ [name]: value }), { labels } = settings;
+  const needed = (name, value, step) => number(`set-${name}`, value, step, (to) => to !== null && send({ [name]: to }), "", true);
   return [
-    field("Aircraft", list("set-aircraft", same(settings.aircraft_names, settings.aircraft), settings.aircraft, need("aircraft"))),
-    field("Autopilot", list("set-autopilot", same(offered.autopilots, settings.autopilot), settings.autopilot, need("autopilot"))),
-    field(`${settings.airspeed_kind === "equivalent" ? "Equivalent" : "True"} airspeed, m/s`, number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
-    field("Wind, m/s", number("set-wind_speed", settings.wind_speed, 0.5, need("wind_speed"))),
-    field("Wind from, °", number("set-wind_from", settings.wind_from, 5, need("wind_from"))),
+    field(labels.aircraft, list("set-aircraft", same(settings.aircraft_names, settings.aircraft), settings.aircraft, need("aircraft"))),
+    field(labels.autopilot, list("set-autopilot", same(offered.autopilots, settings.autopilot), settings.autopilot, need("autopilot"))),
+    field(`${labels.airspeed} (${settings.airspeed_kind}), m/s`, needed("airspeed", settings.airspeed, 0.5)),
+    field(`${labels.wind_speed}, m/s`, needed("wind_speed", settings.wind_speed, 0.5)),
+    field(`${labels.wind_from}, °`, needed("wind_from", settings.wind_from, 5)),
     ...(settings.forecast ? [element("p", { class: "more" }, `The wind is that of the ${settings.forecast}; its mean at the start stands above. A wind entered here replaces it.`)] : []),
-    field("Turbulence", list("set-turbulence", same(offered.turbulence, settings.turbulence), settings.turbulence, need("turbulence"))),
+    field(labels.turbulence, list("set-turbulence", same(offered.turbulence, settings.turbulence), settings.turbulence, need("turbulence"))),
   ];
 }
 
 function limits(settings, send) {
-  const rows = LIMITS.map(([name, words, none]) => field(words, number(`set-${name}`, settings.limits[name], name.endsWith("_m") ? 5 : 1, (value) => send({ limits: { [name]: value } }), none)));
+  const { labels } = settings;
+  const rows = LIMITS.map(([name, unit, none]) => field(`${labels[name]}, ${unit}`, number(`set-${name}`, settings.limits[name], name.endsWith("_m") ? 5 : 1, (value) => send({ limits: { [name]: value } }), none)));
   const surveys = list("set-surveys", SURVEYS, settings.limits.surveys || "", (value) => send({ limits: { surveys: value || null } }));
-  const ceiling = settings.ceiling === null ? [] : [field("Ceiling, m AMSL", number("set-ceiling", settings.ceiling, 10, (value) => value !== null && send({ ceiling: value })))];
-  return [...rows.slice(0, 2), ...ceiling, ...rows.slice(2), field("Photo lines", surveys)];
+  const ceiling = settings.ceiling === null ? [] : [field(`${labels.ceiling}, m AMSL`, number("set-ceiling", settings.ceiling, 10, (value) => value !== null && send({ ceiling: value }), "", true))];
+  return [...rows.slice(0, 2), ...ceiling, ...rows.slice(2), field(labels.surveys, surveys)];
 }
 
 function parameters(settings, app, send) {
@@ -73,7 +75,7 @@ function parameters(settings, app, send) {
   const rows = set.map(([name, value]) => element("li", {}, element("span", {}, `${name} = ${value}`), element("button", { type: "button", class: "remove", "aria-label": `No longer set ${name}`, onclick: () => send({ without: [name] }) }, "\u00d7")));
   const from = settings.parameter_file ? `Set here or by ${settings.parameter_file}:` : "Set here:";
   return [
-    field("Set one", element("span", { class: "with-button" }, one, element("button", { type: "button", onclick: enter }, "Set")), one.id),
+    field(settings.labels.parameter, element("span", { class: "with-button" }, one, element("button", { type: "button", onclick: enter }, "Set")), one.id),
     element("datalist", { id: "known-parameters" }, ...known.map((name) => element("option", { value: `${name}=${settings.known[name]}` }))),
     field("From a file", file),
     element("p", { class: "more" }, set.length ? from : `No parameter is set here: ${settings.autopilot_title} flies with the parameters of the aircraft and of the scenario. A file replaces all of them.`),

@@ -11,8 +11,11 @@ import { Scene } from "/scene.js";
 
 const $ = (id) => document.getElementById(id);
 const STOPPED = "Stopped; earlier results stay.";
+// Where edits wait that were made while the server did not answer, for a page that is opened with the next server's key.
+const WAITING = "planfly-studio-waiting";
+const HISTORY = ["undo", "redo", "revert"];
 const map = new MapView($("map")), profile = new Profile($("profile"));
-const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {}, committed: false, queue: [] };
+const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {}, committed: null, queue: [], doubtful: null, lost: "" };
 let fitted = 0, scene = null;
 
 // ---- what the server sends
@@ -52,13 +55,15 @@ function setGround() {
 }
 
 function onSheet(sent) {
-  const before = now.sheet, sheet = sent.planning ? unjudged(sent) : sent;
+  const before = now.sheet || takeWaiting(), sheet = sent.planning ? unjudged(sent) : sent;
+  sessionStorage.removeItem(WAITING);
   now.sent = sent;
+  now.lost = "";
   const same = sameItems(before, sheet), opened = before && isOther(before, sheet);
   // What was wrong before an edit that was taken is over.
   if (now.committed) complain("");
   now.sheet = sheet;
-  now.committed = false;
+  now.committed = null;
   if (opened) {
     now.flown = null;
     panel.forget();
@@ -130,8 +135,11 @@ function isOther(before, sheet) {
 
 // What waits was meant for the sheet before: it goes on to this one where its numbers mean the same, and else is left.
 function catchUp(before, sheet, same) {
-  const waiting = now.queue.length;
-  now.queue = now.queue.filter((one) => one.rev === undefined || (same && one.rev === before.rev && one.kind !== "apply"));
+  // An edit that was on its way when the connection was lost was made if the items have changed since.
+  if (now.doubtful && same && JSON.stringify(before.items) === JSON.stringify(sheet.items)) now.queue.unshift(now.doubtful);
+  now.doubtful = null;
+  const waiting = now.queue.length, other = before && isOther(before, sheet);
+  now.queue = now.queue.filter((one) => (one.rev === undefined ? !(other && isEdit(one)) : same && one.rev === before.rev && (one.kind !== "apply" || one.rev === sheet.rev)));
   for (const one of now.queue) if (one.rev !== undefined) one.rev = sheet.rev;
   let left = now.queue.length < waiting;
   if (now.nudged && same) {
@@ -150,16 +158,42 @@ function placed(model, k, to) {
 }
 
 // One edit at a time is on its way; what follows it waits for the sheet that it comes to.
+// Edits that the server cannot be sent wait for it, too; what else was asked of it is not done.
 function pump() {
   while (!now.committed && now.queue.length) {
+    if (now.lost || !link.send(now.queue[0])) return sayLost(now.lost || "The studio does not answer.");
     const message = now.queue.shift();
-    if (!link.send(message)) {
-      now.queue = [];
-      return app.cancel();
-    }
-    now.committed = message.rev !== undefined;
+    now.committed = message.rev === undefined ? null : message;
   }
   return undefined;
+}
+
+function isEdit({ rev, kind }) {
+  return rev !== undefined || kind === "settings" || HISTORY.includes(kind);
+}
+
+// The connection is lost: what becomes of the edits.
+function sayLost(text) {
+  now.lost = text;
+  now.doubtful = now.committed || now.doubtful;
+  now.committed = null;
+  now.queue = now.queue.filter(isEdit);
+  const { sheet, queue, doubtful } = now, count = queue.length + (doubtful ? 1 : 0);
+  if (!hands.drag?.moved && !hands.side?.moved) app.cancel();
+  if (!sheet) return complain(text, true);
+  if (!count) return complain(`${text} Your edits are saved.`, true);
+  const { rev, document: number, name, items } = sheet;
+  sessionStorage.setItem(WAITING, JSON.stringify({ sheet: { rev, document: number, name, items }, queue, doubtful }));
+  const edits = count === 1 ? "1 edit is not saved: it is" : `${count} edits are not saved: they are`;
+  return complain(`${text} ${edits} sent when the studio answers again in this tab.`, true);
+}
+
+// The edits that waited in this tab for another run of the studio: the sheet that they were made on, or null.
+function takeWaiting() {
+  const { sheet = null, queue = [], doubtful = null } = JSON.parse(sessionStorage.getItem(WAITING) || "{}");
+  now.queue.unshift(...queue);
+  now.doubtful = doubtful;
+  return sheet;
 }
 
 // A verdict on a drag: of all, or of the legs about the item, which are put in their places.
@@ -232,7 +266,7 @@ function withFlight(sheet) {
   if (!flown || flown.rev !== sheet.rev || sheet.planning) return sheet;
   const worse = (kind) => sheet.states[kind].map((own, i) => {
     const other = flown.states[kind][i];
-    return other && SEVERITY.indexOf(other[0]) > SEVERITY.indexOf(own[0]) ? [other[0], `flown: ${other[1]}`] : own;
+    return other && SEVERITY.indexOf(other[0]) > SEVERITY.indexOf(own[0]) ? [other[0], `flown: ${other[1]}`, other[2]] : own;
   });
   const both = (kind) => [...new Set([...sheet.violated[kind], ...flown.violated[kind]])];
   return {
@@ -439,7 +473,8 @@ const app = {
     map.root.classList.remove("dragging");
     $("panel-verdict").classList.remove("before");
     link.settle();
-    now.model = withFlight(now.sheet);
+    // Moves that wait to be sent stay where they were made.
+    now.model = [now.doubtful, ...now.queue].reduce((model, one) => (one?.kind === "move" ? placed(model, one.k, one) : model), withFlight(now.sheet));
     drawAll();
     answers();
     app.hint(null);
@@ -448,7 +483,10 @@ const app = {
   commit(message) {
     link.settle();
     app.flush();
-    now.queue.push({ rev: now.sheet.rev, ...message });
+    const last = now.queue.at(-1);
+    // Of moves of one item that wait, the newest is sent.
+    if (message.kind === "move" && last?.kind === "move" && last.k === message.k) Object.assign(last, message, { rev: last.rev });
+    else now.queue.push({ rev: now.sheet.rev, ...message });
     pump();
   },
   // Anything else that is asked of the server, after the edits that were made before it.
@@ -465,7 +503,7 @@ const app = {
     if (nudged) app.commit({ kind: "move", ...nudged });
   },
   refused() {
-    now.committed = false;
+    now.committed = null;
     now.queue = [];
   },
   // Keys come faster than answers: they add up, and are sent as one.
@@ -536,7 +574,7 @@ const hands = new Hands(app);
 const link = new Link({
   open: () => complain(""),
   // What goes on is said with the next connection.
-  lost: (text) => { app.refused(); now.work = {}; progress(); answers(); complain(text, true); },
+  lost: (text) => { now.work = {}; progress(); app.flush(); sayLost(text); },
   world: onWorld,
   sheet: onSheet,
   preview: onPreview,

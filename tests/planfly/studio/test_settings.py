@@ -46,7 +46,7 @@ def test_only_settings_that_differ_from_the_opening_are_lost(tmp_path: Path) -> 
     session, _ = open_session(str(file), MissionOptions(terrain="jacksboro"))
     shown = session.settings_json()
     for change, name in (
-        ({"limits": {"corridor_m": 90.0}}, "corridor"),
+        ({"limits": {"corridor_m": 90.0}}, "corridor each side"),
         ({"limits": {"min_clearance_m": 11.0}}, "minimum clearance"),
         ({"wind_speed": 4.0}, "wind"),
         ({"airspeed": 26.0}, "airspeed"),
@@ -109,22 +109,28 @@ def test_an_aircraft_named_by_its_folder_can_be_chosen_again(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"limits": {"min_clearance_m": 6000.0}}, "limits.min_clearance_m: 6000.0: allowed 0..5000"),
-        ({"limits": {"max_height_m": 20.0}}, "limits: max_height_m: 20: must be above min_clearance_m 60"),
-        ({"limits": {"max_turn_deg": 400.0}}, 'limits.max_turn_deg: 400.0: allowed above 0, up to 180, or "aircraft"'),
-        ({"ceiling": -9999.0}, "area.ceiling_amsl_m: -9999.0: allowed -500..9000"),
-        ({"wind_speed": 500.0}, "wind: speed_mps: 500.0: allowed 0..40"),
+        ({"limits": {"min_clearance_m": 6000.0}}, "Minimum clearance: 6000: allowed 0..5000"),
+        ({"limits": {"max_height_m": 20.0}}, "Maximum above ground: 20: must be above Minimum clearance 60"),
+        ({"limits": {"max_turn_deg": 400.0}}, 'Sharpest turn: 400: allowed above 0, up to 180, or "aircraft"'),
+        ({"limits": {"corridor_m": -1.5}}, "Corridor each side: -1.5: allowed 1..5000"),
+        ({"limits": {"max_climb_deg": 0.0}}, 'Steepest climb: 0: allowed above 0, below 90, or "aircraft"'),
+        ({"limits": {"max_dive_deg": 99.0}}, 'Steepest descent: 99: allowed above 0, below 90, or "aircraft"'),
+        ({"ceiling": -9999.0}, "Ceiling: -9999: allowed -500..9000"),
+        # What a setting makes impossible elsewhere is said of the setting.
+        ({"ceiling": 100.0}, "Ceiling: 100: start: 485 m AMSL: outside floor..ceiling -500..100"),
+        ({"wind_speed": 500.0}, "Wind: 500: allowed 0..40"),
+        ({"wind_from": -361.0}, "Wind from: -361: allowed -360..360"),
         # One range on both sides, the aircraft's (its TOML); the Zagi flies from 11 m/s, and a scenario takes 15 m/s.
-        ({"airspeed": 2.0}, "airspeed 2: aerosonde flies 18..31 m/s"),
-        ({"airspeed": 60.5}, "airspeed 60.5: aerosonde flies 18..31 m/s"),
-        ({"airspeed": 10.0, "aircraft": "zagi"}, "airspeed 10: zagi flies 11..16.9 m/s"),
-        ({"airspeed": 60.0, "aircraft": "zagi"}, "airspeed 60: zagi flies 11..16.9 m/s"),
-        ({"aircraft": "zagi"}, "flight.airspeed_mps: 25: zagi flies 11..16.9 m/s"),
-        ({"aircraft": "../x8"}, "aircraft"),
-        ({"parameter": "WP_RADIUS=99999"}, "parameter:1: WP_RADIUS: 99999: allowed 0..32767"),
-        ({"parameter": "WP_RADIUS=wide"}, "parameter:1: WP_RADIUS: 'wide': expected a finite number"),
-        ({"parameter": "WP_RADIU=50"}, "parameter: WP_RADIU: not known to the simulated ArduPlane"),
-        ({"parameter": "THR_MIN=100"}, "THR_MIN 100: must be below THR_MAX"),
+        ({"airspeed": 2.0}, "Airspeed 2: aerosonde flies 18..31 m/s"),
+        ({"airspeed": 60.5}, "Airspeed 60.5: aerosonde flies 18..31 m/s"),
+        ({"airspeed": 10.0, "aircraft": "zagi"}, "Airspeed 10: zagi flies 11..16.9 m/s"),
+        ({"airspeed": 60.0, "aircraft": "zagi"}, "Airspeed 60: zagi flies 11..16.9 m/s"),
+        ({"aircraft": "zagi"}, "Airspeed: 25: zagi flies 11..16.9 m/s"),
+        ({"aircraft": "../x8"}, "Aircraft: expected an aircraft listed by 'planfly aircraft'"),
+        ({"parameter": "WP_RADIUS=99999"}, "Parameter WP_RADIUS: 99999: allowed 0..32767"),
+        ({"parameter": "WP_RADIUS=wide"}, "Parameter WP_RADIUS: 'wide': expected a finite number"),
+        ({"parameter": "WP_RADIU=50"}, "Parameter WP_RADIU: not known to the simulated ArduPlane"),
+        ({"parameter": "THR_MIN=100"}, "Parameter THR_MIN 100: must be below THR_MAX"),
         ({"parameter_file": "a.parm", "parameter_text": "\n"}, "a.parm: no parameter"),
     ],
 )
@@ -134,8 +140,26 @@ def test_a_value_that_is_not_allowed_is_refused_in_one_line(kept: Session, asked
     with pytest.raises(PlanflyError, match=said.replace("(", "[(]")) as refused:
         set_in(session, **asked)
     assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith(said)
     assert "/" not in str(refused.value).replace("m/s", "")
     assert (session.rev, session.settings_json(), session.judged) == before
+
+
+def test_an_error_names_no_file_of_a_mission_without_a_scenario(tmp_path: Path) -> None:
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(6, 14).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), MissionOptions(terrain="jacksboro"))
+    with pytest.raises(PlanflyError) as refused:
+        set_in(session, wind_speed=-1.0)
+    assert str(refused.value) == "Wind: -1: allowed 0..40"
+
+
+@pytest.mark.parametrize(("asked", "shown"), [(-90.0, 270.0), (360.0, 0.0), (-360.0, 0.0), (45.0, 45.0)])
+def test_a_wind_comes_from_0_to_below_360_degrees(asked: float, shown: float) -> None:
+    session = drawn_session(6, 14)
+    set_in(session, wind_speed=4.0, wind_from=asked)
+    assert session.settings_json()["wind_from"] == shown
+    assert session.context.scenario.spec.wind.from_deg == pytest.approx(shown)
 
 
 def test_planflys_own_guidance_has_no_parameters() -> None:
