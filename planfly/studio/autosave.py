@@ -8,6 +8,7 @@ import hashlib
 import json
 import math
 from dataclasses import asdict, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,6 +31,10 @@ _SCHEMA = "planfly.studio/1"
 _MAX_AUTOSAVE_BYTES = 16 * MAX_BYTES
 # Maximum number of undone edits that are saved.
 _MAX_UNDONE_STEPS = 8
+# Maximum number of edits in effect that are saved.
+_MAX_SAVED_STEPS = 100
+# Maximum number of items in the missions of these edits; the newest edit is always saved.
+_MAX_SAVED_ITEMS = 10_000
 # Tables of a scenario that the studio changes.
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
 _AUTOPILOT_KEYS = ("autopilot", "autopilot_from", "params", "arduplane_version", "px4_version", "guidance")
@@ -53,6 +58,7 @@ class Restored(NamedTuple):
 
     mission: the edited mission, which is the opened mission itself if it was not edited.
     context: editing context with the saved settings.
+    steps: edits in effect, each with its description; the last one results in the edited mission.
     undone_steps: undone edits after the edited mission, each with its description, for redo.
     replaced: saved settings that are not restored, each with the reason or the value that replaces it.
     by_options: True if options of the command line replaced them, which are then saved in their place.
@@ -60,6 +66,7 @@ class Restored(NamedTuple):
 
     mission: Mission
     context: EditContext
+    steps: list[tuple[Mission, str]]
     undone_steps: list[tuple[Mission, str]]
     replaced: tuple[str, ...] = ()
     by_options: bool = False
@@ -70,8 +77,8 @@ def autosave_text(
 ) -> str:
     """Encode the state of a session as the JSON text of its autosave file.
 
-    Edits in effect are saved as a single edit, which is their result.  Of the undone edits, the first
-    `_MAX_UNDONE_STEPS` are saved.
+    Of the edits in effect the newest are saved, see `_steps_to_save`; of the undone edits, the first
+    `_MAX_UNDONE_STEPS`.
 
     context: editing context with the settings of the session.
     document: the opened document.
@@ -86,6 +93,7 @@ def autosave_text(
         "schema": _SCHEMA,
         "name": document.name,
         "mission": mission_data(history.mission),
+        "steps": [[mission_data(mission), text] for mission, text in _steps_to_save(document, history)],
         "undone": [
             [mission_data(mission), text] for mission, text in history.steps[history.position :][:_MAX_UNDONE_STEPS]
         ],
@@ -99,6 +107,20 @@ def autosave_text(
         "plan": None if plan is None else plan_json(plan),
     }
     return json.dumps(data)
+
+
+def _steps_to_save(document: Document, history: History) -> list[tuple[Mission, str]]:
+    """Return the newest edits in effect, as many as are saved.
+
+    Edits before the last saving of the document's file are left out, because the file contains their result.
+    """
+    steps = history.steps[: history.position]
+    saved = [k for k, (mission, _) in enumerate(history.steps) if mission is history.saved]
+    if document.path is not None and saved:
+        steps = steps[saved[-1] + 1 :] or steps[-1:]
+    item_counts = accumulate(len(mission.items) for mission, _ in reversed(steps))
+    count = sum(total <= _MAX_SAVED_ITEMS for total in item_counts)
+    return steps[-max(1, min(count, _MAX_SAVED_STEPS)) :]
 
 
 def _file_digest(document: Document) -> str:
@@ -128,7 +150,10 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
         return None
     is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
     mission = first if is_opened else mission_from_data(data["mission"], first)
-    undone_steps = [(mission_from_data(step, first), str(text)) for step, text in data.get("undone", [])]
+    steps, undone_steps = (
+        [(mission_from_data(step, first), str(text)) for step, text in data.get(name, [])]
+        for name in ("steps", "undone")
+    )
     try:
         new_context, replaced = _restore_settings(context, data, options)
         # The certificate of a plan applies only to the settings that it was made for.
@@ -136,10 +161,10 @@ def read_autosave(file: Path, context: EditContext, document: Document, options:
             (mission, new_context) if replaced else _restore_plan(new_context, mission, data)
         )
         by_options = bool(replaced) and data.get("scenario") == _scenario_name(context)
-        return Restored(restored_mission, restored_context, undone_steps, replaced, by_options)
+        return Restored(restored_mission, restored_context, steps, undone_steps, replaced, by_options)
     except (*INTERNAL, PlanflyError) as error:
         # If the settings cannot be restored, restore at least the edited mission.
-        return Restored(mission, context, undone_steps, (f"none of them can be restored: {error}",))
+        return Restored(mission, context, steps, undone_steps, (f"none of them can be restored: {error}",))
 
 
 def sibling_autosave_path(file: Path, first: Mission) -> Path:

@@ -533,7 +533,7 @@ class Session:
         self.autosaved_rev = self.rev
 
     def restore(self, file: Path) -> bool:
-        """Restore the autosave of this document, with its mission as an edit; return True if there was one.
+        """Restore the autosave of this document, with its edits; return True if there was one.
 
         An autosave of another document is ignored. An autosave that cannot be read is added to `unreadable`, and is
         neither restored nor overwritten.
@@ -543,7 +543,7 @@ class Session:
             autosave = read_autosave(file, self.context, self.document, self.options)
             if autosave is None:
                 return False
-            mission, context, undone_steps, replaced_settings, self.must_autosave = autosave
+            mission, context, steps, undone_steps, replaced_settings, self.must_autosave = autosave
             is_edited = mission is not self.history.first
             if is_edited or context is not self.context:
                 self._set_mission(mission, context)
@@ -556,7 +556,10 @@ class Session:
         self.aircraft_folders |= own_aircraft(self.context.scenario)
         self.replaced_settings = replaced_settings
         if is_edited:
-            self._add_to_history(mission, "the edits of the previous session")
+            self.history.steps = steps[:-1]
+            self.history.position = len(self.history.steps)
+            # An autosave of an older version has no steps.
+            self._add_to_history(mission, steps[-1][1] if steps else "the edits of the previous session")
         self.history.steps += undone_steps
         return is_edited or context is not previous_state[0]
 

@@ -15,7 +15,7 @@ from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.places import Change, Place
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import MissionOptions
-from planfly.studio import messages
+from planfly.studio import autosave, messages
 from planfly.studio.autosave import mission_data, mission_from_data
 from planfly.studio.documents import Document, open_document, open_dropped, straight_plan
 from planfly.studio.session import Session, StaleEdit, TriedChanges, open_session
@@ -438,6 +438,50 @@ def test_undone_edits_can_be_redone_after_the_server_died(tmp_path: Path) -> Non
     assert unedited.needs_autosave
     unedited.step_history("redo")
     assert unedited.mission.items == results[0]
+
+
+def test_each_edit_can_be_undone_after_the_server_died(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro")
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), world, kept)
+
+    def raise_all(session: Session, *heights: float) -> list[Mission]:
+        for by in heights:
+            session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
+        return [mission for mission, _ in session.history.steps]
+
+    def undone(session: Session) -> list[str]:
+        """Undo all, and return what was undone."""
+        texts = []
+        while text := session.undo_text:
+            texts.append(text)
+            session.step_history("undo")
+        assert session.mission is session.history.first
+        return texts
+
+    first, second, _ = raise_all(session, 10.0, 20.0, 30.0)
+    session.autosave(kept)
+    again, _ = open_session(str(file), world, kept)
+    again.step_history("undo")
+    assert again.mission.items == second.items
+    again.step_history("undo")
+    assert again.mission.items == first.items
+    assert undone(again) == ["raise all items by 10 m"]
+    # What was saved over the file is where undo ends; what came after it can be undone.
+    session.overwrite_file()
+    raise_all(session, 1.0, 2.0)
+    session.autosave(kept)
+    again, _ = open_session(str(file), world, kept)
+    assert undone(again) == ["raise all items by 2 m", "raise all items by 1 m"]
+    # Of edits with more items than are kept, the newest are there; the last one always is.
+    for most, count in ((2 * len(first.items), 2), (0, 1)):
+        monkeypatch.setattr(autosave, "_MAX_SAVED_ITEMS", most)
+        again, _ = open_session(str(file), world, kept)
+        raise_all(again, 3.0)
+        again.autosave(tmp_path / "other.json")
+        fewer, _ = open_session(str(file), world, tmp_path / "other.json")
+        assert fewer.mission.items == again.mission.items
+        assert undone(fewer) == ["raise all items by 3 m", "raise all items by 2 m"][:count]
 
 
 def test_speeds_and_jumps_are_shown_and_stay_through_edits() -> None:
