@@ -58,7 +58,7 @@ function flown(settings, offered, send) {
 
 function limits(settings, send) {
   const { labels } = settings;
-  const rows = LIMITS.map(([name, unit, none]) => field(`${labels[name]}, ${unit}`, number(`set-${name}`, settings.limits[name], name.endsWith("_m") ? 5 : 1, (value) => send({ limits: { [name]: value } }), none)));
+  const rows = LIMITS.map(([name, unit, none]) => field(`${labels[name]},\u00a0${unit}`, number(`set-${name}`, settings.limits[name], name.endsWith("_m") ? 5 : 1, (value) => send({ limits: { [name]: value } }), none)));
   const surveys = list("set-surveys", SURVEYS, settings.limits.surveys || "", (value) => send({ limits: { surveys: value || null } }));
   const ceiling = settings.ceiling === null ? [] : [field(`${labels.ceiling}, m AMSL`, number("set-ceiling", settings.ceiling, 10, (value) => value !== null && send({ ceiling: value }), "", true))];
   return [...rows.slice(0, 2), ...ceiling, ...rows.slice(2), field(labels.surveys, surveys)];

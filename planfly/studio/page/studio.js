@@ -55,7 +55,7 @@ function setGround() {
 }
 
 function onSheet(sent) {
-  const before = now.sheet || takeWaiting(), sheet = sent.planning ? unjudged(sent) : sent;
+  const before = now.sheet || takeWaiting(sent.document), sheet = sent.planning ? unjudged(sent) : sent;
   sessionStorage.removeItem(WAITING);
   now.sent = sent;
   now.lost = "";
@@ -182,18 +182,19 @@ function sayLost(text) {
   if (!hands.drag?.moved && !hands.side?.moved) app.cancel();
   if (!sheet) return complain(text, true);
   if (!count) return complain(`${text} Your edits are saved.`, true);
-  const { rev, document: number, name, items } = sheet;
-  sessionStorage.setItem(WAITING, JSON.stringify({ sheet: { rev, document: number, name, items }, queue, doubtful }));
+  const { rev, name, items } = sheet;
+  sessionStorage.setItem(WAITING, JSON.stringify({ sheet: { rev, name, items }, queue, doubtful }));
   const edits = count === 1 ? "1 edit is not saved: it is" : `${count} edits are not saved: they are`;
   return complain(`${text} ${edits} sent when the studio answers again in this tab.`, true);
 }
 
 // The edits that waited in this tab for another run of the studio: the sheet that they were made on, or null.
-function takeWaiting() {
+// Each run numbers its documents anew: the name and the items tell whether it is the same.
+function takeWaiting(number) {
   const { sheet = null, queue = [], doubtful = null } = JSON.parse(sessionStorage.getItem(WAITING) || "{}");
   now.queue.unshift(...queue);
   now.doubtful = doubtful;
-  return sheet;
+  return sheet && { ...sheet, document: number };
 }
 
 // A verdict on a drag: of all, or of the legs about the item, which are put in their places.
