@@ -33,7 +33,7 @@ from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
-from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
+from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import FlownMission, PlanThenFly, autopilot_log_path, fly_and_judge

@@ -12,7 +12,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
-from logs.recording.recorder import Recorder
+from logs.recording.recorder import INTERRUPTED, Recorder
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
@@ -49,7 +49,6 @@ from planfly.rtl.sitl_returns import (
 )
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
-from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import FlownMission, fly_and_judge

@@ -23,7 +23,7 @@ from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, with_tightened_limits
-from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
+from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.output_paths import (

@@ -51,7 +51,7 @@ from planfly.surveys.survey_text import (
     usable_segments_text,
 )
 from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import length_and_duration_text
+from planfly.workflow.flight_limits import length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import FlownMission, fly_and_judge
