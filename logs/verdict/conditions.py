@@ -132,7 +132,7 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
     """Return the conditions (aircraft, airspeed, wind, autopilot) under which a flight or unflown mission is judged."""
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
-    source = setup.source
+    source = setup.imported_log
     if source is None:
         return conditions
     has_flown_airspeed = conditions.airspeed_source == "aircraft" and "airspeed" in source.holds

@@ -34,7 +34,7 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import check_keywords_not_given, named_program
+from planfly.api.flying import check_keywords_not_given, check_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, select_log_options, select_mission_options
@@ -280,7 +280,7 @@ def _check_request(
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """
-    program = named_program(sitl)
+    program = None if sitl is None else check_program(sitl)
     if program is not None:
         check_is_arduplane(program)
     if out is not None:

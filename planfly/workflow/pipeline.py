@@ -9,7 +9,7 @@ from flight.autopilots.catalog import program_class_for
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
-from flight.simulation.airborne import Airborne
+from flight.simulation.running_flight import RunningFlight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import BLOCK_DURATION_S, LONG_BLOCK_DURATION_S, Flight, TrackBuilder, simulate
 from flight.simulation.track import Track, join_tracks
@@ -21,13 +21,13 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
 from planfly.rtl.return_summary import ReturnSummary, return_summary
-from planfly.workflow.airframe import choose_seed, load_airframe
 from planfly.workflow.flight_limits import FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
+from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
@@ -146,12 +146,12 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     Raises a PlanflyError for bad input.  A plan that cannot be flown gives a verdict, not an error.
     """
     chosen_seed = choose_seed(scenario, seed)
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, chosen_seed)
-    mission = replace(mission_of_plan(plan, airframe, "plan"), autopilot=airframe.autopilot.name)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, chosen_seed)
+    mission = replace(mission_of_plan(plan, uav, "plan"), autopilot=uav.autopilot.name)
     if not plan.feasible:
-        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, airframe)))
-    setup = make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
+        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, uav)))
+    setup = make_setup(scenario, uav, mission, chosen_seed, plan=plan)
     flight = fly_and_judge(setup, log)
     return PlanThenFly(plan, mission, flight.track, flight.verdict)
 
@@ -245,7 +245,7 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
     return log.with_suffix(program_class_for(program).log_suffix)
 
 
-def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: Airborne) -> FlownMission:
+def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: RunningFlight) -> FlownMission:
     """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
     builder, end_reason, length = TrackBuilder(), "", flight.path.length

@@ -57,7 +57,7 @@ def imported_lines(
 
     own_answer: answer of the verdict at its own level, with the headline.
     """
-    source = setup.source
+    source = setup.imported_log
     if source is None:
         return (own_answer.headline,)
     lines = [own_answer.headline, *condition_lines(conditions)]
@@ -247,9 +247,9 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     setup: flight setup with the source of the flight.
     log_complete: True if planfly's own log of the flight has its end.
     """
-    source = setup.source
+    source = setup.imported_log
     if source is None:
-        raise ValueError("setup.source is missing: only imported flights can be judged here")
+        raise ValueError("setup.imported_log is missing: only imported flights can be judged here")
     flown_stretches = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown_stretches])
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
@@ -274,7 +274,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     )
     answer_text = "; ".join([*answer_texts, *filter(None, [unjudged_text])])
     own_answer = LevelAnswer(
-        setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
+        setup.autopilot.answer_name, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
     )
     conditions = judging_conditions(setup)
     lines = imported_lines(findings, setup, own_answer, flown_stretches, conditions)
@@ -348,7 +348,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
         missing_quantities = [
             quantity
             for quantity in rule.log.quantities
-            if setup.source is not None and quantity not in setup.source.holds
+            if setup.imported_log is not None and quantity not in setup.imported_log.holds
         ]
         margin = RULE_WORDS[rule.name].margin
         if rule.log.reports_missing and margin is not None and missing_quantities and rule.name not in judged_rules:
@@ -361,7 +361,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
 
 def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
     """Mark a finding as not judged if the log lacks data that its rule needs."""
-    source = setup.source
+    source = setup.imported_log
     if source is None:
         return finding
     reason, log_needs = "", RULES[finding.rule].log

@@ -98,7 +98,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         return half_width, "scenario"
     ends = slice(leg, leg + 2)
     depths = corner_depths(requirements, leg)
-    source = requirements.setup.source
+    source = requirements.setup.imported_log
     radius_is_known = source is None or source.aircraft_known
     if radius_is_known and not requirements.setup.autopilot.turns.follows_path:
         # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is an estimate.

@@ -93,7 +93,7 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
 
     Return [] if there is no such row, or for an imported flight of an unknown aircraft.
     """
-    source = requirements.setup.source
+    source = requirements.setup.imported_log
     if source is not None and not source.aircraft_known:
         return []
     track = aligned.track
