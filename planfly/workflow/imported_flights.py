@@ -120,7 +120,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         *mission.warnings,
         *_describe_mission_change(flight, mission, options),
     )
-    source = ImportedLog(
+    imported_log = ImportedLog(
         missing=None if plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
         sha256=flight.raw.sha256 or _sha256(path),
@@ -140,7 +140,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         damage=flight.raw.damage,
         notes=notes,
     )
-    setup = replace(setup, imported_log=source)
+    setup = replace(setup, imported_log=imported_log)
     track = make_track(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
         raise MissionError(f"{path}: not a flight of {plan}: {mismatch.text}", file=path)
@@ -452,11 +452,11 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
     The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  The setup is
     returned unchanged if the mission has no take-off, or if the segment never reached this altitude.
     """
-    source, route, mission, scenario = setup.imported_log, setup.route, setup.mission, setup.scenario
+    imported_log, route, mission, scenario = setup.imported_log, setup.route, setup.mission, setup.scenario
     first = next((item for item in mission.items if item.seq == route.items[0]), None)
-    if source is None or not source.stretches or first is None or first.command not in TAKEOFFS:
+    if imported_log is None or not imported_log.stretches or first is None or first.command not in TAKEOFFS:
         return setup
-    stretch, *others = source.stretches
+    stretch, *others = imported_log.stretches
     is_inside = (track.time >= stretch.start) & (track.time <= stretch.end)
     rows = np.flatnonzero(is_inside & (track.position[:, 2] >= route.positions[0, 2]))
     if not rows.size:
@@ -475,7 +475,7 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
         route=route_through_stops(
             placed, setup.limits.airspeed, scenario.flight.fly_over, setup.limits, setup.autopilot.route_rules
         ),
-        imported_log=replace(source, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
+        imported_log=replace(imported_log, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
     )
 
 
@@ -538,10 +538,10 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
 
     Raises LogError if the flight followed no leg of its mission.
     """
-    source = setup.imported_log
-    stretches = () if source is None else source.stretches
+    imported_log = setup.imported_log
+    stretches = () if imported_log is None else imported_log.stretches
     stretch_legs = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not stretch_legs:
-        name = "the log" if source is None else source.file
+        name = "the log" if imported_log is None else imported_log.file
         raise LogError(f"{name}: no leg of its mission was flown, so there is nothing to fly again", file=name)
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

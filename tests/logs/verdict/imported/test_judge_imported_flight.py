@@ -160,7 +160,7 @@ def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path:
     assert flight.verdict.headline.startswith("not judged from end to end: the log begins in flight, and leg 0 is not")
     setup = flight.setup
     assert setup.imported_log is not None
-    on_the_ground = replace(setup, source=replace(setup.imported_log, begins_in_flight=False))
+    on_the_ground = replace(setup, imported_log=replace(setup.imported_log, begins_in_flight=False))
     verdict = judge_flight(on_the_ground, flight.track, "")
     completion = next(item for item in verdict.findings if item.rule == "completion")
     assert (completion.ok, completion.margin) == (False, -1)
