@@ -29,9 +29,9 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import Uav, load_uav
 from planner.evaluation.problem import SLOPE_FRACTION_BY_TURBULENCE
 from world.arrays import Floats
 from world.errors import ScenarioError
@@ -90,7 +90,7 @@ class Compared:
     apart_up: tuple[float, float]
 
 
-def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airframe]:
+def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Uav]:
     """Make the first feasible plan between random ends in a random wind, for ArduPlane with exact navigation.
 
     The same seed gives the same plan.  steep: True to allow the climbs of `_climbing`.
@@ -113,26 +113,26 @@ def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airfra
         spec["flight"] = {"autopilot": "ardupilot", "nav": "perfect"}
         try:
             scenario = scenario_from_spec(spec, f"random {seed}")
-            airframe = load_airframe(scenario)
-            plan = make_plan(scenario, _climbing(airframe, scenario) if steep else airframe, seed)
+            uav = load_uav(scenario)
+            plan = make_plan(scenario, _climbing(uav, scenario) if steep else uav, seed)
         except ScenarioError:  # an end within a missile's reach
             continue
         if plan.feasible:
-            mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
-            return make_setup(scenario, airframe, mission, seed), airframe
+            mission = plan_mission(plan, uav.airspeed, uav.max_bank)
+            return make_setup(scenario, uav, mission, seed), uav
     raise ValueError(f"seed {seed}: no feasible plan")
 
 
-def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """Return an airframe whose plans climb more steeply than ArduPlane's plans in turbulence.
+def _climbing(uav: Uav, scenario: Scenario) -> Uav:
+    """Return a UAV whose plans climb more steeply than ArduPlane's plans in turbulence.
 
     The throttle then saturates at times, which is the hardest case for the control law.
     """
-    limits, parameters = airframe.limits, airframe.autopilot.parameters
+    limits, parameters = uav.limits, uav.autopilot.parameters
     assert limits.tracking is not None
     assert isinstance(parameters, ArduPilotParameters)
     rate = PLANNED_CLIMB * SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence] * parameters.tecs_climb_max
-    return replace(airframe, limits=replace(limits, tracking=replace(limits.tracking, climb_rate=rate)))
+    return replace(uav, limits=replace(limits, tracking=replace(limits.tracking, climb_rate=rate)))
 
 
 def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
@@ -199,11 +199,11 @@ def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
 
 def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
     """Fly one random plan with ArduPlane and with its model."""
-    setup, airframe = random_setup(seed, steep=steep)
-    law = fly_to_end(Flight(setup, airframe.aircraft))
+    setup, uav = random_setup(seed, steep=steep)
+    law = fly_to_end(Flight(setup, uav.aircraft))
     assert isinstance(setup.autopilot, ArduPlane)
     autopilot = ArduPlaneSitl.with_model(setup.autopilot, BINARY)
-    real, _ = fly_autopilot(setup, airframe.aircraft, autopilot)
+    real, _ = fly_autopilot(setup, uav.aircraft, autopilot)
     (law_across, law_up), (across, up) = (_along_legs(setup, flown.track) for flown in (law, real))
     wind = setup.scenario.wind
     compared = Compared(

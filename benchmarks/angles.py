@@ -32,7 +32,7 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
     slopes: list[float] = []
     for number in numbers:
         made = feasible(number, margin)
-        flown = fly_to_end(Flight(made.setup, made.airframe.aircraft))
+        flown = fly_to_end(Flight(made.setup, made.uav.aircraft))
         if flown.ended != "completed":
             raise RuntimeError(f"mission {number} {flown.ended}")
         shape = route_requirements(made.setup)

@@ -24,10 +24,10 @@ from flight.simulation.simulate import Flight, fly_to_end, simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import BATCH_S
+from planfly.workflow.uav import Uav, load_uav
 from world.scenario import load_scenario
 
 # Number of rounds.
@@ -37,31 +37,31 @@ ROUNDS = 5
 def run() -> dict[str, Any]:
     """Measure, print a table, and return it."""
     scenario = load_scenario("jacksboro-air")
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, 1)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
-    setup = make_setup(scenario, airframe, mission, 1, plan=plan)
-    flown = fly_to_end(Flight(setup, airframe.aircraft))
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, 1)
+    mission = plan_mission(plan, uav.airspeed, uav.max_bank)
+    setup = make_setup(scenario, uav, mission, 1, plan=plan)
+    flown = fly_to_end(Flight(setup, uav.aircraft))
     seconds = float(flown.track.time[-1])
     steps = round(seconds * FDM_HZ)
 
     def bare() -> None:
         """Step JSBSim alone, without guidance."""
-        fdm = Fdm(airframe.aircraft, rate_hz=FDM_HZ)
-        trim = fdm.start(36.5, -84.2, 600.0, 0.0, airframe.airspeed)
+        fdm = Fdm(uav.aircraft, rate_hz=FDM_HZ)
+        trim = fdm.start(36.5, -84.2, 600.0, 0.0, uav.airspeed)
         fdm.write(np.array(trim.commands()))
         fdm.step(steps)
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        times = recording(setup, airframe, folder)
+        times = recording(setup, uav, folder)
         hour, hours = long_flight(folder)
         size = hour.stat().st_size / hours / 1e6
         out = ("--out", str(folder / "report"), "--overwrite")
         times |= {
             "bare JSBSim": median_cpu(bare, ROUNDS),
             "judging": median_cpu(lambda: judge_flight(setup, flown.track, "completed"), ROUNDS),
-            "planning": median_cpu(lambda: make_plan(scenario, airframe, 1), ROUNDS),
+            "planning": median_cpu(lambda: make_plan(scenario, uav, 1), ROUNDS),
             "whole `planfly run`, new process": in_child("run", "--out", str(folder / "run"), "--overwrite"),
             "`planfly --help`, new process": in_child("--help"),
             "reading the long log": median_cpu(lambda: read_log(hour), 3),
@@ -90,7 +90,7 @@ def run() -> dict[str, Any]:
     return {"seconds": times, "ratios": ratios, "log_mb_per_hour": size, "long_log_hours": hours, "report_mb": page}
 
 
-def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
+def recording(setup: FlightSetup, uav: Uav, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
     """Measure the flight without a log, with a log at 20 Hz and at 60 Hz, in turn: smallest CPU time of each, s.
 
     The cost of recording is a small difference of these, which would be lost in medians on a busy machine.
@@ -101,13 +101,13 @@ def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int 
         """Fly and record every n-th row."""
         with Recorder(log, setup, every=every, batch=BATCH_S) as recorder:
             ended = ""
-            for block in simulate(Flight(setup, airframe.aircraft)):
+            for block in simulate(Flight(setup, uav.aircraft)):
                 recorder.write_rows(block.rows)
                 ended = block.end_reason
             recorder.finish(ended, None)
 
     work: dict[str, Callable[[], object]] = {
-        "flight": lambda: fly_to_end(Flight(setup, airframe.aircraft)),
+        "flight": lambda: fly_to_end(Flight(setup, uav.aircraft)),
         "flight, recorded at 20 Hz": lambda: fly(3),
         "flight, recorded at 60 Hz": lambda: fly(1),
     }

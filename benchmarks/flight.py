@@ -25,9 +25,9 @@ from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.uav import load_uav
 from tests.setups import MakeSetup, setup_maker, standard
 from world.arrays import Floats
 from world.scenario import load_scenario
@@ -273,9 +273,9 @@ class EngineCost:
 def demo_setup() -> FlightSetup:
     """Return the setup of the demo in the air, planned with seed 1."""
     scenario = load_scenario("jacksboro-air")
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, 1)
-    return make_setup(scenario, airframe, mission_of_plan(plan, airframe, "plan"), 1, plan=plan)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, 1)
+    return make_setup(scenario, uav, mission_of_plan(plan, uav, "plan"), 1, plan=plan)
 
 
 def engine_cost(setup: FlightSetup, rounds: int = 5) -> EngineCost:

@@ -14,10 +14,10 @@ from pathlib import Path
 from flight.mission.from_plan import plan_mission
 from planfly.arguments import CHOICES
 from planfly.flight_options import flight_entries
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import load_uav
 from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
 from world.scenario import with_flight
 
@@ -35,15 +35,15 @@ class Flown:
 def fly(number: int, law: str, sitl: Path | None) -> Flown:
     """Plan and fly the scenario of this number, and print a line about it."""
     scenario = with_flight(plan_scenario(number), **flight_entries({"autopilot": law}))
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, number + 1)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, number + 1)
     if not plan.safe:
         print(f"{scenario.name:10s} no plan: {'; '.join(plan.certificate.problems[:2])}", flush=True)
         return Flown("no plan", None, math.nan, scenario.wind.turbulence)
-    exact = replace(airframe, limits=replace(airframe.limits, tracking=None))
+    exact = replace(uav, limits=replace(uav.limits, tracking=None))
     longer = float(plan.objectives[0] / make_plan(scenario, exact, number + 1).objectives[0])
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+    setup = make_setup(scenario, uav, mission, number + 1, plan=plan)
     judged = fly_and_judge(setup, autopilot=sitl)
     harm = harm_of(scenario, plan.waypoints, judged.track)
     parts = [harm.text(scenario), "" if judged.ended == "completed" else judged.ended]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.reference import brute_scores, numpy_scores, ranks_by_definition
-from benchmarks.task import PROBLEMS, Task, best_known, exact_airframe, graded_scores, make_task
+from benchmarks.task import PROBLEMS, Task, best_known, exact_uav, graded_scores, make_task
 from benchmarks.timing import median_cpu
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import ProblemArrays
@@ -138,8 +138,8 @@ def scale() -> dict[str, Any]:
     micro: dict[str, dict[int, float]] = {"paper": {}, "graded": {}}
     for threats in (60, MANY):
         scenario = scaled(threats)
-        airframe = exact_airframe(scenario)
-        data = make_problem(scenario, airframe.limits).search
+        uav = exact_uav(scenario)
+        data = make_problem(scenario, uav.limits).search
         for name, evaluate in (("paper", paper_scores), ("graded", graded_scores)):
             evaluate(data, paths)
             spent = median_cpu(partial(repeated, evaluate, data, paths, 5))

@@ -16,10 +16,10 @@ from statistics import median
 
 from flight.mission.from_plan import plan_mission
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import load_uav
 from planner.plan import Objective
 from tests.fresh_plans import fresh_scenario
 from world.errors import PlanflyError
@@ -53,9 +53,9 @@ def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
     scenario = fresh_scenario(number)
     whose = scenario.name, scenario.wind.turbulence
     began = time.process_time()
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     try:
-        plan = make_plan(scenario, airframe, number + 1)
+        plan = make_plan(scenario, uav, number + 1)
     except PlanflyError as error:
         return Answer(*whose, f"refused: {error}")
     planned = time.process_time()
@@ -64,8 +64,8 @@ def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
         why = "; ".join(plan.certificate.problems[:2])
         said = "safe" if plan.safe else f"no plan: {why}"
         return Answer(*whose, said, "", "", "", (planned - began, 0.0), *found)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+    setup = make_setup(scenario, uav, mission, number + 1, plan=plan)
     verdicts = {"drawn": judge_geometry(setup)}
     if flown:
         verdicts["flown"] = fly_and_judge(setup).verdict

@@ -29,11 +29,11 @@ FIRST_SAFE = """
 import os
 from planfly.runtime.process_setup import prepare_process
 prepare_process()
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.search.plan_path import plan_path
 from world.scenario import load_scenario
 scenario = load_scenario("jacksboro-air")
-plan = plan_path(scenario, load_airframe(scenario).limits, seed=1, first_safe=True)
+plan = plan_path(scenario, load_uav(scenario).limits, seed=1, first_safe=True)
 os._exit(not plan.safe)
 """
 

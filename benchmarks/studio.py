@@ -25,8 +25,8 @@ from websockets.sync.client import connect
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from flight.mission_files.formats import mission_text
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
+from planfly.workflow.uav import load_uav
 from planner.plan import plan_json
 from tests.browser import Browser
 from world.frames import to_geo
@@ -113,7 +113,7 @@ new MutationObserver(() => {
 def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
     """Write the missions that are dragged, and return the arguments of the command by description."""
     scenario = load_scenario(SCENARIO)
-    plan = make_plan(scenario, load_airframe(scenario), 1)
+    plan = make_plan(scenario, load_uav(scenario), 1)
     (folder / "demo.json").write_text(plan_json(plan), encoding="utf-8")
     found: dict[str, tuple[str, ...]] = {"demo, 14 waypoints": ("demo.json",)}
     for count in (100, 500):

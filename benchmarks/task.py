@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.uav import Uav, load_uav
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
@@ -33,7 +33,7 @@ class Task:
     """Scenario in the form of compiled code, in the rotated encoding."""
 
     scenario: Scenario
-    airframe: Airframe
+    uav: Uav
     problem: Problem
     encoding: Encoding
 
@@ -62,19 +62,19 @@ def is_safe(certificate: Certificate) -> bool:
     return certificate.ok and certificate.kill_distance > 0.0
 
 
-def exact_airframe(scenario: Scenario) -> Airframe:
-    """Return a scenario's airframe for plans without tracking error, like the best known paths."""
-    airframe = load_airframe(scenario)
-    return replace(airframe, limits=replace(airframe.limits, tracking=None))
+def exact_uav(scenario: Scenario) -> Uav:
+    """Return a scenario's UAV for plans without tracking error, like the best known paths."""
+    uav = load_uav(scenario)
+    return replace(uav, limits=replace(uav.limits, tracking=None))
 
 
 @cache
 def make_task(name: str) -> Task:
     """Make the task of an embedded scenario."""
     scenario = load_scenario(name)
-    airframe = exact_airframe(scenario)
-    problem = make_problem(scenario, airframe.limits)
-    return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
+    uav = exact_uav(scenario)
+    problem = make_problem(scenario, uav.limits)
+    return Task(scenario, uav, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
 
 
 def best_known(name: str) -> float:

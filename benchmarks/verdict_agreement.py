@@ -21,9 +21,9 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
 from planfly.arguments import CHOICES
 from planfly.flight_options import flight_entries
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import Uav, load_uav
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
 # Loss of clearance, or depth in a sphere, from which a violation is grave, m.
@@ -47,16 +47,16 @@ class Answer:
     harmed: bool
 
 
-def setup_of(made: FieldMission) -> tuple[FlightSetup, Airframe]:
+def setup_of(made: FieldMission) -> tuple[FlightSetup, Uav]:
     """Make the setup of a mission, with GNSS errors as in a scenario."""
-    airframe = load_airframe(made.scenario)
-    return make_setup(made.scenario, airframe, made.mission, seed=1), airframe
+    uav = load_uav(made.scenario)
+    return make_setup(made.scenario, uav, made.mission, seed=1), uav
 
 
 def by_law(made: FieldMission) -> tuple[Verdict, float]:
     """Return the verdict on the law's flight, and its energy, Wh."""
-    setup, airframe = setup_of(made)
-    flown = fly_to_end(Flight(setup, airframe.aircraft))
+    setup, uav = setup_of(made)
+    flown = fly_to_end(Flight(setup, uav.aircraft))
     return judge_flight(setup, flown.track, flown.ended), float(flown.track.energy[-1])
 
 

@@ -420,7 +420,7 @@ def _check_aircraft_options(scenario: Scenario, options: FlightOptions) -> None:
         model_hash(aircraft)
     except FlightError as error:
         if stated_aircraft is None:
-            # The scenario names it, which the load of its airframe reports.
+            # The scenario names it, which the load of its UAV reports.
             return
         if error.field:
             # A wrong value in the aircraft's own file.

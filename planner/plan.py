@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from planner.ground_ways import DepartureAndApproach, DepartureAndApproachFile, departure_and_approach_json
+from planner.procedures import DepartureAndApproach, DepartureAndApproachFile, departure_and_approach_json
 from world.arrays import Floats
 from world.errors import ArgumentError, MissionError
 from world.files import read_small_file
@@ -159,8 +159,8 @@ class Plan:
     the best path in each generation.
     ended: "completed", or the reason why the search ended early: "budget" or "interrupted".
     flown_legs: number of first legs that were already flown under an earlier plan.
-    ways: departure from the ground to the first waypoint and approach from the last; None for a plan that stays in the
-    air. If a departure or approach that the scenario requires is blocked, the certificate reports it.
+    procedures: departure from the ground to the first waypoint and approach from the last; None for a plan that stays
+    in the air. If a departure or approach that the scenario requires is blocked, the certificate reports it.
     """
 
     scenario: Scenario
@@ -174,7 +174,7 @@ class Plan:
     history: Floats
     ended: str = "completed"
     flown_legs: int = 0
-    ways: DepartureAndApproach | None = None
+    procedures: DepartureAndApproach | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays, and name the four scores.
@@ -355,7 +355,7 @@ def plan_json(plan: Plan) -> str:
         "feasible": plan.feasible,
         "safe": plan.safe,
         "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
-        **({} if plan.ways is None else {"ground_ways": departure_and_approach_json(plan.ways)}),
+        **({} if plan.procedures is None else {"ground_ways": departure_and_approach_json(plan.procedures)}),
         "violations": plan.violations._asdict(),
         "objectives": plan.objectives._asdict(),
         "certificate": {
@@ -428,7 +428,7 @@ def parse_plan(
         history=history,
         ended=plan_file.ended,
         flown_legs=plan_file.flown_legs,
-        ways=None if plan_file.ground_ways is None else plan_file.ground_ways.to_procedures(),
+        procedures=None if plan_file.ground_ways is None else plan_file.ground_ways.to_procedures(),
     )
 
 

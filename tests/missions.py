@@ -18,8 +18,8 @@ from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import FlightSetup
 from logs.verdict.places import Place
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import Uav, load_uav
 from tests.mission_draft import Draft, draw_heights, draw_runs, draw_turns
 from tests.setups import spec_around, waypoint_mission
 from world.arrays import Floats
@@ -53,7 +53,7 @@ class MadeMission:
     """
 
     setup: FlightSetup
-    airframe: Airframe
+    uav: Uav
     kind: str
     places: tuple[Place, ...]
 
@@ -115,10 +115,10 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     steps = runs[:, None] * np.stack([np.sin(draft.courses), np.cos(draft.courses)], axis=1)
     points = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heights])
     scenario = _scenario(draft, points, numbers, f"{kind or 'feasible'} {number}")
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     mission = waypoint_mission(points, draft.speeds, scenario.origin)
-    setup = make_setup(scenario, airframe, mission, number)
-    return MadeMission(setup, airframe, kind, _places(draft))
+    setup = make_setup(scenario, uav, mission, number)
+    return MadeMission(setup, uav, kind, _places(draft))
 
 
 def _places(draft: Draft) -> tuple[Place, ...]:

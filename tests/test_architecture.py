@@ -36,6 +36,7 @@ LONGER = {
     "flight/autopilots/px4/lateral.py:guide_to_path": 66,
     "flight/guidance/path.py:fly_by_path": 74,
     "flight/mission/loiter_circles.py:_corners_around": 68,
+    "flight/mission/route.py:route_through_stops": 67,
     "flight/simulation/simulate.py:make_loop": 98,
     "logs/recording/reader.py:read_log": 63,
     "logs/verdict/returns/glide_reach.py:_fill_altitudes_left": 78,

@@ -545,7 +545,8 @@ def _assemble_scenario(
     max_ground = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
     ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else max_ground + 1000.0
     if not replaced:
-        _check_ends_in_area(spec, source, origin, bounds)
+        for name, end in (("start", spec.start), ("destination", spec.destination)):
+            check_in_area(name, np.array(map_coordinates(end, origin)), source, bounds, origin)
     start = map_position(spec.start, "start", source, origin, ground)
     destination = map_position(spec.destination, "destination", source, origin, ground)
     # If the terrain was replaced, the verdict reports ends below the new ground.
@@ -629,12 +630,6 @@ def with_ground_at(scenario: Scenario, position: tuple[float, float]) -> Scenari
         return scenario
     wide = read_terrain(raster, scenario.origin, box, GROUND_BUFFER)
     return replace(scenario, terrain=replace(wide, vertical_error=terrain.vertical_error))
-
-
-def _check_ends_in_area(spec: ScenarioFile, source: str, origin: GeoOrigin, bounds: Floats) -> None:
-    """Raise ScenarioError for a start or destination outside the area."""
-    for name, table in (("start", spec.start), ("destination", spec.destination)):
-        check_in_area(name, np.array(map_coordinates(table, origin)), source, bounds, origin)
 
 
 def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:

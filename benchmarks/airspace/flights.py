@@ -14,10 +14,10 @@ import numpy as np
 
 from benchmarks.airspace.scenarios import airspace_scenario, ring_distance
 from flight.mission.from_plan import plan_mission
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import load_uav
 from world.arrays import Floats
 from world.scenario import Scenario
 from world.scenario_tables import ZoneTable
@@ -81,16 +81,16 @@ def _kept_of(zone: ZoneTable, position: Floats, over: Floats) -> float:
 def fly(number: int) -> Flown:
     """Plan and fly the scenario of this number, and print a line about it."""
     scenario = airspace_scenario(number)
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     before = time.perf_counter()
-    plan = make_plan(scenario, airframe, number + 1)
+    plan = make_plan(scenario, uav, number + 1)
     seconds = time.perf_counter() - before
     name = f"{scenario.name:15s} {len(scenario.zones):2d} zones, {len(plan.waypoints)} waypoints, {seconds:4.1f} s"
     if not plan.safe:
         print(f"{name}  no plan: {'; '.join(plan.certificate.problems[:3])}", flush=True)
         return Flown("no plan", None, seconds)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+    setup = make_setup(scenario, uav, mission, number + 1, plan=plan)
     judged = fly_and_judge(setup)
     kept = kept_by(scenario, judged.track.position)
     parts = ["" if judged.ended == "completed" else judged.ended, "" if kept.least >= 0.0 else "not inside"]

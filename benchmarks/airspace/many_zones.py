@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.airspace.scenarios import HALF, SEED, star
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
+from planfly.workflow.uav import load_uav
 from world.scenario import Scenario, scenario_from_spec
 
 
@@ -53,7 +53,7 @@ def main() -> None:
         begin = time.process_time()
         scenario = crowded_scenario(args.zones, args.corners)
         middle = time.process_time()
-        plan = make_plan(scenario, load_airframe(scenario), 1)
+        plan = make_plan(scenario, load_uav(scenario), 1)
         if run:
             read.append(middle - begin)
             planned.append(time.process_time() - middle)

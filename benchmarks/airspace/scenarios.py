@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from world.arrays import Flags, Floats
 from world.scenario import Scenario, scenario_from_spec
 
@@ -206,7 +206,7 @@ def ring_distance(ring: Floats, places: Floats) -> Floats:
 
 def _slopes(scenario: Scenario) -> tuple[float, float]:
     """Return the climb and dive limits for all courses, rad, reduced by a tenth for turbulence and by half a degree."""
-    limits = load_airframe(scenario).limits
+    limits = load_uav(scenario).limits
     up = float(max(scenario.start[2], scenario.destination[2])) + 100.0
     found = np.array([limits.slopes(course, up) for course in np.radians(np.arange(0, 360, 15))])
     climb, dive = 0.9 * found.min(axis=0) - math.radians(0.5)

@@ -78,7 +78,7 @@ def over_simulate(base: CampaignBase, flights: int = 20) -> float:
         varied = vary_flight(base, draw_flight(base.dispersions, base.seed, index))
         setup_done = time.process_time()
         how = varied.off_nominal
-        fly_to_end(Flight(varied.setup, varied.airframe.aircraft, how.variation, start_offset=how.start_offset))
+        fly_to_end(Flight(varied.setup, varied.uav.aircraft, how.variation, start_offset=how.start_offset))
         ratios.append((between - started) / (time.process_time() - setup_done))
     return statistics.median(ratios)
 

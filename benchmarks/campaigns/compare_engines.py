@@ -40,7 +40,7 @@ def describe_flight(base: CampaignBase, index: int) -> tuple[str, str, bool]:
     varied = vary_flight(base, draw_flight(base.dispersions, base.seed, index))
     flight = Flight(
         varied.setup,
-        varied.airframe.aircraft,
+        varied.uav.aircraft,
         varied.off_nominal.variation,
         start_offset=varied.off_nominal.start_offset,
     )

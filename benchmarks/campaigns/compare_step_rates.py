@@ -17,8 +17,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import Uav, load_uav
 from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind
@@ -46,11 +46,11 @@ class StepRates:
 def compare(seed: int, aircraft: str = "aerosonde") -> StepRates:
     """Fly the mission of a seed at both rates."""
     made = mission_of(seed, aircraft)
-    airframe = load_airframe(made.scenario)
-    setup = make_setup(made.scenario, airframe, made.mission, seed=1)
-    judged = [_judged(setup, airframe, hz) for hz in (120, 60)]
+    uav = load_uav(made.scenario)
+    setup = make_setup(made.scenario, uav, made.mission, seed=1)
+    judged = [_judged(setup, uav, hz) for hz in (120, 60)]
     failed = [{(item.rule, item.place) for item in one.findings if item.ok is False} for one in judged]
-    calm, windy = (_max_distance(_without_gusts(made, speed), airframe) for speed in (0.0, made.scenario.wind.speed))
+    calm, windy = (_max_distance(_without_gusts(made, speed), uav) for speed in (0.0, made.scenario.wind.speed))
     return StepRates(made.name, (judged[0].flyable, judged[1].flyable), failed[0] == failed[1], calm, windy)
 
 
@@ -64,15 +64,13 @@ def mission_of(seed: int, aircraft: str) -> FieldMission:
 
 def _energy(made: FieldMission) -> float:
     """Return the battery energy of a mission's flight, Wh."""
-    airframe = load_airframe(made.scenario)
-    return float(
-        fly_to_end(Flight(make_setup(made.scenario, airframe, made.mission, 1), airframe.aircraft)).track.energy[-1]
-    )
+    uav = load_uav(made.scenario)
+    return float(fly_to_end(Flight(make_setup(made.scenario, uav, made.mission, 1), uav.aircraft)).track.energy[-1])
 
 
-def _judged(setup: FlightSetup, airframe: Airframe, hz: Literal[60, 120]) -> Verdict:
+def _judged(setup: FlightSetup, uav: Uav, hz: Literal[60, 120]) -> Verdict:
     """Fly a setup at a step rate, and return the verdict."""
-    flown = fly_to_end(Flight(replace(setup, fdm_hz=hz), airframe.aircraft))
+    flown = fly_to_end(Flight(replace(setup, fdm_hz=hz), uav.aircraft))
     return judge_flight(setup, flown.track, flown.ended)
 
 
@@ -82,13 +80,13 @@ def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
     wind = Wind(speed, old.from_course, old.gradient if speed else 0.0, "none", None, old.reference_amsl)
     table = made.scenario.spec.wind.model_copy(update={"speed_mps": speed, "turbulence": "none"})
     scenario: Scenario = replace(made.scenario, wind=wind, spec=made.scenario.spec.model_copy(update={"wind": table}))
-    setup = make_setup(scenario, load_airframe(scenario), made.mission, seed=1)
+    setup = make_setup(scenario, load_uav(scenario), made.mission, seed=1)
     return replace(setup, nav="perfect")
 
 
-def _max_distance(setup: FlightSetup, airframe: Airframe) -> float:
+def _max_distance(setup: FlightSetup, uav: Uav) -> float:
     """Return the largest distance between the flights at both step rates at the same time, m."""
-    one, other = (_flown(setup, airframe, hz) for hz in (120, 60))
+    one, other = (_flown(setup, uav, hz) for hz in (120, 60))
     rows = min(len(one.track), len(other.track))
     # The flights may differ by one tick in length.
     if one.ended != other.ended or abs(len(one.track) - len(other.track)) > 1 or not rows:
@@ -96,9 +94,9 @@ def _max_distance(setup: FlightSetup, airframe: Airframe) -> float:
     return float(np.linalg.norm(one.track.position[:rows] - other.track.position[:rows], axis=1).max())
 
 
-def _flown(setup: FlightSetup, airframe: Airframe, hz: int) -> SimulatedFlight:
+def _flown(setup: FlightSetup, uav: Uav, hz: int) -> SimulatedFlight:
     """Fly a setup at a step rate."""
-    return fly_to_end(Flight(replace(setup, fdm_hz=cast("Any", hz)), airframe.aircraft))
+    return fly_to_end(Flight(replace(setup, fdm_hz=cast("Any", hz)), uav.aircraft))
 
 
 def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False) -> dict[str, float]:

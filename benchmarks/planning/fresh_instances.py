@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.planning.reference_search import reference_search
 from benchmarks.planning.wild_instances import wild_scenario
 from benchmarks.task import Task, with_planner
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import make_problem
 from planner.plan import Objective
@@ -52,9 +52,9 @@ def random_task(seed: int, threats: int = THREATS, family: str = "passable", aut
         text = random_scenario(seed, threats) if family == "passable" else _drawn(seed, threats)
         flown = text.replace("[flight]\n", f'[flight]\nautopilot = "{autopilot}"\n')
         scenario = scenario_from_spec(parse_scenario(flown, "random"), "random")
-    airframe = load_airframe(scenario)
-    problem = make_problem(scenario, airframe.limits)
-    return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
+    uav = load_uav(scenario)
+    problem = make_problem(scenario, uav.limits)
+    return Task(scenario, uav, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
 
 
 def _drawn(seed: int, threats: int) -> str:

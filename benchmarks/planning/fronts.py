@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.planning.fresh_instances import random_task
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding
 from planner.optimisers.hypervolume import covering_order, hypervolume
@@ -108,7 +108,7 @@ def _scenario(name: str) -> Scenario:
 def make_contest(scenario: Scenario, front: Front) -> Contest:
     """Make the contest of a problem, with the box of its default plan."""
     default = front.default
-    task = fit_margins(front_task(scenario, load_airframe(scenario).limits.with_margin()), default.plan.waypoints)
+    task = fit_margins(front_task(scenario, load_uav(scenario).limits.with_margin()), default.plan.waypoints)
     space = task.problem.space
     straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
     ends = np.stack([[end, end] for end in (space.start, space.destination)])
@@ -122,7 +122,7 @@ def make_contest(scenario: Scenario, front: Front) -> Contest:
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
     """Plan a front with planfly; return it with its contest and its row."""
     scenario = _scenario(name)
-    limits = load_airframe(scenario).limits.with_margin()
+    limits = load_uav(scenario).limits.with_margin()
     began = time.process_time()
     front = plan_front(scenario, limits, COUNT, seed=seed)
     seconds = time.process_time() - began

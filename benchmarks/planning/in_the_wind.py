@@ -23,10 +23,10 @@ import numpy as np
 
 from aircraft.path_limits import Limits, PerformanceTable, ground_speed_on
 from flight.mission.from_plan import plan_mission
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import load_uav
 from planner.evaluation.travel_cost import make_energy_cost, make_time_cost, path_cost
 from tests.autopilot_plans import plan_scenario
 from world.arrays import Floats
@@ -79,18 +79,18 @@ def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
 
     If `planned`, compute time and energy from the legs only.
     """
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     began = time.process_time()
-    plan = make_plan(scenario, airframe, seed)
+    plan = make_plan(scenario, uav, seed)
     cpu = time.process_time() - began
     if not plan.safe:
         return Flown(np.nan, np.nan, np.nan, cpu, f"no plan: {'; '.join(plan.certificate.problems[:2])}")
     if planned:
-        table = airframe.limits.performance()
-        values = _by_legs(airframe.limits, table, np.array(plan.waypoints))
+        table = uav.limits.performance()
+        values = _by_legs(uav.limits, table, np.array(plan.waypoints))
         return Flown(*values, float(plan.objectives[0]), cpu, "")
-    items = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    judged = fly_and_judge(make_setup(scenario, airframe, items, seed, plan=plan))
+    items = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+    judged = fly_and_judge(make_setup(scenario, uav, items, seed, plan=plan))
     wrong = [] if judged.ended == "completed" else [judged.ended]
     wrong += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]
     seconds, energy = float(judged.track.time[-1]), float(judged.track.energy.max())
@@ -146,16 +146,16 @@ def bounds(name: str, first: int, count: int) -> Floats:
     ratios, detours = np.full((count, 2), np.nan), np.full(count, np.nan)
     for row, number in enumerate(range(first, first + count)):
         scenario = mission(number, objective="length", **SETTINGS[name])
-        airframe = load_airframe(scenario)
-        plan, table = make_plan(scenario, airframe, SEED), airframe.limits.performance()
+        uav = load_uav(scenario)
+        plan, table = make_plan(scenario, uav, SEED), uav.limits.performance()
         if not plan.safe:
             continue
-        seconds, _ = _by_legs(airframe.limits, table, np.array(plan.waypoints))
+        seconds, _ = _by_legs(uav.limits, table, np.array(plan.waypoints))
         step = scenario.destination[:2] - scenario.start[:2]
         run, course = float(np.hypot(*step)), float(np.arctan2(*step))
         level = float(0.5 * (scenario.start[2] + scenario.ceiling))
         fastest = run / ground_speed_on(table, course, float(scenario.ceiling))
-        ratios[row] = fastest / seconds, _straight_seconds(scenario, airframe.limits, course, level) / seconds
+        ratios[row] = fastest / seconds, _straight_seconds(scenario, uav.limits, course, level) / seconds
         detours[row] = plan.objectives[0]
         print(f"  {number}  {ratios[row, 0]:.4f}  {ratios[row, 1]:.4f}  length ratio {detours[row]:.4f}", flush=True)
     middle = np.nanmedian(ratios, axis=0)

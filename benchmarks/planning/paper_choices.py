@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.task import exact_airframe
+from benchmarks.task import exact_uav
 from planfly.planning.paper import PROBLEMS, STRIP_HALF_WIDTHS_M, problem_name
 from planner.evaluation.encoding import (
     Encoding,
@@ -116,7 +116,7 @@ CHOICES = (
 def searched(choice: Choice, threats: int, seed: int) -> tuple[bool, float]:
     """Return True if the reported path of a search is safe at the paper's points, and its length ratio."""
     scenario = load_scenario(problem_name(threats))
-    problem, table = make_problem(scenario, exact_airframe(scenario).limits), scenario.planner
+    problem, table = make_problem(scenario, exact_uav(scenario).limits), scenario.planner
     space = replace(problem.space, across=STRIP_HALF_WIDTHS_M[threats]) if choice.strip else problem.space
     encoding = choice.encode(space, table.waypoints)
 

@@ -44,7 +44,7 @@ from benchmarks.planning.public_environments import (
 )
 from benchmarks.planning.public_ranking import MODELS, BudgetSpentError
 from planfly.api.optimising import Model
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.optimisers.front_sampling import FrontSampling
 from planner.optimisers.hypervolume import covering_order, hypervolume
 from planner.search.plan_front import POPULATION_SIZE, noise_directions, plan_front
@@ -230,7 +230,7 @@ def make_scenario(environment: Environment) -> Scenario:
 def plan_and_score(scores: CountedScores, seed: int) -> None:
     """Plan a front of 20 as `planfly plan --front` does, and score the routes of its plans at the published heights."""
     scenario = make_scenario(scores.environment)
-    front = plan_front(scenario, load_airframe(scenario).limits.with_margin(), FRONT_SIZE, seed=seed)
+    front = plan_front(scenario, load_uav(scenario).limits.with_margin(), FRONT_SIZE, seed=seed)
     routes = [np.asarray(one.plan.waypoints)[:, :2] / CELL_M + 1.0 for one in front.plans]
     scores.count(np.clip([even_places(route) for route in routes], 1.0, float(MAP_CELLS)))
 

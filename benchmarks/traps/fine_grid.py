@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from aircraft.path_limits import Limits
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path
@@ -173,7 +173,7 @@ def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
             continue
         scenario = load_scenario(name)
         scenario = replace(scenario, flight=scenario.flight.model_copy(update={"autopilot": autopilot}))
-        limits = load_airframe(scenario).limits
+        limits = load_uav(scenario).limits
         plan = plan_path(scenario, limits, seed=seed)
         path = shortest_on_map(scenario)
         level = 0.5 * (scenario.start[2] + scenario.ceiling)

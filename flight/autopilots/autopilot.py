@@ -36,7 +36,7 @@ from world.wording import count_text
 
 # Question that a flight answers: whether the aircraft can fly the mission ("airframe"), or whether the aircraft with
 # its autopilot can ("autopilot").
-Level = Literal["airframe", "autopilot"]
+AnswerName = Literal["airframe", "autopilot"]
 
 # ----------------------------------------------------------------------
 # Parameters, from the user's file, the aircraft's folder or the autopilot's defaults.
@@ -177,15 +177,16 @@ class Autopilot(ABC):
 
     name: name in `[flight] autopilot` of a scenario.
     title: name in texts.
-    level: question that a flight answers.  "airframe": whether the aircraft can fly the mission.  "autopilot": whether
-        the aircraft with this autopilot can; the verdict is compared with a reference flight by planfly's guidance.
+    answer_name: name of the answer that a flight gives.  "airframe": whether the aircraft can fly the mission.
+        "autopilot": whether the aircraft with this autopilot can; the verdict is compared with a reference flight by
+        planfly's guidance.
     parameters: None for an autopilot without parameters.
     program: program that flew; None for a simulated autopilot and before the flight.
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
-    level: ClassVar[Level] = "autopilot"
+    answer_name: ClassVar[AnswerName] = "autopilot"
     parameters: Parameters | None = None
     program: AutopilotProgram | None = None
 

@@ -18,7 +18,7 @@ from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.mission.ground_ways import GroundPhases
+from flight.mission.ground_phases import GroundPhases
 from flight.mission.return_path import DEFAULT_RETURN_RULES, LandingStart, ReturnRules, ReturnTarget
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records

@@ -10,11 +10,11 @@ from typing import Any, ClassVar, Self
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot, AutopilotProgram, describe_program
 from flight.autopilots.parts import MissionChecks, MissionParts
-from flight.simulation.airborne import Airborne
+from flight.simulation.running_flight import RunningFlight
 from flight.simulation.setup import FlightSetup
 
 
-class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
+class ProgramFlight(RunningFlight, AbstractContextManager["ProgramFlight"]):
     """Flight of an external program in lockstep with planfly's physics, as a context manager that ends the program."""
 
     @abstractmethod

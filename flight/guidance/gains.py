@@ -18,7 +18,7 @@ GAINS_FILE = "gains.toml"
 class Gains:
     """Gains of guidance and inner loops, in SI units and radians.
 
-    Airframe and altitude:
+    Uav and altitude:
 
     reference_airspeed: airspeed at which surface gains apply; they are scaled with dynamic pressure.
     height_frequency, height_damping, height_integral: second-order altitude law.

@@ -8,8 +8,8 @@ import numpy as np
 from aircraft.envelope import GRAVITY, ground_speed
 from aircraft.tracking import TrackingError, air_density_factor
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
-from planner.ground_ways import DepartureAndApproach
 from planner.plan import Plan
+from planner.procedures import DepartureAndApproach
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 from world.geometry import leg_courses, turning_angles, wrap
@@ -60,7 +60,7 @@ def plan_mission(
     >>> [(item.command, item.params[1]) for item in mission.items]  # speed, then acceptance radii
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
-    procedures = plan.ways or DepartureAndApproach()
+    procedures = plan.procedures or DepartureAndApproach()
     points = _mission_positions(plan, procedures)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     home = _home_position(plan)

@@ -69,8 +69,10 @@ def implied_scenario(
     max_altitude = max(placed_stop.map_position[2] for placed_stop in placed_mission.stops)
     if terrain is not None:
         max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
+    file_name = re.split(r"[/\\]", mission.source)[-1]
+    name = "".join(character if character.isprintable() else "?" for character in file_name)
     spec = ScenarioFile(
-        name=_scenario_name(mission.source),
+        name=name[:100] or "mission",
         description="Made around a mission that came without a scenario",
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
@@ -148,16 +150,12 @@ def _load_terrain(
         terrain = read_terrain(raster, origin, area, GROUND_BUFFER)
         if np.isfinite(terrain.height(points[:, 0], points[:, 1])).any():
             return terrain, table
+    positions_text = f"latitude {lat.min():.4f}..{lat.max():.4f}, longitude {lon.min():.4f}..{lon.max():.4f}"
     raise TerrainError(
-        f"{path}: no data at any position of the mission, which flies to {_position_text(lat, lon)};"
+        f"{path}: no data at any position of the mission, which flies to {positions_text};"
         f" the terrain covers {cover_text(raster)}",
         file=path,
     )
-
-
-def _position_text(lats: Floats, lons: Floats) -> str:
-    """Return the ranges of latitudes and longitudes as text, degrees."""
-    return f"latitude {lats.min():.4f}..{lats.max():.4f}, longitude {lons.min():.4f}..{lons.max():.4f}"
 
 
 def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
@@ -166,9 +164,3 @@ def _end_table_above_ground(position: Position, terrain: Terrain | None) -> EndT
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)
     return EndTable(east_m=east, north_m=north, amsl_m=amsl)
-
-
-def _scenario_name(source: str) -> str:
-    """Return a scenario's name made from the file name of a mission: at most 100 printable characters."""
-    name = "".join(character if character.isprintable() else "?" for character in re.split(r"[/\\]", source)[-1])
-    return name[:100] or "mission"

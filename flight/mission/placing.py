@@ -385,7 +385,8 @@ def _place_stops(
             and not is_loiter_or_return
             and math.dist(placed_stops[-1].map_position[:2], placed_stop.map_position[:2]) < SAME_POSITION_DISTANCE_M
         ):
-            if vertical_legs and _is_vertical(placed_stops[-1], placed_stop):
+            is_vertical = abs(placed_stop.map_position[2] - previous_altitude) >= SAME_POSITION_DISTANCE_M
+            if vertical_legs and is_vertical and stop.command not in TAKEOFFS:
                 placed_stops.append(stop.at(_vertical_leg_end(placed_stops, placed_stop.map_position[2])))
                 continue
             merged_stop = _merge_stops(source, placed_stops[-1], placed_stop, notes)
@@ -520,17 +521,6 @@ class _AltitudeConverter:
             f"home has no altitude: the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f} is used, {ground:.1f} m AMSL"
         )
         return ground
-
-
-def _is_vertical(previous: RoutePoint, stop: RoutePoint) -> bool:
-    """Return True if a stop lies above or below the previous stop, and is no take-off.
-
-    Both stops are at the same place on the map.
-    """
-    return (
-        abs(stop.map_position[2] - previous.map_position[2]) >= SAME_POSITION_DISTANCE_M
-        and stop.command not in TAKEOFFS
-    )
 
 
 def _vertical_leg_end(stops: list[RoutePoint], up: float) -> Position:

@@ -489,12 +489,12 @@ def route_through_stops(
     >>> route_through_stops(placed, 25.0, fly_over=False).leg_airspeeds.tolist()
     [25.0]
     """
-    mission, notes = placed_mission.mission, Notes()
+    mission, itinerary, notes = placed_mission.mission, placed_mission.itinerary, Notes()
     return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
     all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else placed_mission.stops
     read_stops = partial(_read_stops, default_airspeed, reads_as_px4)
     placed_stops = read_stops(all_stops, 0)
-    return_stop = placed_stops.pop() if placed_mission.itinerary.ends_with_rtl else None
+    return_stop = placed_stops.pop() if itinerary.ends_with_rtl else None
     direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
         placed_stops += read_stops(direct_landing.stops, len(all_stops))
@@ -507,28 +507,36 @@ def route_through_stops(
         rules=loiter_rules,
     )
     points, unjoined = lay_out(placed_stops)
-    _note_unsimulated_loiters(placed_mission.itinerary, placed_stops, loiter_rules, notes)
+    _note_unsimulated_loiters(itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
         return_fields, landing = _append_rtl(placed_mission, return_stop, points, rules, limits, notes)
         if landing is not None:
             points += lay_out(read_stops(landing.stops, len(all_stops)))[0]
-    _check_point_count(mission.source, len(points))
+    if len(points) < 2:
+        message = f"{mission.source}: {len(points)} position to fly to: expected at least two different positions"
+        raise MissionError(message, file=mission.source)
     records = _point_records(points, acceptance_limit, placed_mission.home_up)
     is_missed = fly_over_waypoints(records, limits, turn_distance)
     records["fly_over"] = (records["arc_radius"] == 0.0) & (fly_over | is_missed)
     _note_cruise_speed(mission, default_airspeed, points[1], notes)
+    route_notes = itinerary.px4_notes if reads_as_px4 else itinerary.notes
+    open_items = itinerary.px4_open_items if reads_as_px4 else itinerary.open_items
+    if landing is not None:
+        # The landing sequence reaches the items that the itinerary before it never reaches.
+        route_notes = (*(note for note in route_notes if NEVER_REACHED not in note), *landing.notes)
+        open_items += landing.open_items
     return Route(
         points=records,
-        started=_start_text(placed_mission.itinerary, points[0], placed_mission.origin, records["position"]),
-        notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
+        started=_start_text(itinerary, points[0], placed_mission.origin, records["position"]),
+        notes=route_notes + placed_mission.notes + notes.lines(),
         direct_landing_start=None if landing is None else [point.item for point in points].index(landing.stops[0].item),
-        endless_jump=placed_mission.itinerary.endless_jump,
+        endless_jump=itinerary.endless_jump,
         takeoff_ground=placed_mission.takeoff_ground,
         landing_ground=placed_mission.landing_ground if landing is None else landing.ground,
         # An autopilot that flies on tangents omits these stops.
         unjoined_stops=unjoined if loiter_rules.steers_to_center else (),
-        open_items=_open_items(placed_mission.itinerary, landing, reads_as_px4),
+        open_items=open_items,
         **return_fields,
     )
 
@@ -546,40 +554,13 @@ def _point_records(points: list[RoutePoint], acceptance_limit: float, home_up: f
         item=[point.item for point in points],
         arc_radius=[point.arc_radius for point in points],
         stop=np.cumsum([False, *(a.stop != b.stop for a, b in pairwise(points))]),
-        above_ground=[_height_above_ground(point) for point in points],
+        # Only the leg to a place above terrain holds a height above ground.
+        above_ground=[
+            point.alt if point.frame in OVER_TERRAIN and point.command in PLACES else NOT_STATED for point in points
+        ],
         min_ground_speed=[point.min_ground_speed for point in points],
         home_up=[home_up if math.isnan(point.home_up) else point.home_up for point in points],
     )
-
-
-def _height_above_ground(stop: RoutePoint) -> float:
-    """Return the height above ground that the leg to a stop holds, m; `NOT_STATED` for a straight leg."""
-    return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else NOT_STATED
-
-
-def _check_point_count(source: str, point_count: int) -> None:
-    """Raise MissionError if a route has fewer than two points."""
-    if point_count < 2:
-        message = f"{source}: {point_count} position to fly to: expected at least two different positions"
-        raise MissionError(message, file=source)
-
-
-def _route_notes(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:
-    """Return the notes of an itinerary and of the landing sequence after its RTL.
-
-    The note about items that are never reached is omitted if the landing sequence reaches them.
-    """
-    notes = itinerary.px4_notes if reads_as_px4 else itinerary.notes
-    return notes if landing is None else (*(note for note in notes if NEVER_REACHED not in note), *landing.notes)
-
-
-def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
-    """Return the items that leave the verdict undecided.
-
-    They are in an itinerary, or in the landing sequence after its RTL.
-    """
-    open_items = itinerary.px4_open_items if reads_as_px4 else itinerary.open_items
-    return open_items if landing is None else open_items + landing.open_items
 
 
 def _find_direct_landing(

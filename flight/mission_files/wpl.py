@@ -115,7 +115,9 @@ def parse_waypoints(text: str, source: str) -> Mission:
         raise MissionError(f"{source}: no items after the header", file=source)
     has_current = any(int(line.split()[_COLUMNS.index("current")]) for _, line in lines[1:])
     warnings = _collect_warnings(locations, items, has_current=has_current)
-    home, body = _split_home(_renumbered_items(items))
+    # Fence and rally items without a home line are numbered from 0, too.
+    first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
+    home, body = _split_home([replace(item, seq=seq) for seq, item in enumerate(items, first_number)])
     fences = number_items([item for item in body if item.command in FENCES])
     fence_shapes(fences, source)
     return Mission(
@@ -181,15 +183,6 @@ def _parse_number(location: TextLine, name: str, text: str) -> float:
         raise _value_error(location, name, text, _short_repr(text), f"expected a finite number{hint}")
     # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
     return float(text) + 0.0
-
-
-def _renumbered_items(items: list[MissionItem]) -> list[MissionItem]:
-    """Return the items numbered in the order of their lines: from 0 if the file has a home line, else from 1.
-
-    Fence and rally items without a home line are numbered from 0, too.
-    """
-    first_number = 0 if _begins_with_home(items) or items[0].command in _COMMANDS_WITH_OWN_FILES else 1
-    return [replace(item, seq=seq) for seq, item in enumerate(items, first_number)]
 
 
 def _begins_with_home(items: list[MissionItem]) -> bool:

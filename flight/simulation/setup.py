@@ -14,7 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_ways import GroundPhases, display_waypoints, find_ground_phases, flown_notes
+from flight.mission.ground_phases import GroundPhases, display_waypoints, find_ground_phases, flown_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -214,7 +214,7 @@ class FlightSetup:
     guidance_hz: guidance ticks per second, and track rows per second.
     fdm_hz: steps of JSBSim per second.
     engine: flight model to use; both give the same flight.
-    source: the imported log that the flight comes from; None for a flight by planfly.
+    imported_log: the imported log that the flight comes from; None for a flight by planfly.
     demanded_route: route with the airspeeds that are demanded in flight, where the autopilot ignores or limits a
         command.  An imported flight keeps the commanded airspeeds: the limits of its autopilot may be unknown.
     path: reference path from the demanded route and the limits.
@@ -233,14 +233,14 @@ class FlightSetup:
     guidance_hz: Literal[30, 60] = 60
     fdm_hz: Literal[60, 120] = FDM_HZ
     engine: EngineChoice = field(default="auto", compare=False)
-    source: ImportedLog | None = None
+    imported_log: ImportedLog | None = None
     demanded_route: Route = field(init=False, repr=False, compare=False)
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Compute the demanded airspeeds and, with them, the reference path."""
         airspeed = self.autopilot.speeds.flown_airspeeds(self.route.leg_airspeeds, self.airspeed)
-        keeps_commands = self.source is not None or np.array_equal(airspeed, self.route.leg_airspeeds)
+        keeps_commands = self.imported_log is not None or np.array_equal(airspeed, self.route.leg_airspeeds)
         demanded_route = self.route if keeps_commands else self.route.with_fields(airspeed=airspeed)
         object.__setattr__(self, "demanded_route", demanded_route)
         object.__setattr__(self, "path", fly_by_path(self.demanded_route, self.limits, self.scenario.terrain))
@@ -280,7 +280,7 @@ class FlightSetup:
     def ground_phases(self) -> GroundPhases:
         """Take-off and landing that the flight simulates; empty for an autopilot that flies neither."""
         has_ground_ends = self.scenario.launch is not None or self.scenario.landing is not None
-        if self.source is not None or not has_ground_ends:
+        if self.imported_log is not None or not has_ground_ends:
             return GroundPhases()
         ground_rules = self.autopilot.ground
         if ground_rules.control_law is None:

@@ -17,9 +17,9 @@ from flight.dynamics.model_program import UnsupportedModel
 from flight.dynamics.trim import steady_flight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
-from flight.mission.ground_ways import GroundPhases
-from flight.simulation.airborne import Airborne, Start, default_gear, find_release, release
+from flight.mission.ground_phases import GroundPhases
 from flight.simulation.local_map import LocalMap
+from flight.simulation.running_flight import RunningFlight, Start, default_gear, find_release, release
 from flight.simulation.setup import EngineChoice, FlightSetup
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_rows
@@ -170,7 +170,7 @@ class FlightBlock(NamedTuple):
     distance: float
 
 
-def simulate(flight: Airborne, block_duration: float = BLOCK_DURATION_S) -> Iterator[FlightBlock]:
+def simulate(flight: RunningFlight, block_duration: float = BLOCK_DURATION_S) -> Iterator[FlightBlock]:
     """Fly until the flight ends, and yield the rows of each block.  block_duration: duration of a block, s.
 
     >>> import numpy as np
@@ -178,17 +178,17 @@ def simulate(flight: Airborne, block_duration: float = BLOCK_DURATION_S) -> Iter
     >>> from flight.simulation.track import TRACK_ROW
     >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
     >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
-    >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, fly_block=lambda count: next(blocks))
+    >>> flight = SimpleNamespace(dt=1 / 60, guidance_memory=at, path=path, fly_block=lambda count: next(blocks))
     >>> [(len(block.rows), block.end_reason) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
     end_reason = ""
     while not end_reason:
         rows, end_reason = flight.fly_block(round(block_duration / flight.dt))
-        yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
+        yield FlightBlock(rows, end_reason, min(float(flight.guidance_memory.distance), flight.path.length))
 
 
-def fly_to_end(flight: Airborne) -> SimulatedFlight:
+def fly_to_end(flight: RunningFlight) -> SimulatedFlight:
     """Fly until the flight ends. The same setup always gives the same track, bit for bit.
 
     Raises FlightError if a program does not fly to the end.
@@ -275,7 +275,7 @@ _PATH_MEMORY_FIELDS = (
 _DIVERSION_RECORDS = ("state", "true", "estimated", "commands", "air", "place", "wind", "gusts", "navigation", "memory")
 
 
-class Flight(Airborne):
+class Flight(RunningFlight):
     """A flight by a simulated autopilot: as fast as possible by `simulate`, or live in real time."""
 
     _law: ControlLaw
@@ -312,8 +312,8 @@ class Flight(Airborne):
         # Guidance knows the model, but not the differences of the aircraft from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._trim_at_start(setup, model, gains.reference_airspeed)
-        self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
-        self._law.initialise(self.memory, self._workspace.own)
+        self.guidance_memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
+        self._law.initialise(self.guidance_memory, self._workspace.law_record)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(setup)
         self._fly_ticks = self._make_loop()
@@ -327,7 +327,7 @@ class Flight(Airborne):
         setup: setup with the same aircraft, autopilot, wind and rates.
         local_map: local map of that setup.
         """
-        old_record, old_memory = self._work, self._workspace.own
+        old_record, old_law_record = self._work, self._workspace.law_record
         # The aircraft is in the air, even if the new mission starts with a take-off.
         self._ground_phases, self._law = GroundPhases(), setup.autopilot.model.control_law
         self._prepare_route(setup, self.fdm.aircraft, local_map)
@@ -335,9 +335,9 @@ class Flight(Airborne):
             setattr(self._work, name, getattr(old_record, name))
         self._work.wind.start_time += old_record.timing.tick * self.dt
         for name in _PATH_MEMORY_FIELDS:
-            setattr(self.memory, name, 0)
-        self._law.initialise(self.memory, self._workspace.own)
-        self._law.transfer_state(old_memory, self._workspace.own, setup.route.positions[0])
+            setattr(self.guidance_memory, name, 0)
+        self._law.initialise(self.guidance_memory, self._workspace.law_record)
+        self._law.transfer_state(old_law_record, self._workspace.law_record, setup.route.positions[0])
         self._fly_ticks = self._make_loop()
 
     def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
@@ -349,15 +349,15 @@ class Flight(Airborne):
         if setup.autopilot.speeds.equivalent:
             true_airspeed = start.airspeed * setup.autopilot.speeds.true_airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true_airspeed))
-        level = steady_flight(model, reference_airspeed, start.amsl)
-        if level is None:
+        level_trim = steady_flight(model, reference_airspeed, start.amsl)
+        if level_trim is None:
             reason = f"no level flight at {reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=reference_airspeed)
-        self._start_fdm = partial(self._start_motion, setup, start, level.elevator)
+        self._start_fdm = partial(self._start_motion, setup, start, level_trim.elevator)
         self._start_fdm()
-        memory = self.memory
-        memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
-        memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level).throttle
+        memory = self.guidance_memory
+        memory.trim_elevator, memory.trim_alpha = level_trim.elevator, level_trim.alpha
+        memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level_trim).throttle
         memory.last_airspeed = -1.0
         memory.stall_speed = self.fdm.aircraft.stall_speed
 

@@ -131,7 +131,7 @@ class Workspace:
     block: (n,) numbers of the workspace, of the control law's own record, of the path, and of the wind field.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
-    own: the control law's own record, or None.
+    law_record: the control law's own record, or None.
     path: records of `PATH_ROW`; their number is the largest of the numbers of pieces, nodes and waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
@@ -147,12 +147,12 @@ class Workspace:
         gains: Gains,
         path: FlyByPath,
         waypoints: Records,
-        own: np.dtype[np.record] | None = None,
+        law_dtype: np.dtype[np.record] | None = None,
         field: WindField | None = None,
     ) -> None:
         parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
         rows_of_path = max(map(len, parts.values()))
-        path_begins = WORKSPACE_NUMBERS + (0 if own is None else own.itemsize // 8)
+        path_begins = WORKSPACE_NUMBERS + (0 if law_dtype is None else law_dtype.itemsize // 8)
         packed_field = np.empty(0) if field is None else field.packed()
         # The path's records are a view of the rest of the block, so the field takes a whole number of them.
         row_numbers = PATH_ROW.itemsize // 8
@@ -161,7 +161,8 @@ class Workspace:
         self.block[field_begins : field_begins + packed_field.size] = packed_field
         self.array: Records = self.block[:WORKSPACE_NUMBERS].view(WORKSPACE)
         self.path: Records = self.block[path_begins:field_begins].view(PATH_ROW)
-        self.own: Record = None if own is None else self.block[WORKSPACE_NUMBERS:path_begins].view(own)[0]
+        law_numbers = self.block[WORKSPACE_NUMBERS:path_begins]
+        self.law_record: Record = None if law_dtype is None else law_numbers.view(law_dtype)[0]
         self.record: Record = self.array[0]
         self.record.gains = gains.record()
         self.record.settings.field = 0 if field is None else field_begins

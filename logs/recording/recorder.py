@@ -6,10 +6,11 @@ The same setup and rows give the same bytes, however the rows are split into blo
 
 import contextlib
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
@@ -56,6 +57,8 @@ from logs.verdict.reference_attachment import reference_flights_json
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict, verdict_json
 from world.arrays import Ints
+from world.files import lock_path
+from world.interruption import delay_signals
 
 # Maximum size of a chunk, bytes.
 CHUNK_SIZE = 64 * 1024
@@ -123,7 +126,6 @@ class Recorder:
         self._newest_ns = EPOCH_NS - 1  # log time of the last received row
         self._channels: dict[str, int] = {}
         self._file = path.open("wb", buffering=_BUFFER_BYTES)
-        self._is_open = True
         try:
             # A thinned log is meant to cost little: compress faster, a quarter more bytes for half the time.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
@@ -133,8 +135,9 @@ class Recorder:
             raise
         self._poses = Poses(setup.scenario.origin, self._channels)
         self._flight_events = FlightEvents(setup, self._channels[EVENT_TOPIC])
+        self._is_open = True
 
-    def __enter__(self) -> "Recorder":
+    def __enter__(self) -> Self:
         """Return the recorder itself."""
         return self
 
@@ -320,6 +323,97 @@ class Recorder:
         )
         for content in _chunk_contents(layout):
             self._writer.write_chunk(content)
+
+
+# Reason for the end of a flight that was interrupted.
+INTERRUPTED = "interrupted"
+
+
+class CrashSafeRecorder(Recorder):
+    """Recorder that leaves a valid log if Ctrl-C interrupts the flight, and locks the log against other processes.
+
+    The log of an interrupted flight ends with the last row flown and has no verdict; `planfly check` can judge it.  A
+    log without a row is removed.  After any other error the log stays unfinished; `planfly recover` can read its rows.
+
+    end_reason: reason for the end that the log of an interrupted flight states.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.recording.reader import read_log
+    >>> flown = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "flight.mcap"
+    ...     try:
+    ...         with CrashSafeRecorder(path, flown.setup) as recorder:
+    ...             recorder.write_rows(track_rows(flown.track)[:100])
+    ...             raise KeyboardInterrupt
+    ...     except KeyboardInterrupt:
+    ...         left = read_log(path)
+    >>> left.complete, left.ended, len(left.track)
+    (True, 'interrupted', 100)
+    """
+
+    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
+        """Lock ``path``, then open it as `Recorder` does.  Raises OSError."""
+        self.end_reason = INTERRUPTED
+        self._path = path
+        self._is_open = False
+        self._locks = contextlib.ExitStack()
+        # Do not remove a symbolic link, even if its target does not exist.
+        file_existed = path.exists() or path.is_symlink()
+        try:
+            with delay_signals(), self._errors_with_file_name():
+                path.touch()
+                # Take the lock before the file is emptied, so that a log locked by another process is not changed.
+                self._locks.enter_context(lock_path(path))
+                super().__init__(path, setup, every=every, batch=batch)
+        except BaseException as error:
+            # A signal may have arrived while the log was opened.
+            self.__exit__(type(error), error, None)
+            if not file_existed:
+                path.unlink(missing_ok=True)
+            raise
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close a log whose flight has not been judged, and release its lock."""
+        with self._locks, delay_signals():
+            if not self._is_open:
+                return
+            is_interrupted = kind is not None and issubclass(kind, KeyboardInterrupt)
+            if is_interrupted and self._received_count:
+                super().finish(self.end_reason)
+            else:
+                self.abandon()
+            if is_interrupted and not self._received_count:
+                Path(os.path.realpath(self._path)).unlink(missing_ok=True)
+
+    def write_rows(self, rows: Rows) -> None:
+        """Record rows of the flight, even if a signal arrives."""
+        with delay_signals(), self._errors_with_file_name():
+            super().write_rows(rows)
+
+    def finish(
+        self,
+        end_reason: str,
+        verdict: Verdict | None = None,
+        reference: ReferenceFlights | None = None,
+        returns: DrawnReturns | None = None,
+    ) -> None:
+        """Write the results of a judged flight, and close the log, even if a signal arrives."""
+        with delay_signals(), self._errors_with_file_name():
+            super().finish(end_reason, verdict, reference, returns)
+
+    @contextlib.contextmanager
+    def _errors_with_file_name(self) -> Iterator[None]:
+        """Add the file name to an OSError without one, such as the error of a full disk."""
+        try:
+            yield
+        except OSError as error:
+            if error.filename is not None or error.errno is None:
+                raise
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
 
 
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:

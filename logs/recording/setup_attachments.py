@@ -392,7 +392,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         program=None if stored_autopilot.program is None else ProgramTable.from_dataclass(stored_autopilot.program),
         autopilot=stored_name(setup.autopilot),
         autopilot_version=stored_autopilot.version or None,
-        source=setup.source,
+        source=setup.imported_log,
         mission=MissionTable.from_dataclass(setup.mission),
         route=RouteTable.from_dataclass(setup.route),
         envelope=EnvelopeTable.from_dataclass(setup.envelope),
@@ -445,7 +445,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         nav=file.nav,
         guidance_hz=file.guidance_hz,
         fdm_hz=file.fdm_hz,
-        source=file.source,
+        imported_log=file.source,
     )
     return StoredSetup(setup, file.versions)
 

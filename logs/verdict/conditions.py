@@ -134,18 +134,18 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
     """Return the conditions (aircraft, airspeed, wind, autopilot) under which a flight or unflown mission is judged."""
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
-    source = setup.source
-    if source is None:
+    imported_log = setup.imported_log
+    if imported_log is None:
         return conditions
-    has_flown_airspeed = conditions.airspeed_source == "aircraft" and "airspeed" in source.holds
-    if not source.aircraft_known:
+    has_flown_airspeed = conditions.airspeed_source == "aircraft" and "airspeed" in imported_log.holds
+    if not imported_log.aircraft_known:
         conditions = replace(conditions, aircraft="", mass_kg=None, aircraft_named=False)
     return replace(
         conditions,
         airspeed_source="flight" if has_flown_airspeed else conditions.airspeed_source,
         turbulence=None,
         navigation=None,
-        autopilot=source.program or "not stated",
+        autopilot=imported_log.program or "not stated",
         autopilot_version="",
     )
 

@@ -61,7 +61,7 @@ def judge_flight(
     >>> judge_flight(log.setup, log.track, "completed").headline
     'not flyable: missile Alfa (13.3 s inside its range)'
     """
-    if setup.source is not None:
+    if setup.imported_log is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)
     whole_requirements = requirements or route_requirements(setup, envelope=envelope)
     if not len(track):
@@ -127,7 +127,10 @@ def _level_answers(
         finding.ok is False for finding in flight_findings
     )
     own_answer = LevelAnswer(
-        requirements.setup.autopilot.level, flyable, headline(flight_findings, flyable, notes), undecided=undecided
+        requirements.setup.autopilot.answer_name,
+        flyable,
+        headline(flight_findings, flyable, notes),
+        undecided=undecided,
     )
     return (*levels, own_answer)
 

@@ -86,7 +86,7 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     notes = setup_notes(setup, findings)
     levels = (
         LevelAnswer("geometry", passes, headline(route_findings, passes, notes)),
-        LevelAnswer(setup.autopilot.level, False, headline(findings, False, notes)),
+        LevelAnswer(setup.autopilot.answer_name, False, headline(findings, False, notes)),
     )
     conditions = judging_conditions(setup)
     lines = summary_lines(findings, setup, "geometric", levels, conditions)

@@ -614,7 +614,7 @@ def suggest_using_less_energy(
         energy = np.fmax(finding.planned, finding.flown)
     envelope = requirements.setup.envelope
     # The energy of an imported log is measured; other energies may be as large as their upper limit with 95 %.
-    is_measured = requirements.setup.source is not None and finding.flown is not None
+    is_measured = requirements.setup.imported_log is not None and finding.flown is not None
     ratio = energy / finding.limit * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
     if ratio <= 1.0:
         return ()

@@ -36,7 +36,7 @@ _LONGEST_SHORT_PART = 2
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
     "geometry": "By geometry only",
-    "airframe": "Airframe alone (planfly's guidance, exact navigation)",
+    "airframe": "Uav alone (planfly's guidance, exact navigation)",
 }
 
 

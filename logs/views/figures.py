@@ -173,7 +173,7 @@ def _map_caption(subject: Subject) -> str:
     """Return the caption of the map, which explains its lines."""
     arc_text = " At corners the two differ: the aircraft flies an arc inside the waypoint."
     flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
-        arc_text if subject.setup.source is None else ""
+        arc_text if subject.setup.imported_log is None else ""
     )
     return subject.text_if_flown(flight_text, "Nothing was flown: the line is the plan.")
 

@@ -15,8 +15,8 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.model_check import shipped_model
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
-from planfly.workflow.airframe import check_level_flight
 from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
+from planfly.workflow.uav import check_level_flight
 from world.argument_types import checks_types
 from world.errors import PlanflyError
 from world.files import absolute_path, write_atomically

@@ -33,7 +33,7 @@ from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
-from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
+from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import FlownMission, PlanThenFly, autopilot_log_path, fly_and_judge
@@ -156,7 +156,7 @@ def fly(
     limits = FlightLimits(options["max_hours"], options["max_log"])
     stated = {name: options[name] for name in ("seed", "log_hz", "max_hours", "max_log", "engine")}
     check_arguments(**stated)
-    program = named_program(options["sitl"])
+    program = None if options["sitl"] is None else check_program(options["sitl"])
     setup = open_flight(mission, options, program, options["engine"])
     target = None if log is None else _prepare_log_file(log, setup, mission, program, overwrite)
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
@@ -350,13 +350,11 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     return Judged(setup, verdict, track=flight.track, is_log=True)
 
 
-def named_program(sitl: str | Path | None) -> Path | None:
-    """Return the checked path of the autopilot program, or None if no program is named.
+def check_program(sitl: str | Path) -> Path:
+    """Return the path of an autopilot program (SITL) that can be run.
 
     Raises FlightError for a file that cannot be run, and MissingExtraError if a package for programs is missing.
     """
-    if sitl is None:
-        return None
     require_extra("live", "--sitl needs")
     program = Path(sitl)
     check_binary(program, program_class_for(program).title)

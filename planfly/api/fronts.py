@@ -15,8 +15,8 @@ from planfly.kernel_units.unit_kernels import FRONT_PLANNING
 from planfly.planning.pareto_plans import make_pareto_plans
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
-from planfly.workflow.airframe import choose_seed, load_airframe
 from planfly.workflow.output_paths import RUN_FOLDER, clean_folder, expand_path_pattern
+from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import plan_json
 from planner.search.plan_front import Front, FrontPlan
 from world.files import write_atomically
@@ -71,12 +71,12 @@ def plan_front(
     check_arguments(front=count, seed=seed, seconds=seconds)
     world = load_scenario_with_options(scenario, options)
     chosen_seed = choose_seed(world, seed)
-    airframe = load_airframe(world)
+    uav = load_uav(world)
     folder = None
     if out is not None:
         folder = clean_folder(expand_path_pattern(out, world.name, chosen_seed), FRONT_FILES, overwrite=overwrite)
     with stage(f"planning a front of {world.name}", "planning a front") as advance:
-        front = make_pareto_plans(world, airframe, chosen_seed, count, advance, stop=stop_condition(seconds, stop))
+        front = make_pareto_plans(world, uav, chosen_seed, count, advance, stop=stop_condition(seconds, stop))
     if folder is not None:
         _write_front(front, world, folder)
     return front

@@ -165,7 +165,7 @@ def refly(
     """
     check_arguments(turbulence=turbulence)
     flight_log = log if isinstance(log, FlightLog) else read_log(log)
-    if flight_log.setup.source is None:
+    if flight_log.setup.imported_log is None:
         message = f"{flight_log.source}: flown by planfly itself; refly expects a log written by `planfly import`"
         raise LogError(message, file=flight_log.source)
     if out is not None:
@@ -176,7 +176,7 @@ def refly(
     lines: list[str] = []
     for number, reflight in enumerate(reflights, 1):
         lines += [*([] if number == 1 else [""]), *refly_lines(reflight)]
-    lines += not_reflown_lines(reflights, flight_log.setup.source.stretches, MAX_REFLOWN_PARTS)
+    lines += not_reflown_lines(reflights, flight_log.setup.imported_log.stretches, MAX_REFLOWN_PARTS)
     files: list[Path] = []
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)

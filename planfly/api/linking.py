@@ -203,7 +203,7 @@ def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
         if track is not None and len(track):
             requirements, aligned = (
                 flown_phases(requirements, track)
-                if setup.source is None
+                if setup.imported_log is None
                 else (requirements, align_track(requirements, track))
             )
         judged = judge_link(requirements, aligned, link_of_scenario, fly_again=fly_return)

@@ -18,9 +18,9 @@ from planfly.planning.expected_failures import expected_failures
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
 from planfly.threat_tables import GivenThreats, threat_tables
-from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_airframe
 from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
+from planfly.workflow.uav import choose_seed, cruise_airspeed, find_aircraft_and_energy, load_uav
 from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
 from planner.search.replan import check_same_mission
@@ -82,7 +82,7 @@ def plan(
     if waypoints is None:
         return _search_and_write(world, scenario, None, options, out, overwrite)
     path, target = _check_waypoints(world, waypoints, options), _plan_target(world, scenario, options, out, overwrite)
-    return _write_plan(make_given_plan(world, load_airframe(world), choose_seed(world, options["seed"]), path), target)
+    return _write_plan(make_given_plan(world, load_uav(world), choose_seed(world, options["seed"]), path), target)
 
 
 # Options of a search, which a path of one's own does not have.
@@ -203,11 +203,11 @@ def _search_and_write(
     flown_plan_and_leg: the plan being flown and the leg to plan from; None for a new plan.
     """
     seed, target = choose_seed(world, options["seed"]), _plan_target(world, source, options, out, overwrite)
-    airframe, should_stop = load_airframe(world), stop_condition(options["seconds"], options["stop"])
+    uav, should_stop = load_uav(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
         plan = make_plan(
             world,
-            airframe,
+            uav,
             seed,
             options["algorithm"],
             advance,
@@ -275,8 +275,8 @@ def failures_to_expect(plan: Plan) -> tuple[str, ...]:
 
     if not plan.safe:
         return ()
-    airframe = load_airframe(plan.scenario)
-    return (*expected_failures(plan, airframe), *steep_landing_failures(plan, airframe))
+    uav = load_uav(plan.scenario)
+    return (*expected_failures(plan, uav), *steep_landing_failures(plan, uav))
 
 
 @checks_types
@@ -291,7 +291,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
         return ()
     if plan.algorithm == GIVEN_WAYPOINTS and plan.certificate.problems:
         return plan.certificate.problems
-    return tuple(explain_failure(plan, load_airframe(plan.scenario).limits.with_margin()))
+    return tuple(explain_failure(plan, load_uav(plan.scenario).limits.with_margin()))
 
 
 def scenarios() -> dict[str, str]:

@@ -281,7 +281,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     if is_log(path):
         log = read_log(path)
         setup, track = log.setup, log.track
-        if setup.source is None:
+        if setup.imported_log is None:
             message = f"{path}: flown by planfly itself: expected a log that `planfly import` wrote"
             raise LogError(message, file=path)
     else:

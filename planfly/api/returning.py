@@ -12,7 +12,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
-from logs.recording.recorder import Recorder
+from logs.recording.recorder import INTERRUPTED, Recorder
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
@@ -34,7 +34,7 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, is_improvement, suggest_parameters, suggest_rally_points
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import check_keywords_not_given, named_program
+from planfly.api.flying import check_keywords_not_given, check_program
 from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log
 from planfly.flight_options import LogOptions, select_log_options, select_mission_options
@@ -49,7 +49,6 @@ from planfly.rtl.sitl_returns import (
 )
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import stage
-from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import FlownMission, fly_and_judge
@@ -281,7 +280,7 @@ def _check_request(
 
     Raises PlanflyError for a folder that is a file or is not empty, and for a program that is not ArduPlane.
     """
-    program = named_program(sitl)
+    program = None if sitl is None else check_program(sitl)
     if program is not None:
         check_is_arduplane(program)
     if out is not None:

@@ -15,15 +15,14 @@ from logs.recording.setup_attachments import package_versions
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.verdict import Verdict, verdict_json
 from planfly.api.exporting import judging_parameters_text
-from planfly.api.flying import named_program
+from planfly.api.flying import check_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
 from planfly.rtl.return_summary import return_summary
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
-from planfly.workflow.airframe import Airframe, choose_seed, load_airframe, with_tightened_limits
-from planfly.workflow.crash_safe_log import FlightLimits, computing_time_key, length_and_duration_text
+from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
 from planfly.workflow.make_plan import make_plan, planning_conditions
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.output_paths import (
@@ -36,6 +35,7 @@ from planfly.workflow.output_paths import (
 from planfly.workflow.pipeline import autopilot_log_path, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
+from planfly.workflow.uav import Uav, choose_seed, load_uav, with_tightened_limits
 from planner.plan import Plan, plan_json
 from world.files import lock_path, write_atomically
 from world.scenario import Scenario
@@ -101,7 +101,7 @@ class _RunTask:
     """Common settings of all rounds.
 
     scenario: the scenario in which each round is judged.
-    airframe: the aircraft of the scenario.
+    uav: the aircraft of the scenario.
     command: the command line that repeats the run, for the report.
     folder: the folder for the results.
     program: program of an autopilot; None for planfly's own simulation.
@@ -112,7 +112,7 @@ class _RunTask:
     """
 
     scenario: Scenario
-    airframe: Airframe
+    uav: Uav
     seed: int
     command: str
     folder: Path
@@ -157,9 +157,9 @@ def run(
         seed=seed, refine=refine, log_hz=options["log_hz"], max_hours=limits.hours, max_log=limits.megabytes
     )
     check_arguments(engine=options["engine"])
-    program = named_program(options["sitl"])
+    program = None if options["sitl"] is None else check_program(options["sitl"])
     world = load_scenario_with_options(scenario, options, program)
-    chosen_seed, airframe = choose_seed(world, seed), load_airframe(world)
+    chosen_seed, uav = choose_seed(world, seed), load_uav(world)
     folder = expand_path_pattern(out, world.name, chosen_seed)
     check_output_folder(folder, overwrite or out == RUN_FOLDER)
     scenario_name = world.name if isinstance(scenario, Scenario) else str(scenario)
@@ -169,7 +169,7 @@ def run(
     reference: FlyReference = "always" if options["levels"] else "failed"
     task = _RunTask(
         world,
-        airframe,
+        uav,
         chosen_seed,
         repeat_command,
         folder,
@@ -208,7 +208,7 @@ def _fly_rounds(
 
     locks: exit stack that holds the lock of the folder from the first plan on.
     """
-    scenario, airframe, folder = task.scenario, task.airframe, task.folder
+    scenario, uav, folder = task.scenario, task.uav, task.folder
     flown_rounds: list[Round] = []
 
     def plan_and_fly_round(planning_scenario: Scenario) -> tuple[Verdict, bool]:
@@ -216,11 +216,9 @@ def _fly_rounds(
 
         planning_scenario: scenario with the limits of this round.
         """
-        planning_airframe = (
-            airframe if planning_scenario is scenario else with_tightened_limits(airframe, planning_scenario)
-        )
+        planning_uav = uav if planning_scenario is scenario else with_tightened_limits(uav, planning_scenario)
         with stage(f"planning {scenario.name}", "planning") as advance:
-            plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
+            plan = make_plan(planning_scenario, planning_uav, task.seed, advance=advance)
         if not flown_rounds:
             folder.mkdir(parents=True, exist_ok=True)
             locks.enter_context(lock_path(folder))
@@ -253,21 +251,21 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
     # Imported here: only the report needs matplotlib.
     from logs.views.report.page import write_report
 
-    folder, airframe = task.folder, task.airframe
+    folder, uav = task.folder, task.uav
     write_atomically(folder / "plan.json", plan_json(plan))
-    mission = mission_of_plan(plan, airframe, "mission.waypoints")
-    mission = replace(mission, autopilot=airframe.autopilot.name)
+    mission = mission_of_plan(plan, uav, "mission.waypoints")
+    mission = replace(mission, autopilot=uav.autopilot.name)
     rally = [folder / "mission.rally"] if mission.rally else []
-    written = replace(mission, cruise_speed=stated_cruise_speed(mission) or airframe.airspeed)
+    written = replace(mission, cruise_speed=stated_cruise_speed(mission) or uav.airspeed)
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_atomically(target, mission_text(written, mission_kind(target)))
-    if plan.ways is not None and airframe.autopilot.parameters is not None:
-        write_atomically(folder / "mission.parm", judging_parameters_text(mission, airframe.autopilot)[0])
+    if plan.procedures is not None and uav.autopilot.parameters is not None:
+        write_atomically(folder / "mission.parm", judging_parameters_text(mission, uav.autopilot)[0])
     if not plan.feasible:
-        verdict = judge_plan_only(plan, planning_conditions(task.scenario, airframe))
+        verdict = judge_plan_only(plan, planning_conditions(task.scenario, uav))
         write_atomically(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
-    setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan, engine=task.engine)
+    setup = make_setup(task.scenario, uav, mission, task.seed, plan=plan, engine=task.engine)
     with stage(f"flying {length_and_duration_text(setup)}", computing_time_key(setup)) as advance:
         flight = fly_and_judge(
             setup,

@@ -50,11 +50,11 @@ from planfly.surveys.survey_text import (
     survey_text,
     usable_segments_text,
 )
-from planfly.workflow.airframe import airframe_for_setup
-from planfly.workflow.crash_safe_log import length_and_duration_text
+from planfly.workflow.flight_limits import length_and_duration_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import FlownMission, fly_and_judge
+from planfly.workflow.uav import uav_of_setup
 from world.errors import ArgumentError, LogError, MissionError, ParameterError
 from world.files import read_small_file, utf8_text, write_atomically
 from world.scenario import Scenario
@@ -201,7 +201,7 @@ def survey(
         what = read_log(Path(what))
     if isinstance(what, FlightLog | FlownMission):
         check_keywords_not_given("flight", fixed_options, _LINES_AS_FLOWN_TEXT)
-        source = what.setup.source
+        source = what.setup.imported_log
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude, so the bank at the photos is unknown", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_with_parallel_lines_as_survey(what.setup.scenario)), own_camera)
@@ -263,7 +263,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
         step_counter = count(1)
         trials = find_survey_remedies(
             flight.setup,
-            airframe_for_setup(setup),
+            uav_of_setup(setup),
             flight.verdict,
             lambda text: advance(next(step_counter), 0.0, text),
             result.overlaps,

@@ -22,18 +22,18 @@ from logs.verdict.conditions import Conditions, judging_conditions
 from planfly.campaigns.campaign_inputs import describe_differences, flatten_inputs, hash_input
 from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
 from planfly.flight_options import MissionOptions, NamedFences, load_scenario_with_options, read_named_fences
-from planfly.workflow.airframe import (
-    Airframe,
-    airframe_for_setup,
-    check_level_flight,
-    choose_seed,
-    load_airframe,
-    max_turn_bank,
-    with_tracking_error,
-)
 from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.workflow.pipeline import OffNominal
+from planfly.workflow.uav import (
+    Uav,
+    check_level_flight,
+    choose_seed,
+    load_uav,
+    max_turn_bank,
+    uav_of_setup,
+    with_tracking_error,
+)
 from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
@@ -58,7 +58,7 @@ class CampaignBase:
     """Mission of a campaign, and the dispersions around it.
 
     scenario: the planned scenario; every flight flies `mission` in this scenario, with its own wind.
-    airframe: the airframe in this scenario.
+    uav: the uav in this scenario.
     placed: the mission placed on the terrain that the planner knows, even if a flight has another terrain.
     plan: the plan of the mission; None for a mission from a file.
     seed: seed of the draws.
@@ -66,7 +66,7 @@ class CampaignBase:
     """
 
     scenario: Scenario
-    airframe: Airframe
+    uav: Uav
     mission: Mission
     placed: PlacedMission
     plan: Plan | None
@@ -79,7 +79,7 @@ class CampaignBase:
 
         Raises PlanflyError for a mission without a valid route.
         """
-        return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
+        return make_setup(self.scenario, self.uav, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
         """Return the nominal conditions of the flights: aircraft, weather, world and autopilot."""
@@ -90,7 +90,7 @@ class CampaignBase:
 
         The inputs are seed, scenario, terrain, mission, aircraft model, autopilot parameters and dispersions.
         """
-        terrain, autopilot = self.scenario.terrain, self.airframe.autopilot
+        terrain, autopilot = self.scenario.terrain, self.uav.autopilot
         parameters = autopilot.parameters
         return flatten_inputs(
             {
@@ -99,7 +99,7 @@ class CampaignBase:
                 "elevations": None if terrain is None else hash_input(terrain.heights.tobytes()),
                 "mission": hash_input(mission_text(self.mission, "waypoints")),
                 "fences": hash_input(repr(self.mission.fences)),
-                "aircraft model": hash_input(model_hash(self.airframe.aircraft)),
+                "aircraft model": hash_input(model_hash(self.uav.aircraft)),
                 "autopilot": f"{autopilot.title} {autopilot.version}",
                 "parameters": {}
                 if parameters is None
@@ -161,11 +161,11 @@ def campaign_of_setup(setup: FlightSetup, dispersions: Dispersions) -> CampaignB
     """
     # Use the name without the folder, because the folder does not affect the flight.
     mission = replace(setup.mission, source=Path(setup.mission.source).name)
-    scenario, airframe = setup.scenario, airframe_for_setup(setup)
+    scenario, uav = setup.scenario, uav_of_setup(setup)
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
-    dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
+    dispersions = with_aircraft_draws(dispersions, uav.aircraft)
     return _check_base(
-        CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
+        CampaignBase(scenario, uav, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
     )
 
 
@@ -183,7 +183,7 @@ def _check_base(base: CampaignBase) -> CampaignBase:
 
 def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
     """Plan a path in a scenario.  Raises MissionError if no feasible path is found."""
-    plan = make_plan(scenario, load_airframe(scenario), choose_seed(scenario, seed), advance=advance)
+    plan = make_plan(scenario, load_uav(scenario), choose_seed(scenario, seed), advance=advance)
     if not plan.feasible:
         raise MissionError(
             f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why", file=scenario.name
@@ -197,11 +197,11 @@ def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersio
     seed: seed of the campaign.
     """
     scenario = plan.scenario
-    airframe = load_airframe(scenario)
-    mission = fences.add_to_mission(mission_of_plan(plan, airframe))
+    uav = load_uav(scenario)
+    mission = fences.add_to_mission(mission_of_plan(plan, uav))
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain)
-    dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
-    return CampaignBase(scenario, airframe, mission, placed_mission, plan, dispersions, seed, scenario.name)
+    dispersions = with_aircraft_draws(dispersions, uav.aircraft)
+    return CampaignBase(scenario, uav, mission, placed_mission, plan, dispersions, seed, scenario.name)
 
 
 def check_level_flight_at_medians(base: CampaignBase) -> None:
@@ -213,8 +213,8 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
     variation = Variation(
         mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
     )
-    aircraft = base.airframe.aircraft
-    check_level_flight(aircraft, base.airframe.limits.envelope)
+    aircraft = base.uav.aircraft
+    check_level_flight(aircraft, base.uav.limits.envelope)
     _check_draws(base)
     try:
         model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
@@ -229,13 +229,13 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             field=quantity,
         ) from error
     amsl = float(base.scenario.start[2])
-    if steady_flight(model, base.airframe.airspeed, amsl) is None:
+    if steady_flight(model, base.uav.airspeed, amsl) is None:
         factors = ", ".join(
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
         raise SpreadError(
             f"{base.dispersions.name}: with the medians of its factors ({factors}) {aircraft.name} cannot fly level at"
-            f" {base.airframe.airspeed:g} m/s",
+            f" {base.uav.airspeed:g} m/s",
             file=base.dispersions.name,
             value=factors,
         )
@@ -251,7 +251,7 @@ def _check_draws(base: CampaignBase) -> None:
     if draws is None:
         return
     try:
-        Fdm(base.airframe.aircraft, variation=Variation(properties=draws.properties(0)))
+        Fdm(base.uav.aircraft, variation=Variation(properties=draws.properties(0)))
     except FlightError as error:
         allowed = f"these draws belong to another aircraft: {error}"
         raise SpreadError(f"{draws.source}: {allowed}", file=draws.source, field=error.field) from error
@@ -297,17 +297,17 @@ class GivenWind(NamedTuple):
 class VariedFlight:
     """A flight with the values of a draw.
 
-    setup, airframe: setup and airframe in the drawn wind and terrain.
+    setup, uav: setup and uav in the drawn wind and terrain.
     off_nominal: drawn differences that the autopilot does not know.
     """
 
     setup: FlightSetup
-    airframe: Airframe
+    uav: Uav
     off_nominal: OffNominal
 
 
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """Apply a draw to a flight: vary its setup, its airframe, and what differs unknown to the autopilot.
+    """Apply a draw to a flight: vary its setup, its UAV, and what differs unknown to the autopilot.
 
     Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`.  The autopilot does not know
     the varied mass, drag, control power, aircraft properties and start position.
@@ -326,17 +326,17 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
         home_error = _terrain_error_at_home(base, terrain)
         if home_error:
             mission, placed = _with_moved_home(base, home_error)
-    battery = base.airframe.battery * values["battery"]
+    battery = base.uav.battery * values["battery"]
     draws = base.dispersions.draws
-    limits = _limits_in_wind(base.airframe, scenario, is_drawn=draws is not None)
-    airframe = replace(base.airframe, limits=limits, battery=battery)
-    setup = make_setup(scenario, airframe, mission, draw.seed, plan=plan, placed=placed)
+    limits = _limits_in_wind(base.uav, scenario, is_drawn=draws is not None)
+    uav = replace(base.uav, limits=limits, battery=battery)
+    setup = make_setup(scenario, uav, mission, draw.seed, plan=plan, placed=placed)
     properties = () if draws is None else draws.properties(draw.seed)
     variation = Variation(
         mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties
     )
     start_offset = (values["start_east"], values["start_north"], values["start_up"])
-    return VariedFlight(setup, airframe, OffNominal(variation, start_offset))
+    return VariedFlight(setup, uav, OffNominal(variation, start_offset))
 
 
 def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: GivenWind | None) -> Scenario:
@@ -418,14 +418,14 @@ def _with_moved_home(base: CampaignBase, home_error: float) -> tuple[Mission, Pl
     return mission, place_stops(mission, base.scenario.origin, terrain, vertical_legs=base.plan is None)
 
 
-def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -> Limits:
-    """Return the airframe's limits in the wind of a scenario.
+def _limits_in_wind(uav: Uav, scenario: Scenario, *, is_drawn: bool) -> Limits:
+    """Return the UAV's limits in the wind of a scenario.
 
     is_drawn: True if the model of the flight's aircraft is drawn at random.
     """
-    old_limits = airframe.limits
+    old_limits = uav.limits
     # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
     exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = exact_envelope if is_drawn else old_limits.envelope
-    limits = make_limits(scenario, envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot))
-    return with_tracking_error(limits, airframe.autopilot, scenario)
+    limits = make_limits(scenario, envelope, old_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
+    return with_tracking_error(limits, uav.autopilot, scenario)

@@ -119,11 +119,11 @@ def fly_for_energy(
     mass_factor: mass of the aircraft with its battery, relative to the stated mass.
     """
     draw = draw_flight(base.dispersions, base.seed, index)
-    endless = replace(base, airframe=replace(base.airframe, battery=_ENDLESS_BATTERY_WH))
+    endless = replace(base, uav=replace(base.uav, battery=_ENDLESS_BATTERY_WH))
     varied = vary_flight(endless, draw, wind)
     variation = varied.off_nominal.variation
     variation = replace(variation, mass=variation.mass * mass_factor)
-    flight = Flight(varied.setup, varied.airframe.aircraft, variation, start_offset=varied.off_nominal.start_offset)
+    flight = Flight(varied.setup, varied.uav.aircraft, variation, start_offset=varied.off_nominal.start_offset)
     flown = fly_to_end(flight)
     track = flown.track
     outcome: Outcome = "flyable" if flown.ended == _COMPLETED else "not flyable"
@@ -291,14 +291,14 @@ def find_battery(base: CampaignBase, goal: BatteryGoal, workers: Workers, advanc
     If the mass changes with the battery, the campaign is repeated with the same draws and the mass of the battery found
     last, until the battery no longer changes.
     """
-    aircraft = base.airframe.aircraft
+    aircraft = base.uav.aircraft
     if not aircraft.battery_voltage > 0.0:
         raise PlanflyError(
             f"{base.name}: {aircraft.name} burns fuel: expected an electric aircraft",
             field="aircraft",
             value=aircraft.name,
         )
-    own_capacity = base.airframe.battery
+    own_capacity = base.uav.battery
     rows = fly_energy_campaign(base, goal, workers, 1.0, advance)
     kept = sum(row.required_capacity(goal.reserve) <= own_capacity for row in rows)
     capacity, interval = quantile_of_capacities(rows, goal)

@@ -123,7 +123,7 @@ def fly_for_excursions(
     varied = vary_flight(base, draw, wind)
     setup, off_nominal = varied.setup, varied.off_nominal
     try:
-        flight = Flight(setup, varied.airframe.aircraft, off_nominal.variation, start_offset=off_nominal.start_offset)
+        flight = Flight(setup, varied.uav.aircraft, off_nominal.variation, start_offset=off_nominal.start_offset)
     except StartError as error:
         return ExcursionRow(draw=draw, outcome="not flyable", ended=str(error))
     flown = fly_to_end(flight)
@@ -134,9 +134,9 @@ def fly_for_excursions(
         return row
     times, positions, velocities = _sampled_flight(flown.track)
     paths = _return_paths(setup, flown.track, interval, glide=glide)
-    airframe = varied.airframe.aircraft
+    uav = varied.uav.aircraft
     sampled = [(positions, velocities), *map(_sampled_return, paths.returns)]
-    half_span = 0.5 * airframe.wing_span
+    half_span = 0.5 * uav.wing_span
     lines = [shapely.LineString(each[:, :2]) for each in (positions, *paths.returns)]
     turns = turn_areas(times, positions, paths.times, paths.turns, interval)
     areas = [*shapely.buffer(lines, half_span), *paths.loiters, *areas_between(paths.returns), *turns]
@@ -148,7 +148,7 @@ def fly_for_excursions(
         """Return the wind at places (n, 3) at the middle of the flight, m/s, (n, 2)."""
         return setup.scenario.wind_velocities(places, np.full(len(places), middle))
 
-    falls = _fall_areas(sampled, airframe, wind_at, terrain)
+    falls = _fall_areas(sampled, uav, wind_at, terrain)
     glides = shapely.buffer([shapely.LineString(glide_path[:, :2]) for glide_path in paths.glides], 1.0)
     fallen_area = shapely.union_all([flown_area, *falls, *glides])
     height = _largest_height(positions, terrain)
@@ -366,7 +366,7 @@ class GroundRiskResult:
     @property
     def aircraft(self) -> Aircraft:
         """Aircraft of the mission."""
-        return self.base.airframe.aircraft
+        return self.base.uav.aircraft
 
     @property
     def lost(self) -> int:
@@ -431,7 +431,7 @@ def find_ground_risk(base: CampaignBase, goal: GroundRiskGoal, workers: Workers,
     Raises ScenarioError without terrain, FlightError if no flight can be flown, and PlanflyError for a population
     raster that cannot be used.
     """
-    scenario, aircraft = base.scenario, base.airframe.aircraft
+    scenario, aircraft = base.scenario, base.uav.aircraft
     if scenario.terrain is None:
         message = f"{base.name}: the heights above ground need terrain: name an elevation file (--terrain)"
         raise ScenarioError(message, file=base.name, field="terrain")
@@ -474,7 +474,7 @@ def nominal_path(base: CampaignBase) -> BaseGeometry:
     Raises FlightError if the flight ends where it starts.
     """
     setup = base.nominal_setup()
-    track = fly_to_end(Flight(setup, base.airframe.aircraft)).track
+    track = fly_to_end(Flight(setup, base.uav.aircraft)).track
     if len(track) < 2:
         raise FlightError(f"{base.name}: the flight ends where it starts", file=base.name)
     _, positions, _ = _sampled_flight(track)
@@ -511,7 +511,7 @@ def _best_glide_ratio(base: CampaignBase) -> float:
     """
     from flight.autopilots.point_mass import make_point_mass
 
-    aircraft, setup = base.airframe.aircraft, base.nominal_setup()
+    aircraft, setup = base.uav.aircraft, base.nominal_setup()
     model = make_point_mass(aircraft, setup.envelope, setup.airspeed, Wind())
     if not model.glides:
         message = f"{aircraft.name}: its model has no trim with the throttle closed, so its glide is unknown"
@@ -536,7 +536,7 @@ def make_volumes(
     path: planned path, and that of the flight without variations, m.
     glide_ratio: best glide ratio; None if glides are not requested.
     """
-    aircraft = base.airframe.aircraft
+    aircraft = base.uav.aircraft
     if not all(math.isfinite(row.height) for row in rows):
         message = f"{base.name}: no ground is known below some flights; name an elevation file that covers them"
         raise ScenarioError(message, file=base.name, field="terrain")

@@ -131,6 +131,6 @@ class CampaignCopy:
             check_fingerprint(self._own_fingerprint, fingerprint(self._aircraft), worker)
             base, fly = pickle.loads(self._packed)
             # The same model, from its folder on this machine.
-            airframe = replace(base.airframe, aircraft=find_aircraft(self._aircraft))
-            self._unpacked = replace(base, airframe=airframe), fly
+            uav = replace(base.uav, aircraft=find_aircraft(self._aircraft))
+            self._unpacked = replace(base, uav=uav), fly
         return self._unpacked

@@ -10,8 +10,8 @@ from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import wilson
 from planfly.planning.expected_failures import HOLDING_PROBABILITY
-from planfly.workflow.airframe import Airframe
 from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.uav import Uav
 from planner.plan import Plan
 
 # Slope of a final above which its landing is flown, rad.  In `benchmarks.planning.plans_in_campaigns`, plans with a
@@ -24,16 +24,16 @@ LANDING_COUNT = 40
 _WAYPOINTS_BEFORE_LANDING = 3
 
 
-def steep_landing_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
+def steep_landing_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     """Return how many landings on a steep final succeed, with what would help, if fewer than 95 % do; otherwise ().
 
     The landing begins in the air before the line-up and has the default dispersions of a campaign.
     """
-    descent = None if plan.ways is None else plan.ways.descent
+    descent = None if plan.procedures is None else plan.procedures.descent
     if not plan.safe or descent is None or math.atan(descent.slope) <= STEEP_FINAL_RAD:
         return ()
-    mission = landing_mission(mission_of_plan(plan, airframe))
-    base = campaign_of_setup(make_setup(plan.scenario, airframe, mission, plan.seed), default_dispersions())
+    mission = landing_mission(mission_of_plan(plan, uav))
+    base = campaign_of_setup(make_setup(plan.scenario, uav, mission, plan.seed), default_dispersions())
     flyable_count = sum(fly_one(base, index).outcome == "flyable" for index in range(LANDING_COUNT))
     if flyable_count >= HOLDING_PROBABILITY * LANDING_COUNT:
         return ()

@@ -140,7 +140,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
 
 def _draw_tracks(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
     """Draw the clearance fan and the crossings of the flights that have a track."""
-    setup = make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
+    setup = make_setup(base.scenario, base.uav, base.mission, base.seed, plan=base.plan, placed=base.placed)
     points = setup.route.positions
     clearances = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _MAX_DRAWN_FLIGHTS)]
     if not clearances:

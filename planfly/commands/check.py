@@ -25,7 +25,7 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_returns_line, print_verdict, print_warnings
+from planfly.terminal.results import print_returns_line, print_warnings
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -88,6 +88,8 @@ def add_check_parser(command_line: LineParser) -> None:
 
 def check(args: argparse.Namespace) -> int:
     """Judge a flight or a mission; return the exit code of the verdict, or 3 for an incomplete log."""
+    from planfly.terminal.verdict_lines import print_verdict
+
     if args.autopilots is not None:
         return _check_for_each_autopilot(args)
     result = call_api(planfly.judge, args)

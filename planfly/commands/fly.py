@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_engine, print_returns_line, print_verdict, print_warnings
+from planfly.terminal.results import print_engine, print_returns_line, print_warnings
 from planfly.workflow.output_paths import FLY_LOG
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ def add_fly_parser(command_line: LineParser) -> None:
 
 def fly(args: argparse.Namespace) -> int:
     """Fly a mission, write its log, and return the exit code of the verdict."""
+    from planfly.terminal.verdict_lines import print_verdict
+
     is_log_named = args.log is not None
     log = args.log if is_log_named else FLY_LOG
     flight = call_api(planfly.fly, args, log=log, overwrite=args.overwrite or not is_log_named)

@@ -18,7 +18,7 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_verdict, warn_about_incomplete_log
+from planfly.terminal.results import warn_about_incomplete_log
 from world.errors import PlanflyError
 from world.wording import count_text
 
@@ -63,6 +63,8 @@ def add_import_log_parser(command_line: LineParser) -> None:
 
 def import_log(args: argparse.Namespace) -> int:
     """Import a log; return the exit code of the verdict, or 3 if part of the log could not be read."""
+    from planfly.terminal.verdict_lines import print_verdict
+
     if args.files is not None:
         return _guess_columns(args)
     if args.target is None:

@@ -18,9 +18,9 @@ from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.rtl.return_summary import return_summary, returns_line
-from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import Uav, find_aircraft_and_energy, load_uav
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FRONT, PARTS, SAMPLE_COUNT, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
@@ -76,10 +76,10 @@ def _make_scenario() -> Scenario:
     return scenario_from_spec(tomllib.loads(SCENARIO_TEXT), "field")
 
 
-def _make_scenario_and_airframe() -> tuple[Scenario, Airframe]:
-    """Return the scenario of `_make_scenario` and its airframe."""
+def _make_scenario_and_airframe() -> tuple[Scenario, Uav]:
+    """Return the scenario of `_make_scenario` and its UAV."""
     scenario = _make_scenario()
-    return scenario, load_airframe(scenario)
+    return scenario, load_uav(scenario)
 
 
 def _compile_problem_kernels() -> None:
@@ -102,14 +102,14 @@ def _compile_rank_kernels() -> None:
 
 def _compile_planner_kernels(part: str) -> None:
     """Compile the kernels of one part of the planner.  part: a name in `PARTS`, or `FRONT`."""
-    scenario, airframe = _make_scenario_and_airframe()
-    call_kernels(part, scenario, airframe.limits)
+    scenario, uav = _make_scenario_and_airframe()
+    call_kernels(part, scenario, uav.limits)
 
 
 def _compile_flight_kernels() -> None:
     """Compile the kernels that fly, judge and record a mission."""
-    scenario, airframe = _make_scenario_and_airframe()
-    setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
+    scenario, uav = _make_scenario_and_airframe()
+    setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     flight = fly_and_judge(setup)
     returns_line(setup, flight.track)
     with Recorder(Path(os.devnull), setup) as recorder:
@@ -119,8 +119,8 @@ def _compile_flight_kernels() -> None:
 
 def _compile_glide_kernels() -> None:
     """Compile the kernels that judge returns and glides."""
-    scenario, airframe = _make_scenario_and_airframe()
-    setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
+    scenario, uav = _make_scenario_and_airframe()
+    setup = make_setup(scenario, uav, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     return_summary(setup, None).data_for_pictures()
 
 

@@ -49,9 +49,9 @@ from logs.verdict.rule_words import rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, noun_with_place
 from planfly.flight_options import MissionOptions, load_scenario_with_options, read_named_fences
-from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
 from planfly.workflow.open_flight import make_setup, open_flight
 from planfly.workflow.reference_flights import explain_verdict
+from planfly.workflow.uav import Uav, choose_seed, load_uav, uav_of_setup
 from world.arrays import Floats
 from world.errors import PlanflyError
 from world.frames import to_geo
@@ -91,7 +91,7 @@ class ServedScenario:
     """
 
     scenario: Scenario
-    airframe: Airframe
+    uav: Uav
     seed: int
     mission: Mission | None
     fence: tuple[MissionItem, ...] = ()
@@ -105,7 +105,7 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
     """
     if options.mission:
         setup = open_flight(options.mission, options.flight_options)
-        return ServedScenario(setup.scenario, airframe_for_setup(setup), setup.seed, setup.mission)
+        return ServedScenario(setup.scenario, uav_of_setup(setup), setup.seed, setup.mission)
     scenario_name = options.flight_options.get("scenario")
     if scenario_name is None:
         allowed = "expected a mission, or `scenario` NAME, in which to wait for the upload of a mission"
@@ -114,19 +114,19 @@ def load_served_scenario(options: ServeOptions) -> ServedScenario:
     scenario = load_scenario_with_options(scenario_name, options.flight_options)
     scenario, seed = fences.add_to_scenario(scenario), options.flight_options.get("seed")
     chosen_seed = choose_seed(scenario, seed)
-    return ServedScenario(scenario, load_airframe(scenario), chosen_seed, None, fences.items, fences.rally)
+    return ServedScenario(scenario, load_uav(scenario), chosen_seed, None, fences.items, fences.rally)
 
 
 def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float]) -> dict[str, float]:
     """Return the values of the autopilot's parameters by name, with `stated_values` applied.
 
-    The cruise airspeed is the airspeed of the airframe.  Raises PlanflyError for values that are not allowed.
+    The cruise airspeed is the airspeed of the UAV.  Raises PlanflyError for values that are not allowed.
     """
-    airframe = load_airframe(scenario, stated_values)
-    parameters = airframe.autopilot.parameters
+    uav = load_uav(scenario, stated_values)
+    parameters = uav.autopilot.parameters
     values = {} if parameters is None else {parameter.name: parameter.value for parameter in parameters.values}
-    cruise = airframe.autopilot.speeds.cruise_parameter
-    return values | {cruise: airframe.airspeed} if cruise in values else values
+    cruise = uav.autopilot.speeds.cruise_parameter
+    return values | {cruise: uav.airspeed} if cruise in values else values
 
 
 def run_flight_process(connection: Connection, options: ServeOptions) -> None:
@@ -151,10 +151,10 @@ class ServedFlights:
     def __init__(self, options: ServeOptions) -> None:
         self._served = load_served_scenario(options)
         self._logs = options.logs
-        # Airframe with the parameters of the last judged mission.
-        self._airframe = self._served.airframe
+        # Uav with the parameters of the last judged mission.
+        self._uav = self._served.uav
         self._parameters: tuple[tuple[str, float], ...] = ()
-        self.aircraft = self._airframe.aircraft
+        self.aircraft = self._uav.aircraft
         self.speed = options.speed
 
     def warm_up(self) -> None:
@@ -176,7 +176,7 @@ class ServedFlights:
             for number, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
-            setup = make_setup(scenario, self._airframe, Mission(None, items), self._served.seed)
+            setup = make_setup(scenario, self._uav, Mission(None, items), self._served.seed)
             judge_geometry(setup)
             rows, _ = Flight(setup, self.aircraft).fly_block(30)
             judge_flight(setup, as_track(rows), "warm")
@@ -190,9 +190,9 @@ class ServedFlights:
         served_scenario = self._served
         try:
             if request.parameters != self._parameters:
-                self._airframe = load_airframe(served_scenario.scenario, dict(request.parameters))
+                self._uav = load_uav(served_scenario.scenario, dict(request.parameters))
                 self._parameters = request.parameters
-            setup = make_setup(served_scenario.scenario, self._airframe, request.mission, served_scenario.seed)
+            setup = make_setup(served_scenario.scenario, self._uav, request.mission, served_scenario.seed)
             # The first tick shows if the flight can start, and compiles the flight loop.
             flight = Flight(setup, self.aircraft)
             flight.fly_block(1)
@@ -234,9 +234,7 @@ class ServedFlights:
             items = (_loiter_item(start_item, request.center),)
         mission = replace(request.mission, items=(start_item, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
-        setup = make_setup(
-            without_ground_phases(served_scenario.scenario), self._airframe, mission, served_scenario.seed
-        )
+        setup = make_setup(without_ground_phases(served_scenario.scenario), self._uav, mission, served_scenario.seed)
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":

@@ -57,15 +57,15 @@ def _make_vehicle(
     link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
     """Return the vehicle for the stations, still without a mission.  speed: multiple of real time."""
-    airframe = served_scenario.airframe
-    autopilot_settings = airframe.autopilot.parameters
+    uav = served_scenario.uav
+    autopilot_settings = uav.autopilot.parameters
     parameters = vehicle_parameters(
         autopilot_values=partial(autopilot_parameters, served_scenario.scenario),
         not_simulated=() if autopilot_settings is None else autopilot_settings.not_simulated,
-        airspeed=airframe.airspeed,
-        min_airspeed=airframe.aircraft.airspeed_min,
-        max_airspeed=airframe.aircraft.airspeed_max,
-        max_bank_deg=math.degrees(airframe.max_bank),
+        airspeed=uav.airspeed,
+        min_airspeed=uav.aircraft.airspeed_min,
+        max_airspeed=uav.aircraft.airspeed_max,
+        max_bank_deg=math.degrees(uav.max_bank),
         system=SYSTEM,
         speed=speed,
     )
@@ -75,8 +75,8 @@ def _make_vehicle(
         pool.spawn,
         parameters,
         standby,
-        airframe.battery,
-        airframe.aircraft.battery_voltage,
+        uav.battery,
+        uav.aircraft.battery_voltage,
         lambda text: on_message(f"{time.strftime('%H:%M:%S')} {text}"),
     )
 

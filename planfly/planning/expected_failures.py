@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 
 from logs.verdict.tolerances import TOUCHDOWN_ERROR_M
-from planfly.workflow.airframe import Airframe
+from planfly.workflow.uav import Uav
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
@@ -30,25 +30,25 @@ _SIGMAS_OF_95_PERCENT = 1.96
 _STRIP_STEP_M = 10.0
 
 
-def expected_failures(plan: Plan, airframe: Airframe) -> tuple[str, ...]:
+def expected_failures(plan: Plan, uav: Uav) -> tuple[str, ...]:
     """Return the known causes of failures of a safe plan, each with a remedy; () if the plan is not safe.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> airframe = load_airframe(scenario)
-    >>> expected_failures(plan_path(scenario, airframe.limits, seed=1), airframe)[0][:57]
+    >>> uav = load_uav(scenario)
+    >>> expected_failures(plan_path(scenario, uav.limits, seed=1), uav)[0][:57]
     'flights are expected to fail, because the limits of the s'
     """
     if not plan.safe:
         return ()
-    return tuple(text for text in (_loose_limits_text(plan, airframe), _short_strip_text(plan)) if text)
+    return tuple(text for text in (_loose_limits_text(plan, uav), _short_strip_text(plan)) if text)
 
 
-def _loose_limits_text(plan: Plan, airframe: Airframe) -> str:
+def _loose_limits_text(plan: Plan, uav: Uav) -> str:
     """Describe the first part of a plan that the scenario's limits allow but the aircraft cannot fly; or ""."""
-    limits = airframe.limits
+    limits = uav.limits
     aircraft_limits = replace(limits, max_turn=None, max_climb=None, max_dive=None, tracking=None)
     if (limits.max_turn, limits.max_climb, limits.max_dive) == (None, None, None):
         return ""
@@ -63,7 +63,10 @@ def _loose_limits_text(plan: Plan, airframe: Airframe) -> str:
 
 def _short_strip_text(plan: Plan) -> str:
     """Explain why a strip is too short for the expected touchdowns; return "" if it is long enough."""
-    strip, descent = plan.scenario.landing, None if plan.ways is None else plan.ways.descent
+    strip, descent = (
+        plan.scenario.landing,
+        None if plan.procedures is None else plan.procedures.descent,
+    )
     if strip is None or descent is None:
         return ""
     room, turbulence = 0.5 * strip.length - TOUCHDOWN_ERROR_M, plan.scenario.wind.turbulence

@@ -17,7 +17,7 @@ import numpy as np
 from aircraft.path_limits import Limits, turn_tangents
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.gust_height import MIN_SPARE_RATE_SIGMAS, gust_deviation
-from planfly.workflow.airframe import Airframe
+from planfly.workflow.uav import Uav
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_pieces
 from planner.evaluation.certify import certify, kill_distance
@@ -78,7 +78,7 @@ class Shortfall(NamedTuple):
     is_threat: bool = False
 
 
-def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
+def ensure_altitude_margin(plan: Plan, uav: Uav, search: Search | None = None) -> Plan:
     """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust.
 
     This is the given plan, or another plan that `search` finds.
@@ -87,34 +87,34 @@ def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None
 
     search: function that plans the same scenario within other limits; None to search for no other path.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> airframe = load_airframe(scenario)
-    >>> plan = plan_path(scenario, airframe.limits, seed=1)
-    >>> ensure_altitude_margin(plan, airframe) is plan
+    >>> uav = load_uav(scenario)
+    >>> plan = plan_path(scenario, uav.limits, seed=1)
+    >>> ensure_altitude_margin(plan, uav) is plan
     True
     """
-    if not plan.safe or not _gusts_displace_aircraft(plan, airframe):
+    if not plan.safe or not _gusts_displace_aircraft(plan, uav):
         return plan
-    if problem_text := _climb_problem_text(plan, airframe):
+    if problem_text := _climb_problem_text(plan, uav):
         return _with_problems(plan, [problem_text])
-    shortfalls = find_shortfalls(plan, airframe)
+    shortfalls = find_shortfalls(plan, uav)
     if not shortfalls:
         return plan
     if search is not None and not any(shortfall.end_name for shortfall in shortfalls):
-        other_plan = _search_other_plan(plan, airframe, search, shortfalls)
+        other_plan = _search_other_plan(plan, uav, search, shortfalls)
         if other_plan is not None:
             return other_plan
-    return _with_problems(plan, [_shortfall_text(shortfall, plan, airframe) for shortfall in shortfalls])
+    return _with_problems(plan, [_shortfall_text(shortfall, plan, uav) for shortfall in shortfalls])
 
 
-def _gusts_displace_aircraft(plan: Plan, airframe: Airframe) -> bool:
+def _gusts_displace_aircraft(plan: Plan, uav: Uav) -> bool:
     """Return True if gusts may displace an aircraft that has no climb or sink rate in reserve."""
     return any(
         displacement(0.0, plan.scenario.wind.turbulence)
-        for _, displacement in _gust_displacements(plan.scenario, airframe.autopilot)
+        for _, displacement in _gust_displacements(plan.scenario, uav.autopilot)
     )
 
 
@@ -140,7 +140,7 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
-def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
+def _climb_problem_text(plan: Plan, uav: Uav) -> str:
     """Describe the problem of an aircraft that climbs too slowly for any margin against downdrafts.
 
     Return "" for any other aircraft.
@@ -150,9 +150,9 @@ def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
     did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
-    climb_rate = airframe.limits.with_margin().max_climb_and_sink_rates(amsl)[0]
+    climb_rate = uav.limits.with_margin().max_climb_and_sink_rates(amsl)[0]
     min_climb_rate = MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence)
-    if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
+    if climb_rate >= min_climb_rate or not uav.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
         f"the aircraft climbs at most {climb_rate:.2f} m/s at {amsl:.0f} m; with less than {min_climb_rate:.2f} m/s,"
@@ -161,7 +161,7 @@ def _climb_problem_text(plan: Plan, airframe: Airframe) -> str:
     )
 
 
-def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
+def _search_other_plan(plan: Plan, uav: Uav, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
     """Search for a plan without shortfalls, within limits that leave climb and sink rate unused.
 
     Returns None if no such plan is found.
@@ -169,14 +169,14 @@ def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfall
     shortfalls: shortfalls of the given plan.
     """
     fractions = [_UNUSED_CLIMB_FRACTION]
-    if _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+    if _exceeds_height_limit(plan, limits_in_gusts(plan, uav).reserve_height):
         fractions.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
     all_shortfalls = list(shortfalls)
     for unused_fraction, from_threats in product(fractions, (False, True)):
         # Most paths pass missiles and zones at the side, so a margin above them is required only if a path led above.
         if from_threats and not any(shortfall.is_threat for shortfall in all_shortfalls):
             continue
-        search_limits = limits_in_gusts(plan, airframe, unused_fraction)
+        search_limits = limits_in_gusts(plan, uav, unused_fraction)
         # Without a maximum height, the limits without a margin at threats only leave sink rate unused.
         has_only_threats = (
             all(shortfall.is_threat for shortfall in shortfalls) and plan.scenario.limits.max_height_m is None
@@ -186,7 +186,7 @@ def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfall
         other_plan = search(_with_margin_at_threats(search_limits) if from_threats else search_limits)
         if not other_plan.safe:
             continue
-        remaining = find_shortfalls(other_plan, airframe)
+        remaining = find_shortfalls(other_plan, uav)
         if not remaining:
             return other_plan
         all_shortfalls += remaining
@@ -216,12 +216,12 @@ def _exceeds_height_limit(plan: Plan, height_change: float) -> bool:
     return bool((inner_points[:, 2] + height_change > np.minimum.reduce(limits)).any())
 
 
-def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
+def limits_in_gusts(plan: Plan, uav: Uav, unused_fraction: float = _UNUSED_CLIMB_FRACTION) -> Limits:
     """Return search limits for paths with the margin that gusts need at the plan's altitude.
 
     unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
-    limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
+    limits, autopilot, turbulence = uav.limits.with_margin(), uav.autopilot, plan.scenario.wind.turbulence
     climb, sink = limits.max_climb_and_sink_rates(float(plan.waypoints[:, 2].max()))
     deviation = gust_deviation(turbulence)
     for gust, displacement in _gust_displacements(plan.scenario, autopilot):
@@ -240,13 +240,13 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
     return limits
 
 
-def limits_for_alternatives(plan: Plan, airframe: Airframe) -> Limits:
+def limits_for_alternatives(plan: Plan, uav: Uav) -> Limits:
     """Return search limits for alternatives to a safe plan: the tightest limits that this plan meets."""
-    limits = airframe.limits.with_margin()
-    if not _gusts_displace_aircraft(plan, airframe):
+    limits = uav.limits.with_margin()
+    if not _gusts_displace_aircraft(plan, uav):
         return limits
     for unused_fraction in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
-        gust_limits = limits_in_gusts(plan, airframe, unused_fraction)
+        gust_limits = limits_in_gusts(plan, uav, unused_fraction)
         for candidate in (_with_margin_at_threats(gust_limits), gust_limits):
             if certify(make_problem(plan.scenario, candidate), plan.waypoints).ok:
                 return candidate
@@ -273,13 +273,13 @@ class _Parts(NamedTuple):
     margin_after: Floats
 
 
-def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
+def find_shortfalls(plan: Plan, uav: Uav) -> list[Shortfall]:
     """Find where each kind of gust displaces the aircraft deepest into each kind of hazard, if at all.
 
     Hazards are the required clearance, the maximum height, missiles and zones.  Only displacements into a hazard are
     returned.
     """
-    limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
+    limits, autopilot, turbulence = uav.limits.with_margin(), uav.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.max_climb_and_sink_rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
     climbs, shortfalls = limits.leg_climb_rates(plan.waypoints), list[Shortfall | None]()
@@ -451,7 +451,7 @@ def _gust_paths(parts: _Parts) -> list[Floats]:
     return [np.ascontiguousarray(parts.points + displacement * step / step_count) for step in range(1, step_count + 1)]
 
 
-def _shortfall_text(shortfall: Shortfall, plan: Plan, airframe: Airframe) -> str:
+def _shortfall_text(shortfall: Shortfall, plan: Plan, uav: Uav) -> str:
     """Describe a shortfall and its remedies in one line."""
     ability_text = "climbs better" if shortfall.gust == "downdrafts" else "sinks faster"
     remedies = f"less turbulence, an aircraft that {ability_text}"
@@ -459,7 +459,7 @@ def _shortfall_text(shortfall: Shortfall, plan: Plan, airframe: Airframe) -> str
     if shortfall.end_name:
         direction = "higher" if shortfall.gust == "downdrafts" else "lower"
         remedies += f" or a {shortfall.end_name} that is {math.ceil(shortfall.depth)} m {direction}"
-    elif is_below_height_limit or _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+    elif is_below_height_limit or _exceeds_height_limit(plan, limits_in_gusts(plan, uav).reserve_height):
         remedies += " or a higher limit on its height"
     else:
         remedies = f"less turbulence, or an aircraft that {ability_text},"

@@ -14,7 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.mission.from_plan import corner_speeds
 from logs.verdict.trials import first_that_passes
-from planfly.workflow.airframe import Airframe
+from planfly.workflow.uav import Uav
 from planner.plan import Plan
 from planner.search.fewer_waypoints import drop_waypoints
 from world.geometry import turning_angles
@@ -31,7 +31,7 @@ _TRIED_ALTITUDE_RADII_M = range(5, 105, 5)
 
 def limit_waypoint_orbits(
     plan: Plan,
-    airframe: Airframe,
+    uav: Uav,
     search: Callable[[Scenario], Plan] | None = None,
     search_limits: Limits | None = None,
     *,
@@ -48,16 +48,16 @@ def limit_waypoint_orbits(
     search_limits: limits within which the plan was made; None for the limits of the aircraft.
     keeps_waypoints: True to keep the waypoints of the plan, and to reject it if they are too many.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> airframe = load_airframe(scenario)
-    >>> plan = plan_path(scenario, airframe.limits, seed=1)
-    >>> limit_waypoint_orbits(plan, airframe) is plan
+    >>> uav = load_uav(scenario)
+    >>> plan = plan_path(scenario, uav.limits, seed=1)
+    >>> limit_waypoint_orbits(plan, uav) is plan
     True
     """
-    autopilot, limits = airframe.autopilot, airframe.limits.with_margin()
+    autopilot, limits = uav.autopilot, uav.limits.with_margin()
     orbits = expected_orbits(plan, autopilot, limits)
     if not plan.safe or orbits == 0.0:
         return plan
@@ -66,11 +66,11 @@ def limit_waypoint_orbits(
         has_usual_count = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return (
             plan
-            if has_usual_count or _is_safe_in_gusts(plan, airframe)
-            else _with_problem(plan, _corridor_problem_text(plan, airframe))
+            if has_usual_count or _is_safe_in_gusts(plan, uav)
+            else _with_problem(plan, _corridor_problem_text(plan, uav))
         )
     shorter_plan = plan if keeps_waypoints else drop_waypoints(plan, limits if search_limits is None else search_limits)
-    if _is_safe_in_gusts(shorter_plan, airframe):
+    if _is_safe_in_gusts(shorter_plan, uav):
         return shorter_plan
     remaining_orbits = expected_orbits(shorter_plan, autopilot, limits)
     count = len(shorter_plan.waypoints) - 2
@@ -79,7 +79,7 @@ def limit_waypoint_orbits(
         allowed_count, scenario = max(1, int(MAX_EXPECTED_ORBITS * count / remaining_orbits)), plan.scenario
         planner_table = scenario.planner.model_copy(update={"waypoints": allowed_count + 2})
         other_plan = replace(search(replace(scenario, planner=planner_table)), scenario=scenario)
-        if other_plan.safe and _is_safe_in_gusts(other_plan, airframe):
+        if other_plan.safe and _is_safe_in_gusts(other_plan, uav):
             return other_plan
     return _with_problem(plan, _orbit_problem_text(plan, autopilot, limits))
 
@@ -90,27 +90,27 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
 
-def _is_safe_in_gusts(plan: Plan, airframe: Airframe) -> bool:
+def _is_safe_in_gusts(plan: Plan, uav: Uav) -> bool:
     """Return True if a plan has few enough expected orbits, and its corners stay in the corridor.
 
     At most `MAX_EXPECTED_ORBITS` are accepted.
     """
-    if expected_orbits(plan, airframe.autopilot, airframe.limits.with_margin()) > MAX_EXPECTED_ORBITS:
+    if expected_orbits(plan, uav.autopilot, uav.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
-    return max(_corner_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
+    return max(_corner_excursions(plan, uav), default=0.0) <= _plan_corridor_half_width(plan, uav)
 
 
-def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
+def _plan_corridor_half_width(plan: Plan, uav: Uav) -> float:
     """Return the maximum distance from the legs for a flight of the plan, m."""
-    return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.turns.acceptance_radius)
+    return corridor_half_width(plan.scenario.limits.corridor_m, uav.autopilot.turns.acceptance_radius)
 
 
-def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
+def _corner_excursions(plan: Plan, uav: Uav) -> list[float]:
     """Return the largest distance from the legs at each corner in gusts, m.
 
     The result is empty without a tracking error.
     """
-    limits = airframe.limits
+    limits = uav.limits
     if (tracking := limits.tracking) is None:
         return []
     turns = turning_angles(plan.waypoints)
@@ -121,14 +121,14 @@ def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
     ]
 
 
-def _corridor_problem_text(plan: Plan, airframe: Airframe) -> str:
+def _corridor_problem_text(plan: Plan, uav: Uav) -> str:
     """Return the problem text on the corner with the largest distance from the legs."""
-    excursions = _corner_excursions(plan, airframe)
+    excursions = _corner_excursions(plan, uav)
     max_excursion = max(excursions)
     return (
-        f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {max_excursion:.0f} m off"
+        f"in {plan.scenario.wind.turbulence} turbulence {uav.autopilot.title} is {max_excursion:.0f} m off"
         f" the legs at the corner of waypoint {1 + excursions.index(max_excursion)}; the corridor is"
-        f" {_plan_corridor_half_width(plan, airframe):.0f} m"
+        f" {_plan_corridor_half_width(plan, uav):.0f} m"
     )
 
 
@@ -148,22 +148,22 @@ def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     return orbits
 
 
-def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
+def max_waypoints_in_gusts(plan: Plan, uav: Uav) -> int:
     """Return the maximum number of waypoints, including the ends, for alternatives to a safe plan.
 
     The probability of an orbit is that of level flight.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> airframe = load_airframe(scenario)
-    >>> max_waypoints_in_gusts(plan_path(scenario, airframe.limits, seed=1), airframe)
+    >>> uav = load_uav(scenario)
+    >>> max_waypoints_in_gusts(plan_path(scenario, uav.limits, seed=1), uav)
     22
     """
     scenario, count = plan.scenario, len(plan.waypoints)
-    climb, sink = airframe.limits.with_margin().max_climb_and_sink_rates(float(plan.waypoints[:, 2].max()))
-    probability = airframe.autopilot.deviations.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
+    climb, sink = uav.limits.with_margin().max_climb_and_sink_rates(float(plan.waypoints[:, 2].max()))
+    probability = uav.autopilot.deviations.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
     if probability == 0.0:
         return count
     return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / probability)))

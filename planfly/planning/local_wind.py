@@ -17,8 +17,8 @@ from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
-from planfly.workflow.airframe import Airframe
 from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.uav import Uav
 from planner.plan import Plan
 from world.arrays import Floats
 from world.scenario import Scenario
@@ -37,42 +37,42 @@ _MAX_DURATION_RATIO = 1.5
 _MIN_GROUND_SPEED_MPS = 1.0
 
 
-def ensure_local_wind(plan: Plan, airframe: Airframe, search: Callable[[Airframe], Plan] | None = None) -> Plan:
+def ensure_local_wind(plan: Plan, uav: Uav, search: Callable[[Uav], Plan] | None = None) -> Plan:
     """Return a plan whose slopes and turns can be flown in the local wind of its scenario's forecast.
 
     This is the given plan, or another plan that `search` finds.  If no such plan is found, the given plan is returned
     as not safe, with the reasons in its certificate.  Without a forecast, the given plan is returned.
 
-    search: function that plans the same scenario for an airframe with other limits; None to search for no other path.
+    search: function that plans the same scenario for a UAV with other limits; None to search for no other path.
 
     Raises ForecastError if the flight of a plan leaves the box, the levels or the times of the forecast.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> airframe = load_airframe(scenario)
-    >>> plan = plan_path(scenario, airframe.limits, seed=1)
-    >>> ensure_local_wind(plan, airframe) is plan
+    >>> uav = load_uav(scenario)
+    >>> plan = plan_path(scenario, uav.limits, seed=1)
+    >>> ensure_local_wind(plan, uav) is plan
     True
     """
     scenario = plan.scenario
     if scenario.wind.forecast is None:
         return plan
-    requirements = _plan_requirements(plan, airframe)
+    requirements = _plan_requirements(plan, uav)
     failures = _wind_failures(plan, requirements)
     if not plan.safe or not failures:
         return plan
     ratio, searches = 1.0, 0
-    map_ratio = max_ground_speed_ratio(scenario, airframe.limits.airspeed, float(requirements.path.times[-1]))
+    map_ratio = max_ground_speed_ratio(scenario, uav.limits.airspeed, float(requirements.path.times[-1]))
     while search is not None and ratio < map_ratio:
         path_ratio = _path_ground_speed_ratio(requirements) if searches < _PATH_SEARCHES else ratio
         ratio = path_ratio if ratio < path_ratio < map_ratio else map_ratio
         searches = searches + 1
-        other_plan = search(replace(airframe, limits=limits_at_ground_speed(airframe.limits, ratio)))
+        other_plan = search(replace(uav, limits=limits_at_ground_speed(uav.limits, ratio)))
         if not other_plan.safe:
             break
-        requirements = _plan_requirements(other_plan, airframe)
+        requirements = _plan_requirements(other_plan, uav)
         if not _wind_failures(other_plan, requirements):
             return other_plan
     certificate = plan.certificate
@@ -80,11 +80,9 @@ def ensure_local_wind(plan: Plan, airframe: Airframe, search: Callable[[Airframe
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
-def _plan_requirements(plan: Plan, airframe: Airframe) -> RouteRequirements:
+def _plan_requirements(plan: Plan, uav: Uav) -> RouteRequirements:
     """Return the requirements of a plan's mission.  Raises ForecastError as `ensure_local_wind` does."""
-    return route_requirements(
-        make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
-    )
+    return route_requirements(make_setup(plan.scenario, uav, mission_of_plan(plan, uav), plan.seed, plan=plan))
 
 
 def _wind_failures(plan: Plan, requirements: RouteRequirements) -> list[Finding]:

@@ -19,9 +19,9 @@ import numpy as np
 from planfly.arguments import check_arguments
 from planfly.runtime.process_setup import check_script_guard, end_repeated_call
 from planfly.runtime.stages import stage
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.output_paths import check_output_folder, prepare_folder
+from planfly.workflow.uav import load_uav
 from planner.plan import Objectives, Violations
 from planner.search.algorithms import find_algorithm
 from world.argument_types import checks_types
@@ -146,9 +146,9 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
     if algorithm == STRIP_ALGORITHM:
         scenario = with_planner(scenario, STRIP_ALGORITHM, across_m=STRIP_HALF_WIDTHS_M[threats])
         searched_algorithm = PAPER_ALGORITHM
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     start_time = time.process_time()
-    plan = make_plan(scenario, airframe, seed, searched_algorithm)
+    plan = make_plan(scenario, uav, seed, searched_algorithm)
     seconds = time.process_time() - start_time
     return SeededPlan(
         threats=threats,

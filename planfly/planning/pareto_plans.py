@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from planfly.planning.gust_altitude_margin import limits_for_alternatives
 from planfly.planning.gust_orbits import max_waypoints_in_gusts
-from planfly.workflow.airframe import Airframe
 from planfly.workflow.make_plan import Advance, finish_plan, make_plan
+from planfly.workflow.uav import Uav
 from planner.plan import Plan
 from planner.search.plan_front import Front, plan_front
 from planner.search.search_state import StopCondition
@@ -15,7 +15,7 @@ from world.scenario import Scenario
 
 def make_pareto_plans(
     scenario: Scenario,
-    airframe: Airframe,
+    uav: Uav,
     seed: int,
     count: int,
     advance: Advance | None = None,
@@ -30,12 +30,12 @@ def make_pareto_plans(
     than gusts allow.
     stop, continues: see `make_plan`.
     """
-    default_plan = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)
+    default_plan = make_plan(scenario, uav, seed, advance=advance, stop=stop, continues=continues)
 
     def finish_alternative(plan: Plan) -> Plan:
         """Complete an alternative plan; mark it as not safe if it leaves the forecast."""
         try:
-            return finish_plan(plan, airframe, continues=continues)
+            return finish_plan(plan, uav, continues=continues)
         except ForecastError as error:
             # The default plan is within the forecast; an alternative may take longer, or fly higher.
             certificate = plan.certificate
@@ -43,12 +43,12 @@ def make_pareto_plans(
 
     return plan_front(
         scenario,
-        limits_for_alternatives(default_plan, airframe),
+        limits_for_alternatives(default_plan, uav),
         count,
         seed=seed,
         progress=advance,
         stop=stop,
         default=default_plan,
-        waypoints=max_waypoints_in_gusts(default_plan, airframe),
+        waypoints=max_waypoints_in_gusts(default_plan, uav),
         finish=finish_alternative,
     )

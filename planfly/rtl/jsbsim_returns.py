@@ -12,8 +12,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import ReturnWorld
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import Uav, load_uav
 from world.arrays import Floats
 from world.errors import PlanflyError
 from world.frames import to_geo
@@ -58,9 +58,9 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     start: a record of `flight.autopilots.simulated_returns.RETURN_START`.
     """
     try:
-        setup, airframe = return_setup(world, start)
+        setup, uav = return_setup(world, start)
         # The energy is judged by the point mass: an empty battery does not end the flight.
-        flight = fly_to_end(Flight(replace(setup, battery=_ENDLESS_BATTERY_WH), airframe.aircraft))
+        flight = fly_to_end(Flight(replace(setup, battery=_ENDLESS_BATTERY_WH), uav.aircraft))
     except PlanflyError:
         return None
     position = positions_from_start(flight.track, start)
@@ -70,15 +70,13 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     return (min(0.0, approach.clearance) if flight.ended == "ground contact" else approach.clearance), approach.outside
 
 
-def return_setup(
-    world: ReturnWorld, start: Record, landing: LandingStart | None = None
-) -> tuple[FlightSetup, Airframe]:
-    """Make setup and airframe of a return, with a lead-in, flown by the simulated autopilot.
+def return_setup(world: ReturnWorld, start: Record, landing: LandingStart | None = None) -> tuple[FlightSetup, Uav]:
+    """Make setup and UAV of a return, with a lead-in, flown by the simulated autopilot.
 
     The flight is in the mean wind, without turbulence and navigation error.
 
     landing: the landing sequence that ends the return, or None.
-    Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_airframe`.
+    Raises MissionError for a return without a valid route, and the ScenarioError or ParameterError of `load_uav`.
     """
     wind = replace(world.scenario.wind, turbulence="none")
     if wind.field is not None:
@@ -87,8 +85,8 @@ def return_setup(
         times = wind.field.times - (float(start["time"]) - lead_in_time)
         wind = replace(wind, field=replace(wind.field, times=times))
     scenario = replace(world.scenario, wind=wind)
-    airframe = replace(load_airframe(scenario), autopilot=world.autopilot)
-    return replace(make_setup(scenario, airframe, _return_mission(world, start, landing), 1), nav="perfect"), airframe
+    uav = replace(load_uav(scenario), autopilot=world.autopilot)
+    return replace(make_setup(scenario, uav, _return_mission(world, start, landing), 1), nav="perfect"), uav
 
 
 def positions_from_start(track: Track, start: Record) -> Floats | None:

@@ -254,7 +254,7 @@ def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[M
         return mission, context
     plan = parse_plan(data["plan"], "kept", ground=context.scenario.terrain)
     plan = replace(plan, scenario=context.scenario)
-    mission_of_saved_plan = planned_mission(plan, context.planning_airframe(mission))
+    mission_of_saved_plan = planned_mission(plan, context.planning_uav(mission))
     # The autosave keeps all digits, so items that differ mean that the mission was changed after planning.
     return (
         (mission_of_saved_plan, context.with_plan(plan, mission_of_saved_plan))

@@ -23,10 +23,10 @@ from planfly.flight_logs import MCAP_MAGIC, is_log
 from planfly.flight_options import LogOptions, MissionOptions, apply_options, load_scenario_with_options
 from planfly.studio.edit_context import EditContext
 from planfly.studio.settings import changed_settings, settings_json
-from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
+from planfly.workflow.uav import Uav, choose_seed, load_uav, uav_of_setup
 from planner.plan import GROUND_PROBLEMS, Certificate, Objectives, Plan, Violations, plan_json
 from planner.search.plan_path import certify_waypoints
 from world.arrays import Floats
@@ -207,15 +207,15 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
 
 
 def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> FlightSetup:
-    """Return the flight setup of the mission in a log, with the airframe of `scenario`."""
-    return make_setup(scenario, load_airframe(scenario), mission, seed)
+    """Return the flight setup of the mission in a log, with the UAV of `scenario`."""
+    return make_setup(scenario, load_uav(scenario), mission, seed)
 
 
 def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
     """Make a document for a scenario; its mission is a straight line until a path is planned."""
-    airframe, chosen_seed = load_airframe(scenario), choose_seed(scenario, seed)
-    mission = planned_mission(straight_plan(scenario, chosen_seed), airframe)
-    setup = make_setup(scenario, airframe, mission, chosen_seed)
+    uav, chosen_seed = load_uav(scenario), choose_seed(scenario, seed)
+    mission = planned_mission(straight_plan(scenario, chosen_seed), uav)
+    setup = make_setup(scenario, uav, mission, chosen_seed)
     return Document(scenario.name, scenario.name, setup, to_plan=True)
 
 
@@ -227,9 +227,9 @@ def straight_plan(scenario: Scenario, seed: int) -> Plan:
     return Plan(scenario, line, counts, objectives, certificate, seed, "", 0, np.zeros((0, 3)))
 
 
-def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
+def planned_mission(plan: Plan, uav: Uav) -> Mission:
     """Return the mission that flies a plan, named after the scenario of the plan."""
-    return mission_of_plan(plan, airframe, plan.scenario.name)
+    return mission_of_plan(plan, uav, plan.scenario.name)
 
 
 # ----------------------------------------------------------------------
@@ -309,10 +309,10 @@ def _lost_settings(opened_setup: FlightSetup, context: EditContext) -> tuple[str
     Only settings whose values differ from those at the opening are included.
     """
     opened, current = (
-        settings_json(scenario, airframe, context.parameters, {})
-        for scenario, airframe in (
-            (opened_setup.scenario, airframe_for_setup(opened_setup)),
-            (context.scenario, context.airframe),
+        settings_json(scenario, uav, context.parameters, {})
+        for scenario, uav in (
+            (opened_setup.scenario, uav_of_setup(opened_setup)),
+            (context.scenario, context.uav),
         )
     )
     names = changed_settings(opened, current)
@@ -333,9 +333,7 @@ def _saved_parameters(name: str, context: EditContext) -> SavedFile:
     """
     if not context.parameters.values:
         raise PlanflyError("no parameter was set in the studio: set one under Settings", field="form")
-    return SavedFile(
-        name, context.parameters.text(f"set in planfly studio for {context.airframe.autopilot.title}").encode()
-    )
+    return SavedFile(name, context.parameters.text(f"set in planfly studio for {context.uav.autopilot.title}").encode())
 
 
 def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) -> SavedFile:
@@ -345,7 +343,7 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
         return SavedFile(name, plan_json(plan).encode())
     new_plan = make_certified_plan(context, judged_mission)
     has_changed_items = (
-        not context.planned or planned_mission(new_plan, context.airframe).items != judged_mission.mission.items
+        not context.planned or planned_mission(new_plan, context.uav).items != judged_mission.mission.items
     )
     losses = ["the items: a plan stores only positions, and its mission is made from them"] if has_changed_items else []
     if new_plan.failures:
@@ -403,7 +401,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
 
 def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
     """Return a plan with the given waypoints (w, 3), m, certified in the scenario of the editing context."""
-    return certify_waypoints(context.scenario, context.airframe.limits.with_margin(), waypoints, seed=context.seed)
+    return certify_waypoints(context.scenario, context.uav.limits.with_margin(), waypoints, seed=context.seed)
 
 
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
@@ -417,11 +415,15 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
     opened_plan = context.opened_setup.plan
     if (
         opened_plan is None
-        or opened_plan.ways is None
-        or (opened_plan.ways.climb, opened_plan.ways.descent) == (None, None)
+        or opened_plan.procedures is None
+        or (opened_plan.procedures.climb, opened_plan.procedures.descent) == (None, None)
     ):
         return None
-    climb, descent, points = opened_plan.ways.climb, opened_plan.ways.descent, context.item_positions(mission)
+    climb, descent, points = (
+        opened_plan.procedures.climb,
+        opened_plan.procedures.descent,
+        context.item_positions(mission),
+    )
     departure_count = 0 if climb is None else 1 + len(climb.waypoints)
     approach_count = 0 if descent is None else len(descent.waypoints) + len(descent.final_waypoints) + 1
     waypoints = points[departure_count : len(points) - approach_count]
@@ -430,14 +432,14 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
         for procedure, ends in ((climb, slice(2)), (descent, slice(-2, None)))
     )
     if is_unchanged:
-        plan = replace(_certified_plan(context, waypoints), ways=opened_plan.ways)
+        plan = replace(_certified_plan(context, waypoints), procedures=opened_plan.procedures)
         ground_problems = [
             problem for problem in opened_plan.certificate.problems if problem.startswith(GROUND_PROBLEMS)
         ]
         plan = replace(
             plan, certificate=replace(plan.certificate, problems=(*plan.certificate.problems, *ground_problems))
         )
-        if _have_same_items(planned_mission(plan, context.airframe), mission):
+        if _have_same_items(planned_mission(plan, context.uav), mission):
             return plan
     reason = (
         "its departure or landing, or a leg next to them, differs from the opened plan: save a .plan, or plan again"

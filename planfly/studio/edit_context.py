@@ -11,9 +11,9 @@ from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
 from planfly.flight_options import NamedFences
 from planfly.studio.settings import ChangedParameters
-from planfly.workflow.airframe import Airframe, airframe_for_setup, with_tracking_error
 from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.open_flight import make_setup, with_landing_parameters
+from planfly.workflow.uav import Uav, uav_of_setup, with_tracking_error
 from planner.plan import Plan
 from world.scenario import Scenario
 
@@ -25,7 +25,7 @@ _DEFAULT_PARAMETERS = ChangedParameters()
 
 @dataclass(frozen=True, slots=True)
 class EditContext(MissionContext):
-    """Scenario, airframe and settings with which an edited mission is judged.
+    """Scenario, UAV and settings with which an edited mission is judged.
 
     terrain: elevation file that the user named for a mission without a scenario, or None.
     fences: fences that the user named; their zones are added to every scenario that is made around the mission.
@@ -43,7 +43,7 @@ class EditContext(MissionContext):
         """Make the editing context of an opened mission or plan."""
         return cls(
             setup.scenario,
-            airframe_for_setup(setup),
+            uav_of_setup(setup),
             setup.seed,
             setup,
             planned=setup.plan is not None,
@@ -56,17 +56,17 @@ class EditContext(MissionContext):
 
         The new context has no plan, because the certificate of a plan applies only to the scenario it was made for.
         """
-        airframe = parameters.load_airframe(scenario)
-        setup = make_setup(scenario, airframe, self.opened_setup.mission, self.seed)
-        return replace(self, scenario=scenario, airframe=airframe, opened_setup=setup, parameters=parameters)
+        uav = parameters.load_uav(scenario)
+        setup = make_setup(scenario, uav, self.opened_setup.mission, self.seed)
+        return replace(self, scenario=scenario, uav=uav, opened_setup=setup, parameters=parameters)
 
     def with_plan(self, plan: Plan, mission: Mission) -> "EditContext":
         """Return the context with a new plan, whose certificate applies until the mission is changed."""
-        setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
+        setup = make_setup(self.scenario, self.uav, mission, self.seed, plan=plan)
         return replace(self, opened_setup=setup, planned=True)
 
-    def planning_airframe(self, mission: Mission, index: int | None = None) -> Airframe:
-        """Return the airframe at the commanded airspeed of a mission, for planning a new path.
+    def planning_uav(self, mission: Mission, index: int | None = None) -> Uav:
+        """Return the UAV at the commanded airspeed of a mission, for planning a new path.
 
         index: index of the item at which the path starts; None for the airspeed of the first leg.
         """
@@ -76,10 +76,10 @@ class EditContext(MissionContext):
             leg = int(legs_from_item[-1]) if legs_from_item.size else 0
         airspeed = float(route.leg_airspeeds[leg])
         # A mission states its airspeed in thousandths.
-        if abs(airspeed - self.airframe.airspeed) < 1e-3:
-            return self.airframe
-        limits = replace(self.airframe.limits, airspeed=airspeed)
-        return replace(self.airframe, limits=with_tracking_error(limits, self.airframe.autopilot, self.scenario))
+        if abs(airspeed - self.uav.airspeed) < 1e-3:
+            return self.uav
+        limits = replace(self.uav.limits, airspeed=airspeed)
+        return replace(self.uav, limits=with_tracking_error(limits, self.uav.autopilot, self.scenario))
 
     def with_area_around_mission(self, mission: Mission) -> "EditContext":
         """Return a context whose scenario has an area that contains the mission.
@@ -109,9 +109,9 @@ class EditContext(MissionContext):
     # ------------------------------------------------------------------
     # Verdicts while a mission is dragged.
 
-    def airframe_for_mission(self, mission: Mission) -> Airframe:
-        """Return the airframe with the autopilot's landing parameters for a mission, as in `make_setup`."""
-        return replace(self.airframe, autopilot=with_landing_parameters(self.airframe.autopilot, mission))
+    def airframe_for_mission(self, mission: Mission) -> Uav:
+        """Return the UAV with the autopilot's landing parameters for a mission, as in `make_setup`."""
+        return replace(self.uav, autopilot=with_landing_parameters(self.uav.autopilot, mission))
 
     def route(self, mission: Mission) -> Route:
         """Return the route that the autopilot flies in a mission, without notes for the user."""

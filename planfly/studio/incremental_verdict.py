@@ -139,7 +139,7 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
 
 def _speed_factor(context: EditContext, altitude: float) -> float:
     """Return the ratio of true airspeed to commanded airspeed at an altitude, m AMSL."""
-    autopilot = context.airframe.autopilot
+    autopilot = context.uav.autopilot
     return autopilot.speeds.true_airspeed_factor(altitude) if autopilot.speeds.equivalent else 1.0
 
 

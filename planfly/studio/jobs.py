@@ -186,8 +186,8 @@ class Jobs:
             raise PlanflyError.of_argument("ways", message.ways, "expected 1 if an algorithm is named")
         if message.first is not None:
             session.item_position(message.first)
-        airframe = session.context.planning_airframe(session.mission, message.first)
-        request = PlanRequest(scenario, airframe, message.seed, message.algorithm, ways=message.ways)
+        uav = session.context.planning_uav(session.mission, message.first)
+        request = PlanRequest(scenario, uav, message.seed, message.algorithm, ways=message.ways)
         if message.first is None or message.last is None:
             if scenario.external:
                 raise MissionError(f"{session.document.name}: choose the two items to plan between", field="first")

@@ -11,7 +11,7 @@ import numpy as np
 from flight.mission.items import AMSL, OVER_HOME, OVER_TERRAIN, PLACES, Command, Mission, MissionItem
 from flight.mission.placing import MAX_ALTITUDE_M, MIN_ALTITUDE_M
 from flight.mission.route import Route, fly_over_waypoints
-from planfly.workflow.airframe import Airframe
+from planfly.workflow.uav import Uav
 from world.arrays import Floats
 from world.frames import to_map
 from world.scenario import Scenario
@@ -30,7 +30,7 @@ _IRREGULAR_COMMANDS = frozenset(
 
 
 def update_moved_route(
-    route: Route, previous_mission: Mission, mission: Mission, scenario: Scenario, airframe: Airframe
+    route: Route, previous_mission: Mission, mission: Mission, scenario: Scenario, uav: Uav
 ) -> Route | None:
     """Return the route after moves of a few waypoints; None if the whole route must be computed again.
 
@@ -54,7 +54,7 @@ def update_moved_route(
         return None
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
     waypoint_seqs = {item.seq for item in mission.items if item.command == Command.NAV_WAYPOINT}
-    rules = airframe.autopilot.route_rules
+    rules = uav.autopilot.route_rules
     points, changed_rows = route.points.copy(), set[int]()
     positions = points["position"]
     for old_item, new_item in pairs:
@@ -75,7 +75,7 @@ def update_moved_route(
         changed_rows |= {row, *neighbours}
     if any(_is_near_previous(array, k) for array in (positions, route.positions) for k in changed_rows if k):
         return None
-    must_fly_over = fly_over_waypoints(points, airframe.limits, rules.turn_distance)
+    must_fly_over = fly_over_waypoints(points, uav.limits, rules.turn_distance)
     points["fly_over"] = np.where(route.arc_radii > 0.0, False, scenario.flight.fly_over | must_fly_over)
     return replace(route, points=points)
 

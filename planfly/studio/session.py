@@ -280,7 +280,7 @@ class Session:
 
     def _show_plan(self, plan: Plan) -> None:
         """Replace the current mission by the mission of a plan, whose certificate applies until the next edit."""
-        mission = planned_mission(plan, self.context.planning_airframe(self.mission))
+        mission = planned_mission(plan, self.context.planning_uav(self.mission))
         self._set_mission(mission, self.context.with_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
 
@@ -429,9 +429,7 @@ class Session:
 
     def settings_json(self) -> Json:
         """Return the current settings as page data."""
-        return settings_json(
-            self.context.scenario, self.context.airframe, self.context.parameters, self.aircraft_folders
-        )
+        return settings_json(self.context.scenario, self.context.uav, self.context.parameters, self.aircraft_folders)
 
     # ------------------------------------------------------------------
     # Page data, and files.

@@ -18,7 +18,7 @@ from flight.autopilots.parameter_files import parameters_text, parse_parameters
 from planfly.arguments import is_valid_wind
 from planfly.flight_options import FlightOptions, apply_options
 from planfly.studio.messages import LIMITS, Settings
-from planfly.workflow.airframe import Airframe, find_aircraft_and_energy, load_airframe
+from planfly.workflow.uav import Uav, find_aircraft_and_energy, load_uav
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
 from world.scenario import Scenario, scenario_from_spec, with_flight
@@ -78,19 +78,19 @@ class ChangedParameters:
         """Return the text of a parameter file for ground stations.  title: comment in its first line."""
         return parameters_text(self.values, title)
 
-    def load_airframe(self, scenario: Scenario) -> Airframe:
-        """Load the airframe of a scenario with these parameters in its autopilot.
+    def load_uav(self, scenario: Scenario) -> Uav:
+        """Load the UAV of a scenario with these parameters in its autopilot.
 
-        Raises PlanflyError if the airframe cannot be loaded.
+        Raises PlanflyError if the UAV cannot be loaded.
         """
-        airframe = load_airframe(scenario, self.values)
-        stored_autopilot = airframe.autopilot.store()
+        uav = load_uav(scenario, self.values)
+        stored_autopilot = uav.autopilot.store()
         if not self.values or stored_autopilot.parameters is None:
-            return airframe
+            return uav
         parameters = stored_autopilot.parameters._replace(
             source=self.file or stored_autopilot.parameters.source or "the studio"
         )
-        return replace(airframe, autopilot=airframe.autopilot.restore(stored_autopilot._replace(parameters=parameters)))
+        return replace(uav, autopilot=uav.autopilot.restore(stored_autopilot._replace(parameters=parameters)))
 
 
 def own_aircraft(scenario: Scenario) -> dict[str, str]:
@@ -215,22 +215,22 @@ def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
 
 
 def settings_json(
-    scenario: Scenario, airframe: Airframe, changed_parameters: ChangedParameters, folders: Mapping[str, str]
+    scenario: Scenario, uav: Uav, changed_parameters: ChangedParameters, folders: Mapping[str, str]
 ) -> dict[str, Any]:
     """Return the current settings as page data.  folders: folders of the user's own aircraft, by name."""
-    limits, parameters = scenario.to_json().get("limits", {}), airframe.autopilot.parameters
+    limits, parameters = scenario.to_json().get("limits", {}), uav.autopilot.parameters
     remainder_text = (
         f" and {len(changed_parameters.unused) - _MAX_LISTED_NAMES} more"
         if len(changed_parameters.unused) > _MAX_LISTED_NAMES
         else ""
     )
     return {
-        "aircraft": airframe.aircraft.name,
+        "aircraft": uav.aircraft.name,
         "aircraft_names": list(dict.fromkeys((*folders, *aircraft_names()))),
-        "autopilot": airframe.autopilot.name,
-        "autopilot_title": airframe.autopilot.title,
-        "airspeed": round(airframe.airspeed, 1),
-        "airspeed_kind": "equivalent" if airframe.autopilot.speeds.equivalent else "true",
+        "autopilot": uav.autopilot.name,
+        "autopilot_title": uav.autopilot.title,
+        "airspeed": round(uav.airspeed, 1),
+        "airspeed_kind": "equivalent" if uav.autopilot.speeds.equivalent else "true",
         "wind_speed": float(scenario.wind.speed),
         "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1) % 360.0,
         "turbulence": scenario.wind.turbulence,

@@ -24,12 +24,12 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.states import place_states
 from planfly.studio.view_model import findings_json, round_to_json, states_json, verdict_page_data
 from planfly.studio.worker_process import Advance
-from planfly.workflow.airframe import Airframe
 from planfly.workflow.apply_suggestion import can_apply
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.pipeline import fly_and_judge
 from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, finding_key, tried_suggestions
+from planfly.workflow.uav import Uav
 from planner.evaluation.certify import least_height
 from planner.evaluation.problem import make_problem
 from planner.search.plan_front import FrontPlan
@@ -147,7 +147,7 @@ class PlanRequest:
     """
 
     scenario: Scenario
-    airframe: Airframe
+    uav: Uav
     seed: int
     algorithm: str | None = None
     ends: tuple[tuple[float, ...], tuple[float, ...]] | None = None
@@ -161,7 +161,7 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     """
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
-    airframe, seed, deadline = request.airframe, request.seed, time.monotonic() + seconds
+    uav, seed, deadline = request.uav, request.seed, time.monotonic() + seconds
 
     def stop() -> str:
         """Return the reason to end the search after the deadline, and "" before it."""
@@ -170,12 +170,12 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     # Between two items of a mission, the path must join the leg after the second.
     joins_next_leg = request.ends is not None
     if request.ways > 1:
-        front = make_pareto_plans(scenario, airframe, seed, request.ways, advance, stop=stop, continues=joins_next_leg)
+        front = make_pareto_plans(scenario, uav, seed, request.ways, advance, stop=stop, continues=joins_next_leg)
         return list(front.plans) or [front.default]
-    new_plan = make_plan(scenario, airframe, seed, request.algorithm, advance, stop=stop, continues=joins_next_leg)
+    new_plan = make_plan(scenario, uav, seed, request.algorithm, advance, stop=stop, continues=joins_next_leg)
     # A single path needs no comparison, so quantities that take longer to compute are omitted.
     length = float(np.linalg.norm(np.diff(new_plan.waypoints, axis=0), axis=1).sum())
-    clearance = least_height(make_problem(scenario, airframe.limits).certified, new_plan.waypoints)
+    clearance = least_height(make_problem(scenario, uav.limits).certified, new_plan.waypoints)
     return [FrontPlan(new_plan, length, math.nan, clearance, math.nan, math.nan)]
 
 

@@ -21,10 +21,10 @@ from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP
 from logs.verdict.tolerances import PHOTO_OVERLAP_FRACTION
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.reference_flights import find_passing_parameter
 from planfly.workflow.trial_flight import Trial
+from planfly.workflow.uav import Uav, load_uav
 from world.errors import PlanflyError
 from world.scenario import with_flight
 
@@ -108,7 +108,7 @@ class TriedRemedies:
 
 def find_survey_remedies(
     setup: FlightSetup,
-    airframe: Airframe,
+    uav: Uav,
     verdict: Verdict,
     on_trial: Callable[[str], None] = lambda _: None,
     overlaps: Sequence[OverlapMeasure | None] = (),
@@ -128,7 +128,7 @@ def find_survey_remedies(
     """
     if _all_lines_usable(verdict) or not judged_surveys(setup):
         return TriedRemedies()
-    trials = _Trials(setup, airframe, verdict, on_trial, overlaps)
+    trials = _Trials(setup, uav, verdict, on_trial, overlaps)
     longer_turn_around = trials.find_turn_around()
     gates = trials.try_gates()
     candidates = [
@@ -210,12 +210,12 @@ class _Trials:
     def __init__(
         self,
         setup: FlightSetup,
-        airframe: Airframe,
+        uav: Uav,
         verdict: Verdict,
         on_trial: Callable[[str], None],
         overlaps: Sequence[OverlapMeasure | None],
     ) -> None:
-        self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
+        self._setup, self._uav, self._on_trial = setup, uav, on_trial
         self._original_worst_margins, self._verdict, self._change_prefix = _worst_margins(verdict), verdict, ""
         self._has_gates = False
         lost_legs = {
@@ -237,13 +237,13 @@ class _Trials:
     # ------------------------------------------------------------------
     # One flight.
 
-    def _changed_setup(self, mission: Mission, airframe: Airframe) -> FlightSetup:
+    def _changed_setup(self, mission: Mission, uav: Uav) -> FlightSetup:
         """Return the setup of a changed mission; vertical legs are accepted, as in the original mission."""
         scenario = self._setup.scenario
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
-        return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
+        return make_setup(scenario, uav, mission, self._setup.seed, placed=placed)
 
-    def _fly_trial(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
+    def _fly_trial(self, mission: Mission, uav: Uav, description: str) -> _TrialFlight | None:
         """Fly a changed mission, and store the flight if it came closest to passing.
 
         description: description of the change.
@@ -252,7 +252,7 @@ class _Trials:
         description = self._change_prefix + description
         self._on_trial(description)
         try:
-            trial = Trial(self._changed_setup(mission, airframe), airframe.aircraft)
+            trial = Trial(self._changed_setup(mission, uav), uav.aircraft)
         except PlanflyError:
             return None
         best_verdict = self._verdict if self.nearest is None else self.nearest.verdict
@@ -274,12 +274,12 @@ class _Trials:
                 return None
             mission = changed_mission
             try:
-                setup = self._changed_setup(mission, self._airframe)
+                setup = self._changed_setup(mission, self._uav)
             except PlanflyError:
                 return None
         if self._has_gates:
             mission = _with_gates(setup, judged_surveys(setup))
-        return self._fly_trial(mission, self._airframe, description)
+        return self._fly_trial(mission, self._uav, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
         """Return True if all lines are usable in a flight, and no other rule fails more than before.
@@ -317,7 +317,7 @@ class _Trials:
         if not distances:
             return None
         current, shortest = min(distances, key=lambda pair: pair[1])
-        flight = self._fly_trial(mission, self._airframe, f"photos every {shortest:g} m")
+        flight = self._fly_trial(mission, self._uav, f"photos every {shortest:g} m")
         return SurveyRemedy("trigger", "", current, shortest, "m", *flight) if self._is_remedy(flight) else None
 
     def find_turn_around(self) -> SurveyRemedy | None:
@@ -356,7 +356,7 @@ class _Trials:
         mission = _with_gates(self._setup, self._surveys)
         if mission == self._setup.mission:
             return None
-        flight = self._fly_trial(mission, self._airframe, "gates at the ends of the lines")
+        flight = self._fly_trial(mission, self._uav, "gates at the ends of the lines")
         return SurveyRemedy("gates", "", 0.0, 1.0, "", *flight) if self._is_remedy(flight) else None
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
@@ -438,13 +438,13 @@ class _Trials:
 
         def passes_with(autopilot: Autopilot) -> bool:
             """Return True if the flight passes with an autopilot; store the flight in this case."""
-            airframe = replace(self._airframe, autopilot=autopilot)
-            flight = self._fly_trial(self._setup.mission, airframe, "another parameter of the autopilot")
+            uav = replace(self._uav, autopilot=autopilot)
+            flight = self._fly_trial(self._setup.mission, uav, "another parameter of the autopilot")
             if self._is_remedy(flight):
                 passed_flights.append(flight)
             return self._is_remedy(flight)
 
-        deciding = find_passing_parameter(self._airframe.autopilot, self._verdict.findings, passes_with)
+        deciding = find_passing_parameter(self._uav.autopilot, self._verdict.findings, passes_with)
         if deciding is None:
             return None
         return SurveyRemedy(
@@ -456,10 +456,10 @@ class _Trials:
 
         Nothing is tried if the mission sets an airspeed.
         """
-        for speed, airframe in self._slower_airspeeds():
-            flight = self._fly_trial(self._setup.mission, airframe, f"{speed:g} m/s")
+        for speed, uav in self._slower_airspeeds():
+            flight = self._fly_trial(self._setup.mission, uav, f"{speed:g} m/s")
             if self._is_remedy(flight):
-                return SurveyRemedy("airspeed", "", self._airframe.airspeed, speed, "m/s", *flight)
+                return SurveyRemedy("airspeed", "", self._uav.airspeed, speed, "m/s", *flight)
         return None
 
     # ------------------------------------------------------------------
@@ -468,7 +468,7 @@ class _Trials:
     def _find_turn_around_with(
         self,
         change: str,
-        airframe: Airframe,
+        uav: Uav,
         turn_arounds: Sequence[float],
         mission: Mission | None = None,
         *,
@@ -477,12 +477,12 @@ class _Trials:
         """Find the shortest turn-around distance that passes in combination with another change.
 
         change: description of the other change.
-        airframe, mission: changed airframe, and changed mission or None.
+        uav, mission: changed uav, and changed mission or None.
         turn_arounds: distances to try, in increasing order, m.
         has_gates: True for gates at the ends of the lines.
         """
         trials = copy(self)
-        trials._airframe, trials._change_prefix, trials._has_gates = airframe, f"{change}, ", has_gates
+        trials._uav, trials._change_prefix, trials._has_gates = uav, f"{change}, ", has_gates
         if mission is not None:
             trials._setup = replace(self._setup, mission=mission)
         remedy = trials._find_shortest_turn_around(1, turn_arounds, 0.0)
@@ -493,7 +493,7 @@ class _Trials:
         """Try longer turn-around distances with gates; return None without gates, or if none passes."""
         if not self._setup.autopilot.route_rules.reads_as_px4:
             return None
-        remedy = self._find_turn_around_with("gates", self._airframe, self._longer_turn_arounds(), has_gates=True)
+        remedy = self._find_turn_around_with("gates", self._uav, self._longer_turn_arounds(), has_gates=True)
         return None if remedy is None else replace(remedy, kind="gates", current=0.0, value=1.0, unit="")
 
     def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
@@ -501,7 +501,7 @@ class _Trials:
 
         Returns the first pair that passes, or None.
         """
-        autopilot = self._airframe.autopilot
+        autopilot = self._uav.autopilot
         if autopilot.parameters is None:
             return None
         values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
@@ -523,9 +523,9 @@ class _Trials:
 
         def passes_with(value: float, turn_arounds: Sequence[float]) -> bool:
             """Return True if a turn-around distance passes with a parameter value; store the remedy."""
-            autopilot = self._airframe.autopilot.with_parameters(**{candidate.name: value})
-            airframe = replace(self._airframe, autopilot=autopilot)
-            remedy = self._find_turn_around_with(f"{candidate.name} {value:g}", airframe, turn_arounds)
+            autopilot = self._uav.autopilot.with_parameters(**{candidate.name: value})
+            uav = replace(self._uav, autopilot=autopilot)
+            remedy = self._find_turn_around_with(f"{candidate.name} {value:g}", uav, turn_arounds)
             if remedy is None:
                 return False
             remedies.append(
@@ -548,10 +548,10 @@ class _Trials:
 
         Return None if none of them passes.
         """
-        for speed, airframe in [*self._slower_airspeeds()][-1:]:
-            remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe, self._longer_turn_arounds())
+        for speed, uav in [*self._slower_airspeeds()][-1:]:
+            remedy = self._find_turn_around_with(f"{speed:g} m/s", uav, self._longer_turn_arounds())
             if remedy is not None:
-                return replace(remedy, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
+                return replace(remedy, kind="airspeed", current=self._uav.airspeed, value=speed, unit="m/s")
         return None
 
     def try_default_airspeed(self) -> SurveyRemedy | None:
@@ -559,9 +559,9 @@ class _Trials:
 
         An airspeed is too low if it is below the minimum airspeed of the aircraft.
         """
-        mission, default_airspeed = self._setup.mission, self._airframe.airspeed
+        mission, default_airspeed = self._setup.mission, self._uav.airspeed
         slow_items = [
-            item for item in mission.items if 0.0 < _commanded_airspeed(item) < self._airframe.aircraft.airspeed_min
+            item for item in mission.items if 0.0 < _commanded_airspeed(item) < self._uav.aircraft.airspeed_min
         ]
         if not slow_items:
             return None
@@ -570,7 +570,7 @@ class _Trials:
             for item in mission.items
         )
         remedy = self._find_turn_around_with(
-            f"{default_airspeed:g} m/s", self._airframe, self._longer_turn_arounds(), replace(mission, items=items)
+            f"{default_airspeed:g} m/s", self._uav, self._longer_turn_arounds(), replace(mission, items=items)
         )
         if remedy is None:
             return None
@@ -582,33 +582,33 @@ class _Trials:
             unit="m/s",
         )
 
-    def _slower_airspeeds(self) -> Iterator[tuple[float, Airframe]]:
-        """Yield each reduced airspeed (m/s) with its airframe, the fastest first, down to the lowest allowed.
+    def _slower_airspeeds(self) -> Iterator[tuple[float, Uav]]:
+        """Yield each reduced airspeed (m/s) with its UAV, the fastest first, down to the lowest allowed.
 
         Yields nothing if the mission itself sets an airspeed.
         """
         if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
             return
-        limits, steps = self._airframe.autopilot.speeds.limits, 1.0 / _AIRSPEED_STEP_MPS
+        limits, steps = self._uav.autopilot.speeds.limits, 1.0 / _AIRSPEED_STEP_MPS
         min_speed = max(
-            _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min, -math.inf if limits is None else limits.min
+            _MIN_AIRSPEED_RATIO * self._uav.aircraft.airspeed_min, -math.inf if limits is None else limits.min
         )
         lowest = math.ceil(min_speed * steps - 1e-6) / steps
-        speeds = {lowest, *(round(2.0 * factor * self._airframe.airspeed) / 2.0 for factor in AIRSPEED_FACTORS)}
+        speeds = {lowest, *(round(2.0 * factor * self._uav.airspeed) / 2.0 for factor in AIRSPEED_FACTORS)}
         max_speed = self._max_airspeed_for_photos()
         if math.isfinite(max_speed):
             speeds.add(math.floor(max_speed * steps + 1e-6) / steps)
         for speed in sorted(speeds, reverse=True):
-            if lowest <= speed <= max(lowest, max_speed) and speed < self._airframe.airspeed:
+            if lowest <= speed <= max(lowest, max_speed) and speed < self._uav.airspeed:
                 with suppress(PlanflyError):
-                    yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
+                    yield speed, load_uav(with_flight(self._setup.scenario, airspeed_mps=speed))
 
     def _max_airspeed_for_photos(self) -> float:
         """Return the highest airspeed at which a slow camera takes photos with the required front overlap, m/s.
 
         It follows from the ground speed flown at the place with the minimum overlap.  Infinity without such a camera.
         """
-        speeds, autopilot = [math.inf], self._airframe.autopilot
+        speeds, autopilot = [math.inf], self._uav.autopilot
         altitude = float(self._setup.route.positions[self._surveys[0].first, 2])
         for measure in self._overlaps:
             if measure.is_camera_limited and measure.front is not None and measure.camera.front is not None:
@@ -616,7 +616,7 @@ class _Trials:
                 overlap = measure.camera.front - PHOTO_OVERLAP_FRACTION
                 needed_speed = (1.0 - overlap) * measure.camera.along * measure.height / measure.camera.interval
                 change = _GROUND_SPEED_RATIO * needed_speed - ground_speed
-                speeds.append(self._airframe.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
+                speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
         return min(speeds)
 
 

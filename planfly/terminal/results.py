@@ -1,4 +1,4 @@
-"""Print verdicts and warnings of commands."""
+"""Print the lines next to a verdict, and warnings."""
 
 import sys
 from collections.abc import Iterable
@@ -7,21 +7,7 @@ from typing import TYPE_CHECKING
 from planfly.terminal.command_parser import colour_text
 
 if TYPE_CHECKING:
-    from flight.simulation.setup import FlightSetup
     from logs.recording.reader import FlightLog
-    from logs.verdict.verdict import Verdict
-
-
-def print_verdict(verdict: "Verdict", notes: Iterable[str], setup: "FlightSetup | None" = None) -> None:
-    """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule.
-
-    setup: setup of the judged flight, used to look for suggestions on its planned route; None without a flight.
-    """
-    # Imported here because --help does not need them.
-    from planfly.terminal.verdict_lines import verdict_lines
-    from planfly.workflow.suggestion_trials import has_geometric_suggestion
-
-    print("\n".join(verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))))
 
 
 def print_returns_line(line: str) -> None:

@@ -1,13 +1,15 @@
-"""Format a verdict as lines for a terminal."""
+"""Print a verdict on a terminal."""
 
 from collections.abc import Callable, Iterable
 
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.presentation import RuleFindings
 from logs.verdict.rule_words import RULE_WORDS, rule_word
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import noun_with_place, shorten_statement
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
+from planfly.workflow.suggestion_trials import has_geometric_suggestion
 
 # Maximum number of failed findings of a rule that are listed after the worst finding.
 _MAX_LISTED = 6
@@ -15,6 +17,14 @@ _MAX_LISTED = 6
 _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
 # Width of the column of rules, characters.
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
+
+
+def print_verdict(verdict: Verdict, notes: Iterable[str], setup: FlightSetup | None = None) -> None:
+    """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule.
+
+    setup: setup of the judged flight, used to look for suggestions on its planned route; None without a flight.
+    """
+    print("\n".join(verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))))
 
 
 def never_suggests() -> bool:

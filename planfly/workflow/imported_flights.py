@@ -42,9 +42,9 @@ from planfly.flight_options import (
     read_named_fences,
     with_file_autopilot,
 )
-from planfly.workflow.airframe import find_aircraft_and_energy, load_airframe, max_turn_bank
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
+from planfly.workflow.uav import find_aircraft_and_energy, load_uav, max_turn_bank
 from planner.plan import read_plan
 from world.errors import LogError, MissionError, StartError
 from world.frames import to_geo
@@ -77,7 +77,7 @@ class ImportedFlight:
     @property
     def lossy(self) -> bool:
         """True if part of the log could not be read."""
-        return self.setup.source is not None and self.setup.source.damage.lossy
+        return self.setup.imported_log is not None and self.setup.imported_log.damage.lossy
 
     def __repr__(self) -> str:
         return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
@@ -120,7 +120,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         *mission.warnings,
         *_describe_mission_change(flight, mission, options),
     )
-    source = ImportedLog(
+    imported_log = ImportedLog(
         missing=None if plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
         sha256=flight.raw.sha256 or _sha256(path),
@@ -140,7 +140,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         damage=flight.raw.damage,
         notes=notes,
     )
-    setup = replace(setup, source=source)
+    setup = replace(setup, imported_log=imported_log)
     track = make_track(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
         raise MissionError(f"{path}: not a flight of {plan}: {mismatch.text}", file=path)
@@ -173,7 +173,7 @@ def _read_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tupl
             return read_mission(plan_path), f"of {plan_path.name}", None
         plan = read_plan(plan_path, terrain=None if terrain is None else str(terrain))
         scenario = with_file_autopilot(plan.scenario)
-        mission = mission_of_plan(plan, load_airframe(scenario), str(plan_path))
+        mission = mission_of_plan(plan, load_uav(scenario), str(plan_path))
         return mission, f"of {plan_path.name}", scenario
     if flight.mission is None:
         raise LogError(f"{path}: contains no mission; `plan` names the mission that was planned", file=path)
@@ -452,11 +452,11 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
     The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  The setup is
     returned unchanged if the mission has no take-off, or if the segment never reached this altitude.
     """
-    source, route, mission, scenario = setup.source, setup.route, setup.mission, setup.scenario
+    imported_log, route, mission, scenario = setup.imported_log, setup.route, setup.mission, setup.scenario
     first = next((item for item in mission.items if item.seq == route.items[0]), None)
-    if source is None or not source.stretches or first is None or first.command not in TAKEOFFS:
+    if imported_log is None or not imported_log.stretches or first is None or first.command not in TAKEOFFS:
         return setup
-    stretch, *others = source.stretches
+    stretch, *others = imported_log.stretches
     is_inside = (track.time >= stretch.start) & (track.time <= stretch.end)
     rows = np.flatnonzero(is_inside & (track.position[:, 2] >= route.positions[0, 2]))
     if not rows.size:
@@ -475,7 +475,7 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
         route=route_through_stops(
             placed, setup.limits.airspeed, scenario.flight.fly_over, setup.limits, setup.autopilot.route_rules
         ),
-        source=replace(source, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
+        imported_log=replace(imported_log, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
     )
 
 
@@ -510,7 +510,7 @@ def _refly_followed_legs(
         limits=limits,
         aircraft=model.name,
         battery=battery,
-        source=None,
+        imported_log=None,
         nav="perfect",
     )
 
@@ -529,7 +529,7 @@ def _refly_followed_legs(
         raise LogError(f"{scenario.name}: {message}", file=scenario.name)
     if draw is not None:
         track = replace(track, position=track.position + np.array(draw.offset))
-    is_assumed_aircraft = setup.source is not None and not setup.source.aircraft_known and aircraft is None
+    is_assumed_aircraft = setup.imported_log is not None and not setup.imported_log.aircraft_known and aircraft is None
     return compare_with_model(model_setup, legs, track, end_reason, stands_in=is_assumed_aircraft)
 
 
@@ -538,10 +538,10 @@ def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
 
     Raises LogError if the flight followed no leg of its mission.
     """
-    source = setup.source
-    stretches = () if source is None else source.stretches
+    imported_log = setup.imported_log
+    stretches = () if imported_log is None else imported_log.stretches
     stretch_legs = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not stretch_legs:
-        name = "the log" if source is None else source.file
+        name = "the log" if imported_log is None else imported_log.file
         raise LogError(f"{name}: no leg of its mission was flown, so there is nothing to fly again", file=name)
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

@@ -10,8 +10,8 @@ from logs.verdict.measures.route_requirements import route_requirements
 from planfly.planning.gust_altitude_margin import ensure_altitude_margin
 from planfly.planning.gust_orbits import limit_waypoint_orbits
 from planfly.planning.local_wind import ensure_local_wind
-from planfly.workflow.airframe import Airframe, with_departure_and_approach
 from planfly.workflow.open_flight import make_setup, mission_of_plan
+from planfly.workflow.uav import Uav, with_departure_and_approach
 from planner.plan import Plan
 from planner.search.plan_path import certify_waypoints, plan_path
 from planner.search.replan import replan
@@ -24,14 +24,14 @@ from world.scenario import Scenario
 Advance = Callable[[float, float, str], None]
 
 
-def planning_conditions(scenario: Scenario, airframe: Airframe) -> Conditions:
+def planning_conditions(scenario: Scenario, uav: Uav) -> Conditions:
     """Return the conditions for which a path is planned: scenario, aircraft, airspeed and autopilot."""
-    return plan_conditions(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
+    return plan_conditions(scenario, uav.aircraft.name, uav.airspeed, uav.autopilot)
 
 
 def make_plan(
     scenario: Scenario,
-    airframe: Airframe,
+    uav: Uav,
     seed: int,
     algorithm: str | None = None,
     advance: Advance | None = None,
@@ -54,17 +54,17 @@ def make_plan(
 
     Raises ForecastError if the flight of the plan leaves the box, the levels or the times of the forecast.
     """
-    limits = airframe.limits.with_margin()
+    limits = uav.limits.with_margin()
 
     def complete_plan(plan: Plan, search: Search) -> Plan:
         """Make a plan safe in gusts and in local wind, by other searches if necessary."""
 
-        def search_for(other_airframe: Airframe) -> Plan:
-            """Search for a plan with another airframe, and make it safe in gusts."""
+        def search_for(other_airframe: Uav) -> Plan:
+            """Search for a plan with another UAV, and make it safe in gusts."""
             other_plan = search(plan.scenario, other_airframe.limits.with_margin())
             return _complete_in_gusts(other_plan, other_airframe, search)
 
-        return ensure_local_wind(_complete_in_gusts(plan, airframe, search), airframe, search_for)
+        return ensure_local_wind(_complete_in_gusts(plan, uav, search), uav, search_for)
 
     if flown_plan_and_leg is not None:
         old_plan, leg = flown_plan_and_leg
@@ -79,7 +79,7 @@ def make_plan(
             stop=stop,
             settle=complete_plan,
         )
-        return _add_ground_phases(new_plan, airframe, old_plan, continues=continues)
+        return _add_ground_phases(new_plan, uav, old_plan, continues=continues)
 
     def search(world: Scenario, search_limits: Limits) -> Plan:
         """Plan a path within limits by the chosen algorithm."""
@@ -87,43 +87,43 @@ def make_plan(
 
     searches = SharedBudget(search)
     plan = searches.with_total_evaluations(complete_plan(searches(scenario, limits), searches))
-    return _add_ground_phases(plan, airframe, continues=continues)
+    return _add_ground_phases(plan, uav, continues=continues)
 
 
-def _complete_in_gusts(plan: Plan, airframe: Airframe, search: Search) -> Plan:
+def _complete_in_gusts(plan: Plan, uav: Uav, search: Search) -> Plan:
     """Return a plan that is safe in gusts, or the given plan marked as not safe."""
 
     def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:
         """Return a plan whose waypoints are few enough to avoid orbits in gusts."""
-        return limit_waypoint_orbits(candidate, airframe, lambda world: search(world, search_limits), search_limits)
+        return limit_waypoint_orbits(candidate, uav, lambda world: search(world, search_limits), search_limits)
 
     def search_within(search_limits: Limits) -> Plan:
         """Plan a path within limits, with few enough waypoints to avoid orbits in gusts."""
         return limit_orbits(search(plan.scenario, search_limits), search_limits)
 
-    return ensure_altitude_margin(limit_orbits(plan, airframe.limits.with_margin()), airframe, search_within)
+    return ensure_altitude_margin(limit_orbits(plan, uav.limits.with_margin()), uav, search_within)
 
 
-def make_given_plan(scenario: Scenario, airframe: Airframe, seed: int, waypoints: Floats) -> Plan:
+def make_given_plan(scenario: Scenario, uav: Uav, seed: int, waypoints: Floats) -> Plan:
     """Return the plan of given waypoints (w, 3), m, without a search.
 
     It is certified by all checks of `make_plan`.
     """
     return finish_plan(
-        certify_waypoints(scenario, airframe.limits.with_margin(), waypoints, seed=seed), airframe, keeps_waypoints=True
+        certify_waypoints(scenario, uav.limits.with_margin(), waypoints, seed=seed), uav, keeps_waypoints=True
     )
 
 
-def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
+def finish_plan(plan: Plan, uav: Uav, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
     """Complete a plan without another search, by the steps that `make_plan` takes after its search.
 
     keeps_waypoints: see `limit_waypoint_orbits`.
     """
-    limited_plan = limit_waypoint_orbits(plan, airframe, keeps_waypoints=keeps_waypoints)
-    return _add_ground_phases(ensure_altitude_margin(limited_plan, airframe), airframe, continues=continues)
+    limited_plan = limit_waypoint_orbits(plan, uav, keeps_waypoints=keeps_waypoints)
+    return _add_ground_phases(ensure_altitude_margin(limited_plan, uav), uav, continues=continues)
 
 
-def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:
+def _add_ground_phases(plan: Plan, uav: Uav, old_plan: Plan | None = None, *, continues: bool) -> Plan:
     """Return a plan with departure and approach.
 
     The certificate of the plan also names the hazards near its final loiter, and slopes and turns that cannot be flown
@@ -131,13 +131,13 @@ def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = N
 
     old_plan: the plan being flown, or None.
     """
-    plan = ensure_local_wind(with_departure_and_approach(plan, airframe, old_plan), airframe)
-    if continues or not airframe.autopilot.loiters.ends_in_circle:
+    plan = ensure_local_wind(with_departure_and_approach(plan, uav, old_plan), uav)
+    if continues or not uav.autopilot.loiters.ends_in_circle:
         return plan
-    setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
+    setup = make_setup(plan.scenario, uav, mission_of_plan(plan, uav), plan.seed, plan=plan)
     loiter_hazards = end_loiter_hazards(route_requirements(setup))
     if loiter_hazards is None or not loiter_hazards[1]:
         return plan
-    loiter_text = f"{airframe.autopilot.title} circles about the destination, up to {loiter_hazards[0]:.0f} m from it"
+    loiter_text = f"{uav.autopilot.title} circles about the destination, up to {loiter_hazards[0]:.0f} m from it"
     problems = (*plan.certificate.problems, f"{loiter_text}: {', '.join(loiter_hazards[1])}")
     return replace(plan, certificate=replace(plan.certificate, problems=problems))

@@ -17,8 +17,8 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
-from planfly.workflow.airframe import Airframe, airframe_for_setup
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import Uav, uav_of_setup
 from world.arrays import Floats
 from world.frames import to_geo, to_map
 from world.scenario import Scenario
@@ -38,13 +38,13 @@ class JudgedMission:
 class MissionContext:
     """Context in which a changed mission is judged.
 
-    scenario: world of the mission.  airframe: aircraft loaded for the mission.  seed: seed of the flight.
+    scenario: world of the mission.  uav: aircraft loaded for the mission.  seed: seed of the flight.
     opened_setup: the setup as it was opened, with its plan if there is one.
     planned: True if planfly set the acceptance radii, which then follow the turns.
     """
 
     scenario: Scenario
-    airframe: Airframe
+    uav: Uav
     seed: int
     opened_setup: FlightSetup
     planned: bool = False
@@ -55,16 +55,16 @@ class MissionContext:
 
         Raises FlightError if the aircraft is missing.
         """
-        airframe = airframe_for_setup(setup)
-        airframe = replace(airframe, autopilot=setup.autopilot.model)
-        return cls(setup.scenario, airframe, setup.seed, setup, planned=setup.plan is not None)
+        uav = uav_of_setup(setup)
+        uav = replace(uav, autopilot=setup.autopilot.model)
+        return cls(setup.scenario, uav, setup.seed, setup, planned=setup.plan is not None)
 
     # ------------------------------------------------------------------
     # Places.
 
     def place_mission(self, mission: Mission) -> PlacedMission:
         """Return the stops of a mission on the map, with jumps unrolled."""
-        resets = self.airframe.autopilot.checks.resets_jump_counters
+        resets = self.uav.autopilot.checks.resets_jump_counters
         scenario = self.scenario
         return place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets)
 
@@ -125,8 +125,8 @@ class MissionContext:
         position = int(np.searchsorted(item_indices, index))
         nearby = item_indices[max(0, position - 2) : position + 3]
         points = self._planned_positions(mission, nearby)
-        airframe = self.airframe
-        radii = acceptance_radii(self.scenario, points, airframe.airspeed, airframe.max_bank, airframe.limits.tracking)
+        uav = self.uav
+        radii = acceptance_radii(self.scenario, points, uav.airspeed, uav.max_bank, uav.limits.tracking)
         items = list(mission.items)
         for k, radius in zip(nearby, radii.tolist(), strict=True):
             # The turn at an end of the chain is not known, unless it is an end of the mission, which has no turn.
@@ -159,7 +159,7 @@ class MissionContext:
         is_opened_mission = mission.items is opened.mission.items and mission.home == opened.mission.home
         if is_opened_mission and self.scenario is opened.scenario:
             return opened
-        return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.place_mission(mission))
+        return make_setup(self.scenario, self.uav, mission, self.seed, placed=self.place_mission(mission))
 
     def judge(self, mission: Mission) -> JudgedMission:
         """Judge a mission by its geometry, without a flight."""

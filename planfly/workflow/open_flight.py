@@ -26,7 +26,7 @@ from planfly.flight_options import (
     load_scenario_with_options,
     read_named_fences,
 )
-from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
+from planfly.workflow.uav import Uav, choose_seed, load_uav
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.errors import ForecastError, MissionError, ScenarioError, TerrainError
 from world.files import did_you_mean, missing_text
@@ -42,7 +42,7 @@ _MAH_PER_AH = 1000.0
 
 
 def open_flight(
-    source: Plan | str | Path, options: MissionOptions, program: Path | None = None, engine: EngineChoice = "auto"
+    plan_or_file: Plan | str | Path, options: MissionOptions, program: Path | None = None, engine: EngineChoice = "auto"
 ) -> FlightSetup:
     """Make the setup of a plan, or of a plan.json, .waypoints or .plan file.
 
@@ -55,16 +55,16 @@ def open_flight(
     >>> from planfly.workflow.make_plan import make_plan
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("paper-07")
-    >>> setup = open_flight(make_plan(scenario, load_airframe(scenario), 1), {"wind": (4.0, 270.0)})
+    >>> setup = open_flight(make_plan(scenario, load_uav(scenario), 1), {"wind": (4.0, 270.0)})
     >>> setup.name, setup.mission.source, setup.scenario.wind.speed
     ('paper-07', 'plan.json', 4.0)
     """
     fences = read_named_fences(options.get("fence") or ())
     named_world = options.get("scenario")
     terrain = None if options.get("terrain") is None else str(options.get("terrain"))
-    if isinstance(source, Plan) or Path(source).suffix.lower() == ".json":
-        return _open_plan(source, options, program, engine, fences, terrain)
-    mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(source)))))
+    if isinstance(plan_or_file, Plan) or Path(plan_or_file).suffix.lower() == ".json":
+        return _open_plan(plan_or_file, options, program, engine, fences, terrain)
+    mission = fences.add_to_mission(check_fixed_wing(read_mission(check_mission_exists(Path(plan_or_file)))))
     if named_world is not None:
         scenario = load_scenario_with_options(named_world, options, program, mission)
         if scenario.link is not None:
@@ -75,7 +75,7 @@ def open_flight(
         scenario, placed = apply_options(implied_world.scenario, options, program, mission), implied_world.placed
     scenario = fences.add_to_scenario(scenario)
     seed = choose_seed(scenario, options.get("seed"))
-    return make_setup(scenario, load_airframe(scenario), mission, seed, placed=placed, engine=engine)
+    return make_setup(scenario, load_uav(scenario), mission, seed, placed=placed, engine=engine)
 
 
 def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
@@ -94,7 +94,7 @@ def with_ground_at_station(scenario: Scenario, mission: Mission) -> Scenario:
 
 
 def _open_plan(
-    source: Plan | str | Path,
+    plan_or_file: Plan | str | Path,
     options: MissionOptions,
     program: Path | None,
     engine: EngineChoice,
@@ -106,21 +106,22 @@ def _open_plan(
     terrain: elevation file that replaces the terrain of the plan; None keeps the terrain.
     """
     named_world = options.get("scenario")
-    if not isinstance(source, Plan):
-        plan = read_plan(check_mission_exists(Path(source)), terrain=terrain)
-        file = str(source)
+    if not isinstance(plan_or_file, Plan):
+        plan, file = read_plan(check_mission_exists(Path(plan_or_file)), terrain=terrain), str(plan_or_file)
     else:
-        plan, file = source if terrain is None else parse_plan(plan_json(source), PLAN_FILE, terrain=terrain), PLAN_FILE
+        plan, file = plan_or_file, PLAN_FILE
+        if terrain is not None:
+            plan = parse_plan(plan_json(plan), PLAN_FILE, terrain=terrain)
     scenario = fences.add_to_scenario(apply_options(plan.scenario, options, program))
-    airframe, seed = load_airframe(scenario), options.get("seed")
-    mission = fences.add_to_mission(mission_of_plan(plan, airframe, file))
+    uav, seed = load_uav(scenario), options.get("seed")
+    mission = fences.add_to_mission(mission_of_plan(plan, uav, file))
     chosen_seed = plan.seed if seed is None else seed
     if named_world is None:
-        return make_setup(scenario, airframe, mission, chosen_seed, plan=plan, engine=engine)
+        return make_setup(scenario, uav, mission, chosen_seed, plan=plan, engine=engine)
     # The plan's waypoints are in the map coordinates of its own scenario.  Therefore its mission items are flown in
     # another scenario.
     scenario = fences.add_to_scenario(load_scenario_with_options(named_world, options, program))
-    return make_setup(scenario, load_airframe(scenario), mission, chosen_seed, engine=engine)
+    return make_setup(scenario, load_uav(scenario), mission, chosen_seed, engine=engine)
 
 
 def check_mission_exists(path: Path) -> Path:
@@ -164,12 +165,12 @@ def check_fixed_wing(mission: Mission) -> Mission:
     return mission
 
 
-def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> Mission:
+def mission_of_plan(plan: Plan, uav: Uav, source: str = PLAN_FILE) -> Mission:
     """Make a mission without fences from the waypoints of a plan.
 
     source: the plan's file name, for messages.
     """
-    return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
+    return plan_mission(plan, uav.airspeed, uav.max_bank, source, uav.limits.tracking)
 
 
 # Number of items that a common board stores, with the name of the board, by dialect: 724 on a Pixhawk
@@ -190,7 +191,7 @@ def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, .
 
 def make_setup(
     scenario: Scenario,
-    airframe: Airframe,
+    uav: Uav,
     mission: Mission,
     seed: int,
     *,
@@ -205,10 +206,11 @@ def make_setup(
     fdm_hz: step rate of JSBSim, Hz.  engine: flight model that flies.
     Raises MissionError for a mission without a valid route, and for a fence without valid zones.
     """
-    # A fence without valid zones could not be judged.
-    fence_zones(mission.fences, scenario.origin, mission.source)
-    limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
-    autopilot = with_landing_parameters(airframe.autopilot, mission)
+    if mission.fences:
+        # A fence without valid zones could not be judged.
+        fence_zones(mission.fences, scenario.origin, mission.source)
+    limits, airspeed, fly_over = uav.limits, uav.airspeed, scenario.flight.fly_over
+    autopilot = with_landing_parameters(uav.autopilot, mission)
     mission = replace(mission, autopilot=autopilot.name)
     resets = autopilot.checks.resets_jump_counters
     if placed is None:
@@ -229,15 +231,15 @@ def make_setup(
     notes += _item_count_notes(mission, autopilot.checks.dialect)
     envelope, stated_battery = limits.envelope, scenario.flight.battery_wh
     if envelope.volts and (stated_battery is not None or not envelope.battery_guessed):
-        notes += _capacity_notes(autopilot.checks.battery_failsafes, airframe.battery, envelope.volts)
+        notes += _capacity_notes(autopilot.checks.battery_failsafes, uav.battery, envelope.volts)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
         mission=mission,
         route=route,
         limits=limits,
-        aircraft=airframe.aircraft.name,
-        battery=airframe.battery,
+        aircraft=uav.aircraft.name,
+        battery=uav.battery,
         seed=seed,
         plan=plan,
         autopilot=autopilot,

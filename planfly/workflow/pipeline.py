@@ -9,25 +9,25 @@ from flight.autopilots.catalog import program_class_for
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
-from flight.simulation.airborne import Airborne
+from flight.simulation.running_flight import RunningFlight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import BLOCK_DURATION_S, LONG_BLOCK_DURATION_S, Flight, TrackBuilder, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
-from logs.recording.recorder import thin_track
+from logs.recording.recorder import CrashSafeRecorder, thin_track
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.measures.energy import reason_not_to_start
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.verdict import Verdict
 from planfly.rtl.return_summary import ReturnSummary, return_summary
-from planfly.workflow.airframe import choose_seed, load_airframe
-from planfly.workflow.crash_safe_log import CrashSafeLog, FlightLimits
+from planfly.workflow.flight_limits import FlightLimits
 from planfly.workflow.make_plan import Advance, make_plan, planning_conditions
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planfly.workflow.reference_flights import FlyReference, explain_verdict
 from planfly.workflow.suggestion_trials import with_tried_suggestions
+from planfly.workflow.uav import choose_seed, load_uav
 from planner.plan import Plan
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
@@ -146,12 +146,12 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     Raises a PlanflyError for bad input.  A plan that cannot be flown gives a verdict, not an error.
     """
     chosen_seed = choose_seed(scenario, seed)
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, chosen_seed)
-    mission = replace(mission_of_plan(plan, airframe, "plan"), autopilot=airframe.autopilot.name)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, chosen_seed)
+    mission = replace(mission_of_plan(plan, uav, "plan"), autopilot=uav.autopilot.name)
     if not plan.feasible:
-        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, airframe)))
-    setup = make_setup(scenario, airframe, mission, chosen_seed, plan=plan)
+        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planning_conditions(scenario, uav)))
+    setup = make_setup(scenario, uav, mission, chosen_seed, plan=plan)
     flight = fly_and_judge(setup, log)
     return PlanThenFly(plan, mission, flight.track, flight.verdict)
 
@@ -245,14 +245,27 @@ def autopilot_log_path(log: Path, program: Path) -> Path:
     return log.with_suffix(program_class_for(program).log_suffix)
 
 
-def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: Airborne) -> FlownMission:
+def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight: RunningFlight) -> FlownMission:
     """Fly to the end, record the flight if a log is named, and judge the recorded rows."""
     flight.max_ticks = min(flight.max_ticks, task.limits.max_ticks(flight.dt))
+    builder, end_reason, length = TrackBuilder(), "", flight.path.length
     with ExitStack() as open_logs:
         recorder = None
         if task.log is not None:
-            recorder = open_logs.enter_context(CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S))
-        track, end_reason = _simulate_and_record(task, flight, recorder)
+            recorder = CrashSafeRecorder(task.log, flight.setup, every=task.every, batch=BATCH_S)
+            open_logs.enter_context(recorder)
+        # A recorded flight is written second by second, so that a crash of the process loses no more.
+        for block in simulate(flight, LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S):
+            builder.add(block.rows)
+            end_reason = block.end_reason
+            if recorder is not None and len(block.rows):
+                recorder.write_rows(block.rows)
+                end_reason = end_reason or task.limits.log_limit_reason(recorder.size)
+            if task.advance is not None:
+                task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+            if end_reason:
+                break
+        track = builder.track()
         if recorder is not None:
             recorder.end_reason, track = end_reason, thin_track(track, task.every)
         reference_flights, summary = None, None
@@ -286,26 +299,6 @@ def _record_and_judge(task: _FlightTask, requirements: RouteRequirements, flight
         engine=flight.engine if len(track) else "",
         reference=reference_flights,
     )
-
-
-def _simulate_and_record(task: _FlightTask, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
-    """Fly to the end or until the log is full, recording each block.
-
-    Returns the track and the reason for the end.
-    """
-    builder, end_reason, length = TrackBuilder(), "", flight.path.length
-    # A recorded flight is written second by second, so that a crash of the process loses no more.
-    for block in simulate(flight, LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S):
-        builder.add(block.rows)
-        end_reason = block.end_reason
-        if recorder is not None and len(block.rows):
-            recorder.write(block.rows)
-            end_reason = end_reason or task.limits.log_limit_reason(recorder.size)
-        if task.advance is not None:
-            task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-        if end_reason:
-            break
-    return builder.track(), end_reason
 
 
 def _judge_unflown(

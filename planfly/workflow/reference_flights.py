@@ -243,7 +243,7 @@ def explain_verdict(
         # planfly's guidance does not return by itself, so that its flight does not explain such a return.
         is_only_return = bool(verdict.failed) and all(finding.rule == "return" for finding in verdict.failed)
         is_affordable = is_requested or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
-        if setup.autopilot.level != "airframe" and not is_only_return and is_affordable:
+        if setup.autopilot.answer_name != "airframe" and not is_only_return and is_affordable:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
         is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
         if reference.airframe is not None and reference.airframe.flyable and is_affordable:

@@ -254,7 +254,7 @@ class SuggestionTrials:
     _trials: dict[object, Trial] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._current_trial = Trial(self.judged.setup, self.context.airframe.aircraft)
+        self._current_trial = Trial(self.judged.setup, self.context.uav.aircraft)
         # One flight less: the reference flight with planfly's guidance.
         self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)
 
@@ -352,7 +352,7 @@ class SuggestionTrials:
                 mission, setup = self._changed_flight(finding, suggestion)
             except PlanflyError:
                 return
-            new_trial = Trial(setup, self.context.airframe.aircraft, self.should_abort)
+            new_trial = Trial(setup, self.context.uav.aircraft, self.should_abort)
             key = mission.items, mission.home, setup.battery, setup.scenario.launch
             trial = self._trials.setdefault(key, new_trial)
             yield suggestion, trial

@@ -13,7 +13,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.tolerances import ROUNDING_M, SUGGESTION_LENGTH_MARGIN_M
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import threat_text
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN_M
 from world.scenario import Scenario, scenario_from_spec
 
@@ -149,7 +149,7 @@ def _tighten_turns(spec: Spec, scenario: Scenario, failed_findings: list[Finding
         _limits_table(spec)["max_turn_deg"] = "aircraft"
         return [Tightening("max_turn_deg", current, "aircraft")]
     # Plan with larger arcs; the flight keeps its maximum bank.
-    bank = math.degrees(load_airframe(scenario).max_bank)
+    bank = math.degrees(load_uav(scenario).max_bank)
     tightened = round(TIGHTENING_FACTOR * bank, 2)
     if tightened < MIN_BANK_DEG:
         return []

@@ -13,7 +13,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.energy import reason_not_to_start
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
-from planfly.workflow.crash_safe_log import predicted_seconds
+from planfly.workflow.flight_limits import predicted_seconds
 from world.errors import StartError
 
 # Longest predicted time of all flights that explain one verdict, reference flights and trial flights, s of flight.

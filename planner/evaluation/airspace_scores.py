@@ -304,14 +304,14 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
     There are six pieces per leg. The paper has no zones, and counts points, six per leg. Here pieces are tested along
     their full length, because a path could pass through a zone between two points.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> from world.scenario import with_zones
     >>> from world.scenario_tables import ZoneTable
     >>> mill = ZoneTable(name="mill", kind="exclusion", east_m=1300.0, north_m=0.0, radius_m=100.0)
     >>> scenario = with_zones(load_scenario("tight"), [mill], "mills")
-    >>> problem = make_problem(scenario, load_airframe(scenario).limits)
+    >>> problem = make_problem(scenario, load_uav(scenario).limits)
     >>> airspace_counts(problem.search, np.stack([scenario.start, scenario.destination])[None])
     array([2])
     """

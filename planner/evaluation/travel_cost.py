@@ -126,9 +126,9 @@ def make_travel_cost(
     The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
     Returns None for the objective energy if the aircraft's power is unknown.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
-    >>> limits = load_airframe(load_scenario("tight")).limits
+    >>> limits = load_uav(load_scenario("tight")).limits
     >>> make_travel_cost("time", limits.envelope, limits.performance()).time
     25.0
     """
@@ -331,9 +331,9 @@ def leg_cost(
 def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:
     """Return the cost of a path (w, 3), m: the sum over its legs; inf if a leg cannot be flown.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
-    >>> table = load_airframe(load_scenario("tight")).limits.performance()
+    >>> table = load_uav(load_scenario("tight")).limits.performance()
     >>> path_cost(LENGTH_COST, table, np.array([[0.0, 0.0, 9.0], [30.0, 0.0, 9.0], [30.0, 40.0, 9.0]]))
     70.0
     """

@@ -166,11 +166,11 @@ def closed_bands(problem: Problem) -> list[str]:
 
     One band lies between the clearance and the maximum height above ground. Each inclusion has a band, too.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> closed_bands(make_problem(scenario, load_airframe(scenario).limits))
+    >>> closed_bands(make_problem(scenario, load_uav(scenario).limits))
     []
     """
     data, lines = problem.certified, []
@@ -203,11 +203,11 @@ def closed_bands(problem: Problem) -> list[str]:
 def max_altitude(problem: Problem) -> tuple[float, str]:
     """Return the maximum altitude of a plan, m AMSL, and the name of the limit that determines it.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> max_altitude(make_problem(scenario, load_airframe(scenario).limits))[1]
+    >>> max_altitude(make_problem(scenario, load_uav(scenario).limits))[1]
     'the ceiling'
     """
     scenario: Scenario = problem.scenario

@@ -19,11 +19,11 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     The waypoints with the smallest detours are removed first. The path keeps the distance from missiles that plans
     require, or the plan's own distance if that is smaller.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.search.plan_path import plan_path
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> limits = load_airframe(scenario).limits
+    >>> limits = load_uav(scenario).limits
     >>> plan = plan_path(scenario, limits, seed=1)
     >>> fewer = drop_waypoints(plan, limits)
     >>> fewer.safe, len(fewer.waypoints) < len(plan.waypoints)

@@ -46,13 +46,13 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
 
     A path stays above the clearance, below the ceiling and outside the missiles' spheres.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario, with_threats
     >>> scenario = load_scenario("hard-07")
     >>> threat = {"east_m": 5000.0, "north_m": 5000.0, "kill_radius_m": 6000.0}
     >>> guarded = with_threats(scenario, [threat], "threats")
-    >>> [is_closed(make_problem(one, load_airframe(one).limits).certified) for one in (scenario, guarded)]
+    >>> [is_closed(make_problem(one, load_uav(one).limits).certified) for one in (scenario, guarded)]
     [False, True]
     """
     is_considered = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles

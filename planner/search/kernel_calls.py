@@ -55,10 +55,10 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
 
     scenario: a small scenario is sufficient, because the result is discarded.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> call_kernels("paper", scenario, load_airframe(scenario).limits)
+    >>> call_kernels("paper", scenario, load_uav(scenario).limits)
     """
     problem = make_problem(scenario, limits)
     space = problem.space

@@ -20,8 +20,8 @@ from aircraft.tracking import SPEED_RATIOS
 from planner.airspace.zone_limits import ZoneMargins, make_airspace
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, make_problem
-from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
 from planner.plan import GIVEN_WAYPOINTS, Certificate, Plan
+from planner.procedures import ClimbOut, DepartureAndApproach, Descent
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.pose_chains import (
     LAP_SIDE_RADII,
@@ -159,7 +159,7 @@ def add_departure_and_approach(
             descent, reason = _find_approach(site, scenario.landing, final_model)
         problems += [f"landing: {reason}"] if reason else []
     certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
-    return replace(plan, ways=DepartureAndApproach(climb, descent), certificate=certificate)
+    return replace(plan, procedures=DepartureAndApproach(climb, descent), certificate=certificate)
 
 
 # ----------------------------------------------------------------------

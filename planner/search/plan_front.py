@@ -188,10 +188,10 @@ def plan_front(
 
     The same scenario, limits, count and seed give the same front.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> front = plan_front(scenario, load_airframe(scenario).limits, 4, seed=1, generations=5)
+    >>> front = plan_front(scenario, load_uav(scenario).limits, 4, seed=1, generations=5)
     >>> len(front.plans), all(one.plan.safe for one in front.plans)
     (4, True)
     """
@@ -563,5 +563,5 @@ def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
         violations=Violations(*counts[0]),
         objectives=Objectives(*objectives[0]),
         certificate=certify(task.problem, path),
-        ways=None,
+        procedures=None,
     )

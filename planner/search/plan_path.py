@@ -78,10 +78,10 @@ def plan_path(
 ) -> Plan:
     """Plan a path. The same scenario, limits, algorithm and seed give the same plan.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> plan = plan_path(scenario, load_uav(scenario).limits, seed=1)
     >>> plan.safe, plan.waypoints.shape
     (True, (10, 3))
 
@@ -134,10 +134,10 @@ def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, 
 
     The limits are those of the scenario's algorithm.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> limits = load_airframe(scenario).limits
+    >>> limits = load_uav(scenario).limits
     >>> plan = plan_path(scenario, limits, seed=1)
     >>> certify_waypoints(scenario, limits, plan.waypoints, seed=1).certificate == plan.certificate
     True

@@ -47,11 +47,11 @@ def replan(
 
     settle: function that completes the plan of the path ahead, before the flown legs are prepended.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> from world.scenario import with_threats
     >>> scenario = load_scenario("hard-07")
-    >>> limits = load_airframe(scenario).limits
+    >>> limits = load_uav(scenario).limits
     >>> old = plan_path(scenario, limits, seed=1)
     >>> east, north, _ = old.waypoints[6]
     >>> now = with_threats(scenario, [{"east_m": east, "north_m": north, "kill_radius_m": 300.0}], "threats")
@@ -105,10 +105,10 @@ def replan(
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
     """Raise MissionError if the ends of a plan are not the ends of a scenario.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> plan = plan_path(scenario, load_uav(scenario).limits, seed=1)
     >>> check_same_mission(scenario, plan)
     >>> check_same_mission(load_scenario("tight"), plan)
     Traceback (most recent call last):

@@ -227,11 +227,11 @@ def shorten_path(
 
     A model counts as one evaluation. Zones and the maximum height above ground are ignored.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> data = make_problem(scenario, load_airframe(scenario).limits).search
+    >>> data = make_problem(scenario, load_uav(scenario).limits).search
     >>> high = np.array([scenario.start, [5000.0, 5000.0, 590.0], scenario.destination])
     >>> path, _ = shorten_path(data, resample(high, 10))
     >>> path.shape, bool(np.array_equal(path[-1], scenario.destination))

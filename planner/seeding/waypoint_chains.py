@@ -300,11 +300,11 @@ def free_points(data: ProblemArrays, points: Floats) -> Flags:
 
     points: (n, 3) m.
 
-    >>> from planfly.workflow.airframe import load_airframe
+    >>> from planfly.workflow.uav import load_uav
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
-    >>> data = make_problem(scenario, load_airframe(scenario).limits).search
+    >>> data = make_problem(scenario, load_uav(scenario).limits).search
     >>> unit = scenario.threats.position[0]
     >>> free_points(data, np.array([scenario.start, unit + [0.0, 0.0, 50.0], [-5000.0, 0.0, 300.0]])).tolist()
     [True, False, False]

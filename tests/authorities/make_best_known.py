@@ -30,7 +30,7 @@ def candidates(task: Task, methods: Sequence[str]) -> Iterator[tuple[str, list[l
     """How each path was got, the path, its length ratio, and whether it is certified and safe."""
     larger = with_planner(task.scenario, population=MORE * task.scenario.planner.population)
     for seed in OURS if "planfly" in methods else ():
-        plan = make_plan(larger, task.airframe, seed)
+        plan = make_plan(larger, task.uav, seed)
         how = f"planfly {plan.algorithm}, population x {MORE}, seed {seed}, {plan.evaluations} evaluations"
         yield how, plan.waypoints.tolist(), float(plan.objectives[Objective.LENGTH_RATIO]), plan.safe
     for seed in SEEDS if "cmaes" in methods else ():

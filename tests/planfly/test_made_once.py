@@ -1,6 +1,6 @@
 """Through a whole command every stage is entered once, and what it made is handed on.
 
-Limits, airframe, plan, path, local map, the route's requirements and the track's alignment are each made there alone.
+Limits, UAV, plan, path, local map, the route's requirements and the track's alignment are each made there alone.
 """
 
 import json
@@ -36,7 +36,7 @@ from tests.world.made.elevation_files import from_origin, write_raster
 from world.scenario import load_scenario
 
 STAGES = (
-    "planfly.workflow.airframe:load_airframe",
+    "planfly.workflow.uav:load_uav",
     "flight.dynamics.envelope_tables:load_envelope",
     "flight.simulation.setup:make_limits",
     "planner.search.plan_path:plan_path",
@@ -56,7 +56,7 @@ STAGES = (
 OURS = ("planfly", "logs", "flight", "planner", "world", "aircraft")
 # A flight that fails is judged by geometry, too, for what its last line says of `check --geometry`.
 HINT = {"judge_geometry": 1, "route_requirements": 2}
-ONCE = dict.fromkeys(("load_airframe", "load_envelope", "make_limits"), 1)
+ONCE = dict.fromkeys(("load_uav", "load_envelope", "make_limits"), 1)
 ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "route_through_stops", "make_setup", "fly_by_path"), 1)
 OPENED = ROUTED | {"plan_mission": 1}
 ALIGNED = dict.fromkeys(("route_requirements", "align_track"), 1)
@@ -133,8 +133,8 @@ def test_a_round_more_makes_only_what_its_tighter_limits_change(count: Count) ->
 
 
 def test_plan_loads_the_airframe_alone(count: Count) -> None:
-    # Its expected failures are judged by the airframe, which a plan does not hold.
-    again = {"load_airframe": 2, "load_envelope": 2, "make_limits": 2}
+    # Its expected failures are judged by the UAV, which a plan does not hold.
+    again = {"load_uav": 2, "load_envelope": 2, "make_limits": 2}
     assert count("plan", "tight", code=0) == ONCE | {"plan_path": 1} | again
 
 

@@ -12,9 +12,9 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.verdict import Verdict
 from planfly.cli import main
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import load_uav
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.setups import spec_around
 from tests.soak import some
@@ -155,7 +155,7 @@ def setup_of(case: Case, autopilot: str = "planfly") -> FlightSetup:
     tables = made | case.tables | {"flight": {"autopilot": autopilot, **case.tables.get("flight", {})}}
     spec = spec_around(ends, name="known", buffer=0.0, ceiling=9000.0, **tables)
     scenario = scenario_from_spec(spec, "known", external=True)
-    return make_setup(scenario, load_airframe(scenario), mission(*case.lines, home=case.home), 1)
+    return make_setup(scenario, load_uav(scenario), mission(*case.lines, home=case.home), 1)
 
 
 def failed(verdict: Verdict) -> set[str]:

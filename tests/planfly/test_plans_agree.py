@@ -12,8 +12,8 @@ import planfly
 from planfly.planning import pareto_plans as choice_of_ways
 from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, max_waypoints_in_gusts
 from planfly.studio import worker_tasks as works
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
+from planfly.workflow.uav import load_uav
 from planner.plan import Plan
 from tests.planfly.planning.test_gust_orbits import SEED, scenario_of
 from world.scenario import Scenario
@@ -51,7 +51,7 @@ def first_of_a_front(scenario: Scenario) -> Plan:
 
 
 def planned_in_the_studio(scenario: Scenario, ways: int = 1, ends: Any = None) -> Plan:
-    asked = works.PlanRequest(scenario, load_airframe(scenario), SEED, ways=ways, ends=ends)
+    asked = works.PlanRequest(scenario, load_uav(scenario), SEED, ways=ways, ends=ends)
     return works.plan(asked, lambda done, total, remark: None)[0].plan
 
 
@@ -82,15 +82,15 @@ def test_where_the_mission_goes_on_nobody_circles(ways: int) -> None:
 @pytest.mark.parametrize("way", WAYS, ids=NAMES)
 def test_no_plan_has_more_waypoints_than_gusts_allow(way: Callable[[Scenario], Plan]) -> None:
     scenario = scenario_of("moderate")
-    airframe, plan = load_airframe(scenario), way(scenario)
+    uav, plan = load_uav(scenario), way(scenario)
     ahead = replace(plan, waypoints=plan.waypoints[plan.flown_legs :], flown_legs=0)
     assert plan.safe
-    assert 0.0 < expected_orbits(ahead, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
+    assert 0.0 < expected_orbits(ahead, uav.autopilot, uav.limits) <= MAX_EXPECTED_ORBITS
 
 
 def test_all_give_the_same_plan() -> None:
     scenario = scenario_of("moderate")
-    expected = make_plan(scenario, load_airframe(scenario), SEED).waypoints
+    expected = make_plan(scenario, load_uav(scenario), SEED).waypoints
     for way in (planned, planned_in_the_studio):
         np.testing.assert_array_equal(way(scenario).waypoints, expected)
     front = planfly.plan_front(scenario, 2, seed=SEED)
@@ -113,29 +113,29 @@ def test_each_plan_of_a_front_is_safe_in_gusts(searched: int | None, monkeypatch
     Even if the others are searched for with as many waypoints as in still air, none of the front has them.
     """
     if searched is not None:
-        monkeypatch.setattr(choice_of_ways, "max_waypoints_in_gusts", lambda plan, airframe: searched)
+        monkeypatch.setattr(choice_of_ways, "max_waypoints_in_gusts", lambda plan, uav: searched)
     radar = {"name": "radar", "east_m": 2000.0, "north_m": 500.0, "amsl_m": 0.0}
     reach = {"detection_radius_m": 1500.0, "detection_scale_m": 800.0}
     scenario = scenario_of("moderate", threats=[radar | reach], zones=[])
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     front = planfly.plan_front(scenario, 5, seed=SEED)
     assert len(front.default.plan.waypoints) == 2
     assert len(front.plans) >= (3 if searched is None else 1)
     for one in front.plans:
         assert one.plan.safe
-        assert expected_orbits(one.plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
+        assert expected_orbits(one.plan, uav.autopilot, uav.limits) <= MAX_EXPECTED_ORBITS
 
 
 def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
     """With 12 m about their heights three, at 0.0083 each, for 0.03; where nobody circles, as many as the plan has."""
     scenario = scenario_of("moderate")
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, SEED)
-    climb, sink = airframe.limits.max_climb_and_sink_rates(150.0)
-    wider = replace(airframe, autopilot=airframe.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, SEED)
+    climb, sink = uav.limits.max_climb_and_sink_rates(150.0)
+    wider = replace(uav, autopilot=uav.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
     assert wider.autopilot.deviations.altitude_miss_probability(climb, sink, "moderate") == pytest.approx(
         0.0083, abs=0.0001
     )
     assert max_waypoints_in_gusts(plan, wider) == 5
     calm = scenario_of("none")
-    assert max_waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)
+    assert max_waypoints_in_gusts(replace(plan, scenario=calm), load_uav(calm)) == len(plan.waypoints)

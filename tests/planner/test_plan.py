@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
 from planner.plan import (
     GIVEN_WAYPOINTS,
     Certificate,
@@ -24,6 +23,7 @@ from planner.plan import (
     plan_json,
     read_plan,
 )
+from planner.procedures import ClimbOut, DepartureAndApproach, Descent
 from tests.setups import small_scenario
 from world.errors import MissionError, PlanflyError, ScenarioError
 from world.scenario import load_scenario
@@ -57,12 +57,12 @@ DOWN = Descent(np.zeros((0, 3)), np.array([[9.0, 8.0, 90.0], [9.0, 9.0, 90.0]]),
     "ways", [DepartureAndApproach(), DepartureAndApproach(climb=UP), DepartureAndApproach(UP, DOWN)]
 )
 def test_ways_from_and_to_the_ground_come_back(ways: DepartureAndApproach) -> None:
-    plan = made(ways=ways)
+    plan = made(procedures=ways)
     again = parse_plan(plan_json(plan), "plan.json")
     assert plan_json(again) == plan_json(plan)
-    assert again.ways is not None
+    assert again.procedures is not None
     for kind in ("climb", "descent"):
-        mine, read = getattr(ways, kind), getattr(again.ways, kind)
+        mine, read = getattr(ways, kind), getattr(again.procedures, kind)
         assert (mine is None) == (read is None)
         for name in () if mine is None else type(mine).__slots__:
             np.testing.assert_array_equal(getattr(read, name), getattr(mine, name))
@@ -70,7 +70,7 @@ def test_ways_from_and_to_the_ground_come_back(ways: DepartureAndApproach) -> No
 
 
 def test_a_way_that_is_none_is_refused() -> None:
-    data = json.loads(plan_json(made(ways=DepartureAndApproach(UP, DOWN))))
+    data = json.loads(plan_json(made(procedures=DepartureAndApproach(UP, DOWN))))
     data["ground_ways"]["descent"]["line_up_east_north_amsl_m"].pop()
     with pytest.raises(MissionError, match=r"^x: ground_ways\.descent\.line_up_east_north_amsl_m: "):
         parse_plan(json.dumps(data), "x")

@@ -52,7 +52,7 @@ from flight.autopilots.parts import (
     TurnRules,
 )
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
-from flight.mission.ground_ways import Approach, GroundPhases, TakeOff
+from flight.mission.ground_phases import Approach, GroundPhases, TakeOff
 from flight.mission.items import LANDINGS, Command
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Autopilot, Level, StoredAutopilot
+from flight.autopilots.autopilot import AnswerName, Autopilot, StoredAutopilot
 from flight.autopilots.gust_height import height_in_gusts
 from flight.autopilots.parts import ControlLaw, Deviations, TurnRules
 from flight.autopilots.planfly.law import LAWS, planfly_loop, planfly_tick
@@ -28,7 +28,7 @@ class PlanflyGuidance(Autopilot):
 
     name: ClassVar = "planfly"
     title: ClassVar = "planfly's guidance"
-    level: ClassVar[Level] = "airframe"
+    answer_name: ClassVar[AnswerName] = "airframe"
     guidance: Guidance = "path"
 
     @classmethod

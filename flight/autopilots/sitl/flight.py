@@ -29,10 +29,10 @@ from flight.autopilots.sitl.mission import uploaded_mission
 from flight.autopilots.sitl.process import AutopilotProcess
 from flight.guidance.gains import load_gains
 from flight.guidance.path import profile_at, project
-from flight.mission.ground_ways import TakeOff
+from flight.mission.ground_phases import TakeOff
 from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
-from flight.simulation.airborne import Release, default_gear, find_release, release
 from flight.simulation.local_map import Ground
+from flight.simulation.running_flight import Release, default_gear, find_release, release
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S
 from flight.simulation.tick import (
@@ -237,7 +237,7 @@ class SitlFlight(ProgramFlight):
         self._mission = uploaded_mission(setup)
         if self._law is not None:
             self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
-            self._law.initialise(self.memory, self._workspace.own)
+            self._law.initialise(self.guidance_memory, self._workspace.law_record)
         # Compiled here, while no autopilot waits for it.
         tick = self._ground_tick if self._ground_phases else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)
@@ -392,12 +392,12 @@ class SitlFlight(ProgramFlight):
         work.wind.w20 = work.settings.navigation_sigma = 0.0
         for _ in range(round((2.0 * MIN_RUN_IN_TIME_S + _RUN_IN_TIMEOUT_S) / self.dt)):
             timing.row = 0
-            if loop(1) or self.memory.distance >= 0.0:
+            if loop(1) or self.guidance_memory.distance >= 0.0:
                 break
         work.wind.w20, work.settings.navigation_sigma = saved_settings
         timing.tick = timing.row = 0
         work.air.energy = 0.0
-        self.memory.piece = 0
+        self.guidance_memory.piece = 0
         self._make_loop(autopilot_tick)
 
     def _tick(self, tick: "partial[int]", has_gnss_error: bool) -> int:

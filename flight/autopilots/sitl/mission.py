@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.ground_ways import GroundPhases
+from flight.mission.ground_phases import GroundPhases
 from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, round_to_grid
 from flight.mission.itinerary import NO_ITEM, stated_loiter
 from flight.mission.route import Route, ends_at_plain_waypoint

@@ -85,8 +85,8 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
 
 def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
     """Return the pauses of the log between two times, s."""
-    source = legs.requirements.setup.source
-    return [] if source is None else [gap for gap in source.gaps if gap.start < end and gap.end > start]
+    imported_log = legs.requirements.setup.imported_log
+    return [] if imported_log is None else [gap for gap in imported_log.gaps if gap.start < end and gap.end > start]
 
 
 def stretch_end_text(stretch: MissionStretch) -> str:
@@ -176,13 +176,13 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
     >>> source = ImportedLog("a.BIN", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),))
-    >>> setup = replace(log.setup, source=source)
+    >>> setup = replace(log.setup, imported_log=source)
     >>> far = replace(log.track, position=log.track.position + np.array([0.0, 9000.0, 0.0]))
     >>> plan_mismatch(setup, log.track) is None, plan_mismatch(setup, far).text
     (True, 'the flight is elsewhere, at least 8.9 km from every waypoint')
     """
-    source = setup.source
-    stretches = () if source is None else source.stretches
+    imported_log = setup.imported_log
+    stretches = () if imported_log is None else imported_log.stretches
     stretch_tracks = [rows_between(track, stretch.start, stretch.end) for stretch in stretches]
     stretch_tracks = [rows for rows in stretch_tracks if len(rows) > 1]
     points = setup.route.positions

@@ -57,40 +57,44 @@ def imported_lines(
 
     own_answer: answer of the verdict at its own level, with the headline.
     """
-    source = setup.source
-    if source is None:
+    imported_log = setup.imported_log
+    if imported_log is None:
         return (own_answer.headline,)
     lines = [own_answer.headline, *condition_lines(conditions)]
-    lines.append(
-        f"{autopilot_line(conditions, is_flown=True)} ({source.format} {source.file}{_start_time_text(source)})"
-    )
-    lines += [*_judged_lines(source, flown_stretches, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
+    log_text = f"{imported_log.format} {imported_log.file}{_start_time_text(imported_log)}"
+    lines.append(f"{autopilot_line(conditions, is_flown=True)} ({log_text})")
+    lines += [
+        *_judged_lines(imported_log, flown_stretches, setup.route.leg_numbers.tolist()),
+        *_unjudged_lines(findings),
+    ]
     lines += [line] if (line := corridor_line(setup, findings)) else []
-    if source.mission:
-        lines.append(f"Mission: {source.mission}")
-    lines.append(f"Heights: {heights_text(source)}")
+    if imported_log.mission:
+        lines.append(f"Mission: {imported_log.mission}")
+    lines.append(f"Heights: {heights_text(imported_log)}")
     wind = setup.scenario.wind
-    if source.wind:
-        lines.append(f"Wind: {wind.speed:.1f} m/s on average, {source.wind}")
-    lines.append(f"Rows: {row_faults_text(source.faults, len(source.gaps))}")
-    if source.damage.lossy or source.damage.cut:
-        lines.append(f"Lost: {damage_text(source.damage)}")
-    lines += [f"Note: {note}" for note in source.notes]
+    if imported_log.wind:
+        lines.append(f"Wind: {wind.speed:.1f} m/s on average, {imported_log.wind}")
+    lines.append(f"Rows: {row_faults_text(imported_log.faults, len(imported_log.gaps))}")
+    if imported_log.damage.lossy or imported_log.damage.cut:
+        lines.append(f"Lost: {damage_text(imported_log.damage)}")
+    lines += [f"Note: {note}" for note in imported_log.notes]
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     return tuple(lines)
 
 
-def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg_numbers: Sequence[int]) -> list[str]:
+def _judged_lines(
+    imported_log: ImportedLog, flown_stretches: Sequence[FlownLegs], leg_numbers: Sequence[int]
+) -> list[str]:
     """Return a line for each stretch, with its time and the numbers of its judged legs.
 
     leg_numbers: number of each leg of the route, as in `flight.mission.route.Route.leg_numbers`.
     """
-    if not source.stretches:
+    if not imported_log.stretches:
         return ["Judged: nothing, because no part of the flight followed the mission"]
     by_start = {legs.stretch.start: legs for legs in flown_stretches}
     lines = []
-    for stretch in source.stretches:
+    for stretch in imported_log.stretches:
         name = stretch.mode or "the flight"
         time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
         time_text += "" if stretch.mode else " (the log contains no modes)"
@@ -121,16 +125,16 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     return lines
 
 
-def heights_text(source: ImportedLog) -> str:
+def heights_text(imported_log: ImportedLog) -> str:
     """Describe a log's altitude source, its datum, and the offsets of other altitudes at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
     'from POS, above mean sea level, according to the log; difference at the start: GPS.Alt -0.1 m'
     """
-    offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in source.heights.offsets)
+    offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in imported_log.heights.offsets)
     offset_text = f"; difference at the start: {offsets}" if offsets else ""
-    return f"from {source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
+    return f"from {imported_log.heights.source}, {_DATUM_TEXTS[imported_log.heights.datum]}{offset_text}"
 
 
 def row_faults_text(faults: RowFaults, gaps: int) -> str:
@@ -214,11 +218,11 @@ def damage_text(damage: Damage) -> str:
     return "; ".join(texts) or "nothing"
 
 
-def _start_time_text(source: ImportedLog) -> str:
+def _start_time_text(imported_log: ImportedLog) -> str:
     """Describe the date and time at which the log's time is 0; return "" if the log states no plausible date."""
-    if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
+    if not isfinite(imported_log.utc_start) or not 0.0 <= imported_log.utc_start < 4.1e9:
         return ""
-    return f", time 0 s is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+    return f", time 0 s is {datetime.fromtimestamp(imported_log.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 # Name of each quantity in a message about a log without it.
@@ -247,10 +251,12 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     setup: flight setup with the source of the flight.
     log_complete: True if planfly's own log of the flight has its end.
     """
-    source = setup.source
-    if source is None:
-        raise ValueError("setup.source is missing: only imported flights can be judged here")
-    flown_stretches = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
+    imported_log = setup.imported_log
+    if imported_log is None:
+        raise ValueError("setup.imported_log is missing: only imported flights can be judged here")
+    flown_stretches = [
+        legs for stretch in imported_log.stretches if (legs := flown_legs(setup, track, stretch)) is not None
+    ]
     findings = _merge_findings([_stretch_findings(setup, legs) for legs in flown_stretches])
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown_stretches, log_complete) for judge in end_judges))
@@ -259,7 +265,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         filter(
             None,
             [
-                _missing_part_text(findings, source.missing),
+                _missing_part_text(findings, imported_log.missing),
                 _pauses_text(flown_stretches),
                 _undecided_part_text(findings),
             ],
@@ -274,7 +280,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     )
     answer_text = "; ".join([*answer_texts, *filter(None, [unjudged_text])])
     own_answer = LevelAnswer(
-        setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
+        setup.autopilot.answer_name, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
     )
     conditions = judging_conditions(setup)
     lines = imported_lines(findings, setup, own_answer, flown_stretches, conditions)
@@ -348,7 +354,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
         missing_quantities = [
             quantity
             for quantity in rule.log.quantities
-            if setup.source is not None and quantity not in setup.source.holds
+            if setup.imported_log is not None and quantity not in setup.imported_log.holds
         ]
         margin = RULE_WORDS[rule.name].margin
         if rule.log.reports_missing and margin is not None and missing_quantities and rule.name not in judged_rules:
@@ -361,24 +367,26 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
 
 def _unjudge_without_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Finding:
     """Mark a finding as not judged if the log lacks data that its rule needs."""
-    source = setup.source
-    if source is None:
+    imported_log = setup.imported_log
+    if imported_log is None:
         return finding
     reason, log_needs = "", RULES[finding.rule].log
     for quantity in log_needs.quantities:
-        if quantity not in source.holds:
+        if quantity not in imported_log.holds:
             reason = f"the log contains no {_QUANTITY_LABELS[quantity]}"
             break
         if quantity == "heights":
-            has_plan_heights = source.plan_heights or not log_needs.needs_planned_heights
-            reason = _DATUM_REASONS.get(source.heights.datum, "") if has_plan_heights else "the plan states no heights"
+            has_plan_heights = imported_log.plan_heights or not log_needs.needs_planned_heights
+            reason = (
+                _DATUM_REASONS.get(imported_log.heights.datum, "") if has_plan_heights else "the plan states no heights"
+            )
         else:
             reason = _missing_values_text(legs, quantity)
         if reason:
             break
     if reason:
         return _mark_unjudged(finding, reason)
-    if not source.aircraft_known and log_needs.needs_aircraft and finding.limit_source != "scenario":
+    if not imported_log.aircraft_known and log_needs.needs_aircraft and finding.limit_source != "scenario":
         return _mark_unjudged(finding, _UNNAMED_TEXT, keep_measurements=bool(finding.ok))
     return finding
 

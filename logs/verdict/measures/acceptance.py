@@ -98,8 +98,8 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         return half_width, "scenario"
     ends = slice(leg, leg + 2)
     depths = corner_depths(requirements, leg)
-    source = requirements.setup.source
-    radius_is_known = source is None or source.aircraft_known
+    imported_log = requirements.setup.imported_log
+    radius_is_known = imported_log is None or imported_log.aircraft_known
     if radius_is_known and not requirements.setup.autopilot.turns.follows_path:
         # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is an estimate.
         radius = np.where(requirements.setup.route.arc_radii[ends] == 0.0, requirements.radius[ends], 0.0)

@@ -108,8 +108,8 @@ def has_ground_paths(requirements: RouteRequirements) -> bool:
     This needs terrain data, a mission that was not imported from a log, and, for a plan, planned ground phases.
     """
     setup = requirements.setup
-    has_ground_phases = setup.plan is None or setup.plan.ways is not None
-    return setup.scenario.terrain is not None and has_ground_phases and setup.source is None
+    has_ground_phases = setup.plan is None or setup.plan.procedures is not None
+    return setup.scenario.terrain is not None and has_ground_phases and setup.imported_log is None
 
 
 def takeoff_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:

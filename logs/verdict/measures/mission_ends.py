@@ -24,7 +24,7 @@ def _returns_after_last_item(setup: FlightSetup) -> bool:
     """
     route, mission = setup.route, setup.mission
     ends_in_flight = route.rtl_start is None and route.endless_jump is None
-    if setup.source is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
+    if setup.imported_log is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
         return False
     last_seq = _last_seq(setup)
     last_item = next((item for item in mission.items if item.seq == last_seq), None)

@@ -23,7 +23,7 @@ from aircraft.path_limits import (
 )
 from flight.guidance.path import FlyByPath, path_polyline
 from flight.mission.fences import fence_zones
-from flight.mission.ground_ways import GroundPhases
+from flight.mission.ground_phases import GroundPhases
 from flight.mission.route import Route
 from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup

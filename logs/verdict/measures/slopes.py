@@ -307,7 +307,7 @@ def _saturation_times(
 
 def _pitch_limit_time(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> float:
     """Return the time with the pitch at the autopilot's upper limit on a leg, s; 0 for an imported flight."""
-    if requirements.setup.source is not None:
+    if requirements.setup.imported_log is not None:
         return 0.0
     pitch = aligned.track.attitude[aligned.leg_rows(leg), PITCH]
     min_pitch = requirements.setup.autopilot.speeds.max_pitch - PITCH_LIMIT_TOLERANCE_RAD

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.mission.ground_ways import GroundPhases, airborne_route
+from flight.mission.ground_phases import GroundPhases, airborne_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import RTL_ARRIVAL_RADIUS_M
 from flight.simulation.track import Track
@@ -123,7 +123,7 @@ class AlignedTrack:
 
 def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack | None:
     """Align a track with a route; return None if the track has fewer than two usable rows."""
-    is_usable = _usable_rows(track, is_own=requirements.setup.source is None)
+    is_usable = _usable_rows(track, is_own=requirements.setup.imported_log is None)
     if int(is_usable.sum()) < 2:
         return None
     if is_usable.all():
@@ -133,7 +133,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         usable_track = Track(*(getattr(track, column.name)[is_usable] for column in fields(track)))
     apexes, last_row = requirements.apexes(), len(usable_track) - 1
     progress = route_progress(
-        requirements.setup.route, usable_track.position, anywhere=requirements.setup.source is not None
+        requirements.setup.route, usable_track.position, anywhere=requirements.setup.imported_log is not None
     )
     centers, arrival_radius = _arrival_circles(requirements)
     progress = _advance_target_to_arrival(usable_track, progress, centers, arrival_radius)

@@ -150,7 +150,7 @@ class TurnMeasure:
 def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
     """Measure the turn at every inner waypoint, in order."""
     measures = [measure_turn(requirements, aligned, i) for i in range(1, requirements.legs)]
-    if requirements.setup.source is None:
+    if requirements.setup.imported_log is None:
         return measures
     corners = corner_passes(requirements, aligned)[1:-1]
     return [

@@ -454,7 +454,7 @@ class ReturnWorld:
 def unknown_energy_text(setup: FlightSetup) -> str:
     """Explain why the energy of returns is not judged; return "" if it is judged."""
     is_stated = setup.scenario.flight.battery_wh is not None
-    if setup.source is not None and not setup.source.aircraft_known:
+    if setup.imported_log is not None and not setup.imported_log.aircraft_known:
         return "the log names no aircraft, so energy is not judged"
     if setup.envelope.battery_guessed and not is_stated:
         return "the battery capacity is guessed, so energy is not judged; state battery_wh in the scenario"

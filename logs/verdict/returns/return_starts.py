@@ -74,7 +74,7 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     (True, 0.0, True)
     """
     is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
-    if setup.route.rtl_start is not None and setup.source is None:
+    if setup.route.rtl_start is not None and setup.imported_log is None:
         is_usable &= track.leg < setup.route.rtl_start
     usable_rows = np.flatnonzero(is_usable)
     if not usable_rows.size:

@@ -229,7 +229,7 @@ def _find_landing(requirements: RouteRequirements) -> _Landing | None:
     if approach is not None:
         return _Landing(approach.leg, approach.item, (float(approach.point[0]), float(approach.point[1])), True)
     landing = landing_item(requirements)
-    if landing is None or (setup.source is None and not has_ground_paths(requirements)):
+    if landing is None or (setup.imported_log is None and not has_ground_paths(requirements)):
         return None
     waypoint, item = landing
     position = setup.route.positions[waypoint]
@@ -270,7 +270,7 @@ def _fields_by_leg(
 def _logged_takeoff_home(requirements: RouteRequirements) -> tuple[float, float] | None:
     """Return home's position (east, north, m) if an imported log has a take-off, otherwise None."""
     setup, home = requirements.setup, requirements.setup.mission.home
-    if setup.source is None or home is None or takeoff_item(requirements)[1] is None:
+    if setup.imported_log is None or home is None or takeoff_item(requirements)[1] is None:
         return None
     east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
     return float(east), float(north)

@@ -100,11 +100,11 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
     flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))
     finished_count = leg_count - len(_leg_numbers(setup, set(range(setup.route.legs)) - flown_legs))
-    missing_items = None if setup.source is None else setup.source.missing
+    missing_items = None if setup.imported_log is None else setup.imported_log.missing
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     if not stretches:
-        followed_stretches = () if setup.source is None else setup.source.stretches
+        followed_stretches = () if setup.imported_log is None else setup.imported_log.stretches
         reason = (
             "none of the mission's legs was flown"
             if followed_stretches
@@ -165,7 +165,7 @@ def _unflown_legs(
 ) -> tuple[list[int], list[str]]:
     """Return the legs that were certainly not flown, and texts on legs that may be missing in the log."""
     unflown_legs = [leg for leg in range(setup.route.legs) if leg not in flown_legs]
-    begins_in_flight = setup.source is not None and setup.source.begins_in_flight
+    begins_in_flight = setup.imported_log is not None and setup.imported_log.begins_in_flight
     unseen_legs = [leg for leg in unflown_legs if begins_in_flight and leg < flown_stretches[0].first]
     partly_flown_legs = [
         leg

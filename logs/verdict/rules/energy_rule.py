@@ -58,7 +58,7 @@ def energy_findings(
     is_guessed = envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_flown = aligned is not None and bool(aligned.passed[-1]) and energy > 0.0 and planned_energy > 0.0
-    is_measured = setup.source is not None and not geometric
+    is_measured = setup.imported_log is not None and not geometric
     failsafes = _judge_battery_failsafes(requirements, energy)
     faults = _endless_jump_faults(requirements, limit, energy / planned_energy if is_flown else 1.0) + failsafes.faults
     # A flight that ends early, or with an empty battery, does not show the energy that it needs; the prediction does.
@@ -118,7 +118,9 @@ def _energy_limit(requirements: RouteRequirements) -> tuple[float, str, str]:
     failsafes = [
         failsafe
         for failsafe in setup.autopilot.checks.battery_failsafes
-        if setup.source is None and not failsafe.shares_charge and failsafe.used_charge / _MAH_PER_AH * volts < limit
+        if setup.imported_log is None
+        and not failsafe.shares_charge
+        and failsafe.used_charge / _MAH_PER_AH * volts < limit
     ]
     if not failsafes:
         return limit, source, ""
@@ -220,7 +222,7 @@ def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
     messages, unjudged = _FailsafeMessages([], []), []
-    if setup.source is not None or math.isnan(energy_used):
+    if setup.imported_log is not None or math.isnan(energy_used):
         return messages
     charge_used = energy_used / volts * _MAH_PER_AH if volts else math.nan
     for failsafe in setup.autopilot.checks.battery_failsafes:

@@ -19,7 +19,7 @@ from flight.autopilots.arduplane.go_around_point_mass import count_climb_rows, f
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.parts import LandingGlide
 from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
-from flight.mission.ground_ways import climb_pitch
+from flight.mission.ground_phases import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_point, landing_sequence, landing_starts
 from flight.mission.return_path import LandingStart
@@ -177,7 +177,7 @@ def go_around_findings(
     landing = None if landing_place is None or terrain is None else _find_landing(requirements, terrain, *landing_place)
     if landing is not None and terrain is not None:
         return [_go_around_finding(requirements, terrain, landing, is_required=is_required)]
-    if not is_required or setup.source is not None:
+    if not is_required or setup.imported_log is not None:
         return []
     reason = message(
         "a go-around is not judged",

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from flight.mission.ground_ways import TakeOff
+from flight.mission.ground_phases import TakeOff
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, finding_reason, make_finding, message
 from logs.verdict.measures.ground_paths import GroundPath, first_hazard_on_path, min_path_clearance, track_path

@@ -93,8 +93,8 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
 
     Return [] if there is no such row, or for an imported flight of an unknown aircraft.
     """
-    source = requirements.setup.source
-    if source is not None and not source.aircraft_known:
+    imported_log = requirements.setup.imported_log
+    if imported_log is not None and not imported_log.aircraft_known:
         return []
     track = aligned.track
     min_airspeeds = _min_flying_airspeeds(requirements, track.position[:, 2])

@@ -190,7 +190,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     return make_finding(
         "mission",
         Place("mission", item=first_stop.item if first_stop.item >= 0 else None),
-        ok=False if setup.source is None else None,
+        ok=False if setup.imported_log is None else None,
         reason=fault.text,
         faults=[fault],
         source="route",
@@ -213,7 +213,9 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     landing sequence and of a return path, which belong after the end, and items that a jump skips on purpose.
     """
     items = setup.mission.items
-    if setup.source is not None or not any(item.command in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH} for item in items):
+    if setup.imported_log is not None or not any(
+        item.command in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH} for item in items
+    ):
         return []
     itinerary = make_itinerary(setup.mission, resets_jump_counters=setup.autopilot.checks.resets_jump_counters)
     last = next((k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item), -1)
@@ -269,15 +271,19 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
                 if item.command == C.DO_CHANGE_SPEED and item.params[0] == 1.0
             ]
     slopes = landing_slopes(setup.mission, setup.route, setup.scenario)
-    if setup.source is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
+    if setup.imported_log is None and slopes is not None and max(map(abs, slopes)) > STEEPEST_STRIP_SLOPE:
         steepest_text = f"{max(map(abs, slopes)):.1%}; a touchdown is judged only on up to {STEEPEST_STRIP_SLOPE:.0%}"
         reason = f"NAV_LAND: the ground there slopes by {steepest_text}"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
-    texts = setup.autopilot.checks.describe_unsimulated_settings(_mission_parts(setup)) if setup.source is None else []
+    texts = (
+        setup.autopilot.checks.describe_unsimulated_settings(_mission_parts(setup))
+        if setup.imported_log is None
+        else []
+    )
     # The route notes a loiter that is flown with another radius.
     unflown_radius = setup.autopilot.loiters.unflown_note
-    if unflown_radius and unflown_radius in setup.route.notes and setup.source is None:
+    if unflown_radius and unflown_radius in setup.route.notes and setup.imported_log is None:
         texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
     for seq, text in [*remarks, *settings]:

@@ -193,7 +193,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
     """
     setup = requirements.setup
     corners = reversals(setup.route)
-    if setup.source is not None or not corners.size:
+    if setup.imported_log is not None or not corners.size:
         return []
     other_side = route_requirements(setup.with_long_reversals(), envelope=requirements.envelope)
     failures_by_side = [

@@ -65,7 +65,7 @@ def return_findings(
         )
         end_findings = _automatic_return_findings(requirements, planned_end(requirements))
         return [*_rtl_findings(requirements, None, "not flown yet"), *end_findings, *required_findings]
-    if requirements.setup.source is None:
+    if requirements.setup.imported_log is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
     continues_to_landing = requirements.setup.route.rtl_end <= requirements.legs
@@ -267,7 +267,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     reason = f"the simulated {requirements.setup.autopilot.title} returns {note_text}; {outcome}"
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")
     faults = []
-    if unknown_reason and requirements.setup.source is None:
+    if unknown_reason and requirements.setup.imported_log is None:
         # The path flown instead does not show where the autopilot flies.
         faults, ok = [message("the destination of the return is unknown", f": {unknown_reason}")], None
         reason = f"{faults[0].text}; {reason}"

@@ -534,7 +534,7 @@ def _rate_limit_slope(requirements: RouteRequirements, leg: int, *, is_climb: bo
     rate_limit = setup.autopilot.speeds.climb_limit if is_climb else setup.autopilot.speeds.sink_limit
     parameters = setup.autopilot.parameters
     stated_names = {} if parameters is None else parameters.by_origin("file")
-    if not rate_limit.name or (setup.source is not None and rate_limit.name.split(" ")[0] not in stated_names):
+    if not rate_limit.name or (setup.imported_log is not None and rate_limit.name.split(" ")[0] not in stated_names):
         return math.inf, ""
     speed = float(requirements.route.leg_airspeeds[leg])
     altitude = float(requirements.points[leg : leg + 2, 2].mean())

@@ -56,7 +56,7 @@ def speed_findings(
 def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
     """Report contradictory speed parameters as undecided: only a flight shows which airspeed is held."""
     parameters = requirements.setup.autopilot.parameters
-    if parameters is None or not parameters.contradictions or requirements.setup.source is not None:
+    if parameters is None or not parameters.contradictions or requirements.setup.imported_log is not None:
         return []
     more_text = f", and {len(parameters.contradictions) - 1} more" if len(parameters.contradictions) > 1 else ""
     fault = message(
@@ -165,7 +165,11 @@ def _find_held_speed(
         return None
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
-    if requirements.setup.source is not None or time.size < 2 or 0.5 * float(time[-1] - time[0]) < SATURATED_TIME_S:
+    if (
+        requirements.setup.imported_log is not None
+        or time.size < 2
+        or 0.5 * float(time[-1] - time[0]) < SATURATED_TIME_S
+    ):
         return None
     middle_row = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
     speed = float(aligned.track.airspeed[middle_row : rows.stop].astype(np.float64).mean())

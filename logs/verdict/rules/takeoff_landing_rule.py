@@ -57,8 +57,8 @@ def takeoff_findings(
     if waypoint == 0 or not has_own_position:
         reason = f"the autopilot chooses the course of the climb to {altitude:.0f} m AMSL over home"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
-    source = requirements.setup.source
-    if source is not None and not source.aircraft_known:
+    imported_log = requirements.setup.imported_log
+    if imported_log is not None and not imported_log.aircraft_known:
         return [
             _unjudged_finding("takeoff", requirements.waypoint(waypoint), "no aircraft was named: --aircraft names it")
         ]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.mission.ground_ways import Approach
+from flight.mission.ground_phases import Approach
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.ground_paths import first_hazard_on_path, track_path

@@ -290,7 +290,7 @@ def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeas
     # planfly's guidance has the same limit: a sharper corner with short legs has no arc to follow.
     min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
     # An autopilot that does not keep to the arc may pass the waypoint at any distance.
-    follows_arc = setup.autopilot.turns.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
+    follows_arc = setup.autopilot.turns.keeps_to_arcs and setup.imported_log is None and not setup.route.fly_over[i]
     if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
         return None
     tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]

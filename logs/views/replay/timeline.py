@@ -137,11 +137,11 @@ def _start_entry(log: FlightLog) -> TimelineEntry:
     lat, lon = to_geo(setup.scenario.origin, east, north)
     scenario = "a mission without a scenario" if setup.scenario.external else f"scenario {setup.scenario.name}"
     place = f"from {float(lat):.5f}, {float(lon):.5f} at {up:.0f} m AMSL"
-    if setup.source is None:
+    if setup.imported_log is None:
         text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.started}"
     else:
         # A real flight has neither a seed nor a trim.
-        text = f"{setup.aircraft}, {scenario}; imported log {setup.source.file}, {place}"
+        text = f"{setup.aircraft}, {scenario}; imported log {setup.imported_log.file}, {place}"
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots import point_mass as subject
 from flight.autopilots.point_mass import PointMass, excess_power, fill_excess_power, make_point_mass
-from tests.flight.autopilots.arduplane.test_rtl_point_mass import airframe
+from tests.flight.autopilots.arduplane.test_rtl_point_mass import uav
 from world.wind import Wind
 
 NONE = np.nan
@@ -44,7 +44,7 @@ def made(monkeypatch: pytest.MonkeyPatch, slowest_glide: float) -> PointMass:
     monkeypatch.setattr(subject, "_load_trim_tables", subject._load_trim_tables.__wrapped__)
     monkeypatch.setattr(subject, "read_tables", lambda *_: None)
     monkeypatch.setattr(subject, "write_tables", lambda *_: None)
-    one = airframe()
+    one = uav()
     return make_point_mass(one.aircraft, one.limits.envelope, one.airspeed, Wind(0.0, 0.0))
 
 
@@ -67,7 +67,7 @@ def test_trims_are_kept_to_the_last_bit_for_the_model_that_they_are_of(
 ) -> None:
     monkeypatch.setattr(subject, "user_cache_dir", lambda name: str(tmp_path / name))
     keep = subject._load_trim_tables.__wrapped__
-    aircraft = airframe().aircraft
+    aircraft = uav().aircraft
     made = keep(aircraft)
     (file,) = (tmp_path / "planfly").iterdir()
     sound = file.read_text(encoding="utf-8")

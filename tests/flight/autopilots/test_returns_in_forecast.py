@@ -14,7 +14,7 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_TIMEOUT
 from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.mission.return_path import LandingStart, ReturnCircle, ReturnTarget
-from tests.flight.autopilots.arduplane.test_rtl_point_mass import airframe, flat, parameters, start
+from tests.flight.autopilots.arduplane.test_rtl_point_mass import flat, parameters, start, uav
 from world.arrays import Floats
 from world.forecast.wind_field import MeanProfile, WindField, subtract_profile
 from world.frames import fit_polymap
@@ -65,12 +65,12 @@ def speed_of(speeds: Floats, time: float, east: float, up: float) -> float:
 
 
 def aerosonde(wind: Wind) -> PointMass:
-    one = airframe()
+    one = uav()
     return make_point_mass(one.aircraft, one.limits.envelope, one.airspeed, wind, GEO_MAP)
 
 
 def true_airspeed() -> float:
-    return airframe().airspeed * float(eas_to_tas_ratio(UP_M))
+    return uav().airspeed * float(eas_to_tas_ratio(UP_M))
 
 
 def fly_arduplane(begin: Record, aircraft: PointMass) -> Record:
@@ -80,7 +80,7 @@ def fly_arduplane(begin: Record, aircraft: PointMass) -> Record:
 
 def fly_px4(begin: Record, aircraft: PointMass) -> Record:
     target = ReturnTarget((0.0, 0.0, UP_M), "home", "", DISTANCE_M, transit_altitude=UP_M)
-    fly: FlyReturns | None = Px4(Px4Parameters.load(airframe().aircraft)).returns.fly
+    fly: FlyReturns | None = Px4(Px4Parameters.load(uav().aircraft)).returns.fly
     assert fly is not None
     return fly(begin, [target], aircraft, flat()).results[0]
 
@@ -111,7 +111,7 @@ def test_a_straight_return_takes_the_time_and_the_energy_of_the_wind_on_its_way(
     # Within 3 s, while the wind of the start would be wrong by up to 100 s.
     assert flown["arrival_time"] == pytest.approx(seconds, abs=3.0)
     # Its power is that of level flight, also while it circles at the end.
-    power = airframe().limits.envelope.power(airspeed, UP_M, 0.0)
+    power = uav().limits.envelope.power(airspeed, UP_M, 0.0)
     assert flown["energy"] == pytest.approx(power * flown["end_time"] / 3600.0, rel=0.05)
 
 

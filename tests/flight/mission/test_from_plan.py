@@ -17,7 +17,7 @@ from flight.mission.items import item_problem
 from flight.mission.route import make_route
 from flight.mission_files.formats import mission_text, parse_mission
 from flight.simulation.setup import make_limits
-from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
+from planner.procedures import ClimbOut, DepartureAndApproach, Descent
 from tests.mission_lines import a_plan
 from tests.soak import scaled
 from world.frames import to_map
@@ -105,7 +105,7 @@ def test_a_plan_from_the_ground_begins_with_a_take_off_and_ends_with_a_landing()
     assert returns is not None
     plan = replace(
         plan,
-        ways=DepartureAndApproach(up, down),
+        procedures=DepartureAndApproach(up, down),
         scenario=replace(plan.scenario, home=up.home, returns=returns, landing=scenario.landing),
     )
     mission = plan_mission(plan, 25.0, math.radians(30.0))

@@ -279,7 +279,7 @@ def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     rows, ended = flight.fly_block(60)
     assert ended == "loss of control: the state is not a number"
     assert len(rows) == 0
-    assert np.isfinite(flight.memory.tolist()).all()
+    assert np.isfinite(flight.guidance_memory.tolist()).all()
 
 
 def test_dive_into_a_hill(make_setup: MakeSetup, aerosonde: Aircraft) -> None:

@@ -7,9 +7,9 @@ import pytest
 from benchmarks.chain import in_child, long_flight, recording
 from flight.mission.from_plan import plan_mission
 from logs.recording.reader import read_log
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.soak import SOAK, only_in_soak
 from world.scenario import load_scenario
 
@@ -20,17 +20,17 @@ LEGS = 20 if SOAK else 2
 @pytest.mark.skipif(not SOAK, reason="a ratio of times, which other tests disturb: in make soak and make bench")
 def test_recording_costs_a_fraction_of_the_flight(tmp_path: Path) -> None:
     scenario = load_scenario("jacksboro-air")
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, 1)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
-    setup = make_setup(scenario, airframe, mission, 1, plan=plan)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, 1)
+    mission = plan_mission(plan, uav.airspeed, uav.max_bank)
+    setup = make_setup(scenario, uav, mission, 1, plan=plan)
     # The first round compiles what is not compiled yet.  Of each the least of all rounds counts, and more are flown
     # while another test on the next core makes one of them slow.
-    spent = recording(setup, airframe, tmp_path, rounds=10)
+    spent = recording(setup, uav, tmp_path, rounds=10)
     for _ in range(4):
         if spent["flight, recorded at 20 Hz"] < 1.20 * spent["flight"]:
             break
-        again = recording(setup, airframe, tmp_path, rounds=2)
+        again = recording(setup, uav, tmp_path, rounds=2)
         spent = {label: min(spent[label], again[label]) for label in spent}
     assert spent["flight, recorded at 20 Hz"] < 1.20 * spent["flight"]
     assert spent["flight, recorded at 60 Hz"] < 1.60 * spent["flight"]

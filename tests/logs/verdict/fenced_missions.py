@@ -14,8 +14,8 @@ import numpy as np
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
 from flight.simulation.setup import FlightSetup
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.setups import spec_around
 from tests.synthetic import bank_radius
 from world.arrays import Floats
@@ -283,9 +283,9 @@ def mission_of(draft: Draft, points: Floats, turn: Floats, origin: GeoOrigin) ->
 
 
 @cache
-def _airframe() -> Any:
+def _uav() -> Any:
     spec = spec_around([[0.0, 0.0, 300.0], [0.0, 900.0, 300.0]], buffer=900.0, ceiling=900.0, flight=FLIGHT)
-    return load_airframe(scenario_from_spec(spec, "made"))
+    return load_uav(scenario_from_spec(spec, "made"))
 
 
 FLIGHT = {"airspeed_mps": SPEED, "autopilot": "planfly"}
@@ -318,6 +318,6 @@ def fenced_mission(number: int) -> FencedMission:
         "made",
         external=True,
     )
-    airframe = _airframe()
-    setup = make_setup(scenario, airframe, mission_of(draft, placed, turn, origin), number)
+    uav = _uav()
+    setup = make_setup(scenario, uav, mission_of(draft, placed, turn, origin), number)
     return FencedMission(setup, feature.__name__, sign > 0.0, draft.rule, draft.plain)

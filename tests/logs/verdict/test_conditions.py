@@ -140,7 +140,7 @@ def test_every_verdict_is_told_what_it_is_for_and_holds_it_as_data() -> None:
 def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     setup = make_setup()
     source = ImportedLog("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("airspeed",))
-    setup = replace(setup.in_scenario(replace(setup.scenario, flight=FlightTable())), source=source)
+    setup = replace(setup.in_scenario(replace(setup.scenario, flight=FlightTable())), imported_log=source)
     lines = lines_of(setup)
     assert lines[0] == (
         "Aircraft: not named, so none of its limits are judged (--aircraft names yours);"
@@ -148,7 +148,7 @@ def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     )
     assert "turbulence" not in lines[1]
     assert "navigation" not in lines[1]
-    named = replace(setup, source=replace(source, aircraft_known=True, holds=()))
+    named = replace(setup, imported_log=replace(source, aircraft_known=True, holds=()))
     assert lines_of(named)[0] == "Aircraft: aerosonde, 11 kg, 25.2 m/s true airspeed (its cruise speed)"
     verdict = judge_flight(setup, make_track(), "")
     assert list(verdict.lines[1:3]) == lines

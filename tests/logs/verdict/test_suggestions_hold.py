@@ -81,6 +81,6 @@ def test_taken_until_none_is_left_the_mission_flies(number: int) -> None:
         if not wrong:
             break
         setup = taken(setup, wrong[0].suggestions[0])
-    flown = fly_to_end(Flight(setup, made.airframe.aircraft))
+    flown = fly_to_end(Flight(setup, made.uav.aircraft))
     still = failed(made, judge_flight(setup, flown.track, flown.ended))
     assert not still, [item.reason for item in still]

@@ -18,7 +18,7 @@ BEYOND, INSIDE = range(scaled(100, len(KINDS))), range(scaled(100, 4))
 
 def levels(made: MadeMission) -> dict[str, Verdict]:
     """Verdicts by geometry, of the flight, and of the flight without the aircraft's envelope."""
-    flown = fly_to_end(Flight(made.setup, made.airframe.aircraft))
+    flown = fly_to_end(Flight(made.setup, made.uav.aircraft))
     return {
         "geometric": judge_geometry(made.setup),
         "flown": judge_flight(made.setup, flown.track, flown.ended),

@@ -8,7 +8,7 @@ import pytest
 
 import planfly
 from planfly.api.optimising import Model
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.plan import Violation
 from planner.search import generations as generations_module
 from planner.search.plan_path import plan_path
@@ -147,7 +147,7 @@ def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Search, "evaluate", recorded)
     monkeypatch.setattr(generations_module, "_make_optimiser", begin)
     scenario = with_planner(load_scenario("paper-07"), "test", population=40, generations=6)
-    plan_path(scenario, load_airframe(scenario).limits, seed=5, algorithm="umda")
+    plan_path(scenario, load_uav(scenario).limits, seed=5, algorithm="umda")
     generations, (twin,) = told[:7], twins
     assert [len(vectors) for vectors, _ in generations] == [40, *[20] * 6]
     for vectors, scores in generations:

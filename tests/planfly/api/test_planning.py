@@ -12,7 +12,7 @@ from aircraft.catalog import aircraft_names, load_aircraft
 from planfly.api.planning import stop_condition
 from planfly.cli import main
 from planfly.flight_options import FlightOptions, apply_options, load_scenario_with_options
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
 from tests.planfly.conftest import FIELD
@@ -90,7 +90,7 @@ def test_a_value_that_no_scenario_may_have_is_refused() -> None:
 
 def test_it_is_the_planners_plan(path: planfly.Plan) -> None:
     scenario = load_scenario("paper-07")
-    assert plan_json(path) == plan_json(plan_path(scenario, load_airframe(scenario).limits, seed=1))
+    assert plan_json(path) == plan_json(plan_path(scenario, load_uav(scenario).limits, seed=1))
 
 
 @pytest.mark.parametrize("kind", [str, Path])
@@ -131,9 +131,9 @@ def test_a_plan_of_given_waypoints_has_departure_and_landing_and_flies() -> None
     """As every plan of this scenario, whose flights begin and end on the ground."""
     searched = planfly.plan("jacksboro", seed=1)
     given = planfly.plan("jacksboro", waypoints=searched.waypoints, seed=1)
-    assert given.ways is not None
-    assert given.ways.climb is not None
-    assert given.ways.descent is not None
+    assert given.procedures is not None
+    assert given.procedures.climb is not None
+    assert given.procedures.descent is not None
     assert given.certificate == searched.certificate
     assert given.safe
 

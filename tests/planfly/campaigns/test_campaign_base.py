@@ -71,7 +71,7 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
 
 
 def test_a_model_that_a_dispersion_cannot_vary_is_refused(base: CampaignBase) -> None:
-    cessna = replace(base, airframe=replace(base.airframe, aircraft=load_aircraft("c172x")))
+    cessna = replace(base, uav=replace(base.uav, aircraft=load_aircraft("c172x")))
     with pytest.raises(
         SpreadError, match=r"drag: the model of c172x has no property aero/drag-factor, which it varies"
     ):
@@ -136,7 +136,7 @@ def test_aircraft_battery_terrain_and_start(base: CampaignBase) -> None:
     made = vary_flight(base, drawn(**values, start_east=1.0, start_north=-2.0, start_up=3.0))
     variation = made.off_nominal.variation
     assert (variation.mass, variation.drag, variation.control) == (1.1, 0.9, 0.8)
-    assert made.setup.battery == pytest.approx(0.5 * base.airframe.battery)
+    assert made.setup.battery == pytest.approx(0.5 * base.uav.battery)
     assert made.off_nominal.start_offset == (1.0, -2.0, 3.0)
     ground = made.setup.scenario.terrain
     assert ground is not None
@@ -179,8 +179,8 @@ def test_an_aircraft_brings_its_draws(sheet: Path) -> None:
     # Each flight's aircraft is one that is known.
     varied = vary_flight(made, Draw(0, 1, nominal))
     assert (varied.setup.envelope.climb_sd, varied.setup.envelope.descent_sd) == (0.0, 0.0)
-    assert varied.setup.envelope.fastest_sd == 0.0 < made.airframe.limits.envelope.fastest_sd
-    assert varied.setup.envelope.power_sd == 0.0 < made.airframe.limits.envelope.power_sd
+    assert varied.setup.envelope.fastest_sd == 0.0 < made.uav.limits.envelope.fastest_sd
+    assert varied.setup.envelope.power_sd == 0.0 < made.uav.limits.envelope.power_sd
 
 
 def test_a_copy_of_an_aircraft_has_its_draws(sheet: Path) -> None:
@@ -211,7 +211,7 @@ def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Pat
     # What is not known is either flown or left open.
     envelope = varied.setup.envelope
     assert (envelope.climb_sd == 0.0, envelope.descent_sd == 0.0) == (drawn, drawn)
-    assert drawn or envelope.climb_sd == made.airframe.limits.envelope.climb_sd > 0.0
+    assert drawn or envelope.climb_sd == made.uav.limits.envelope.climb_sd > 0.0
 
 
 @pytest.mark.parametrize(

@@ -187,9 +187,9 @@ def test_a_return_against_more_wind_than_the_airspeed_is_covered_by_no_battery(t
 
 
 def test_an_aircraft_that_burns_fuel_is_refused(base: CampaignBase) -> None:
-    fuelled = replace(base.airframe, aircraft=replace(base.airframe.aircraft, battery_voltage=0.0))
+    fuelled = replace(base.uav, aircraft=replace(base.uav.aircraft, battery_voltage=0.0))
     with pytest.raises(PlanflyError, match="tight: aerosonde burns fuel: expected an electric aircraft"):
-        find_battery(replace(base, airframe=fuelled), BatteryGoal(flights=2), Workers(1), lambda *_: None)
+        find_battery(replace(base, uav=fuelled), BatteryGoal(flights=2), Workers(1), lambda *_: None)
 
 
 def test_a_flight_uses_what_its_track_says(base: CampaignBase) -> None:

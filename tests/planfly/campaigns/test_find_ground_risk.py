@@ -197,8 +197,8 @@ def test_lines_and_table_say_what_counts_and_what_it_is_not(base: CampaignBase) 
 def test_the_autopilot_whose_returns_count_is_named(base: CampaignBase) -> None:
     rows = [row(50.0, 40.0, 60.0)] * 20
     assert any("returns to launch by ArduPlane's rules every 10 s" in line for line in risk_lines(volumes(base, rows)))
-    autopilot = Px4(Px4Parameters.load(base.airframe.aircraft))
-    px4 = replace(base, airframe=replace(base.airframe, autopilot=autopilot))
+    autopilot = Px4(Px4Parameters.load(base.uav.aircraft))
+    px4 = replace(base, uav=replace(base.uav, autopilot=autopilot))
     lines = risk_lines(volumes(px4, rows, glide_ratio=10.0))
     assert any("returns to launch by PX4's rules every 10 s" in line for line in lines)
     assert "engine-out glides follow ArduPlane's rules, because PX4's are not simulated" in lines

@@ -296,7 +296,7 @@ def test_a_flight_that_only_an_open_setting_leaves_undecided_is_no_failure(tmp_p
 
 
 def test_an_empty_battery_has_nothing_left(base: CampaignBase) -> None:
-    empty = fly_one(replace(base, airframe=replace(base.airframe, battery=6.0)), 0)
+    empty = fly_one(replace(base, uav=replace(base.uav, battery=6.0)), 0)
     assert (empty.outcome, empty.energy_left) == ("not flyable", 0.0)
 
 

@@ -11,9 +11,9 @@ import pytest
 from flight.mission.commands import Command
 from planfly.campaigns import landing_trial
 from planfly.campaigns.landing_trial import landing_mission, steep_landing_failures
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import mission_of_plan
+from planfly.workflow.uav import load_uav
 from planner.plan import Plan
 from world.scenario import load_scenario
 
@@ -22,16 +22,16 @@ from world.scenario import load_scenario
 def demo_plan() -> Plan:
     """The demo's plan: take-off, ridges, and a landing on a final of 4.9 degrees."""
     scenario = load_scenario("jacksboro")
-    return make_plan(scenario, load_airframe(scenario), 1)
+    return make_plan(scenario, load_uav(scenario), 1)
 
 
 def plan_with_final(degrees: float) -> Plan:
     """The demo's plan as if its final had another slope; its mission stays the same."""
     plan = demo_plan()
-    assert plan.ways is not None
-    assert plan.ways.descent is not None
-    descent = replace(plan.ways.descent, slope=math.tan(math.radians(degrees)))
-    return replace(plan, ways=replace(plan.ways, descent=descent))
+    assert plan.procedures is not None
+    assert plan.procedures.descent is not None
+    descent = replace(plan.procedures.descent, slope=math.tan(math.radians(degrees)))
+    return replace(plan, procedures=replace(plan.procedures, descent=descent))
 
 
 def count_flights(monkeypatch: pytest.MonkeyPatch, flyable: int) -> list[int]:
@@ -53,7 +53,7 @@ def test_a_steep_final_that_holds_in_less_than_95_percent_is_stated(
     """38 of 40 are 95 %."""
     flown = count_flights(monkeypatch, flyable)
     plan = plan_with_final(6.0)
-    texts = steep_landing_failures(plan, load_airframe(plan.scenario))
+    texts = steep_landing_failures(plan, load_uav(plan.scenario))
     assert flown == list(range(40))
     assert bool(texts) == is_stated
     for text in texts:
@@ -67,15 +67,15 @@ def test_a_steep_final_that_holds_in_less_than_95_percent_is_stated(
 def test_a_shallow_final_is_not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
     flown = count_flights(monkeypatch, 0)
     plan = demo_plan()
-    assert steep_landing_failures(plan, load_airframe(plan.scenario)) == ()
+    assert steep_landing_failures(plan, load_uav(plan.scenario)) == ()
     assert flown == []
 
 
 def test_the_landing_is_the_end_of_the_mission() -> None:
     """Its waypoints are those of the mission's last items: the path's end, the line-up, the glide, the landing."""
     plan = demo_plan()
-    airframe = load_airframe(plan.scenario)
-    whole = mission_of_plan(plan, airframe)
+    uav = load_uav(plan.scenario)
+    whole = mission_of_plan(plan, uav)
     landing = landing_mission(whole)
     positions, expected = (
         [(item.lat_deg, item.lon_deg, item.alt) for item in mission.items if item.command == Command.NAV_WAYPOINT]

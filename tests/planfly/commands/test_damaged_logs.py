@@ -75,7 +75,7 @@ def test_damaged_copies_are_refused_or_told(tmp_path: Path, capsys: Output, name
             continue
         assert err == "", seed
         flown = read_log(target)
-        source = flown.setup.source
+        source = flown.setup.imported_log
         assert source is not None
         # What is told is what was found.
         assert ("Lost: " in out) == (source.damage.lossy or source.damage.cut), seed

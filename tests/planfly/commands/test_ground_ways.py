@@ -40,7 +40,7 @@ def test_a_first_waypoint_behind_a_ridge_is_not_judged_in_full(
     assert "  open    climb-out at waypoint 0 (item 1): the climb from home to item 1 hits the ground: " in out
     # The flight itself is well: no autopilot is blamed.
     assert "The aircraft can" not in out
-    assert "Airframe alone (planfly's guidance, exact navigation): flyable in the air; both flights agree" in out
+    assert "Uav alone (planfly's guidance, exact navigation): flyable in the air; both flights agree" in out
     assert main(["check", str(tmp_path / "f.mcap")]) == 3
 
 

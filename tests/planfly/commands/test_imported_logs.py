@@ -40,7 +40,7 @@ def test_each_format_becomes_a_log_of_our_own(tmp_path: Path, capsys: Output, na
     assert written.startswith(again)
     assert main(["check", str(log), "--plan", str(plan)]) == 0
     assert capsys.readouterr().out == again
-    source = read_log(tmp_path / "a.mcap").setup.source
+    source = read_log(tmp_path / "a.mcap").setup.imported_log
     assert source is not None
     assert (source.file, source.mission, len(source.sha256)) == (name, "of plan.waypoints", 64)
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
@@ -299,7 +299,7 @@ def test_tables_pictures_and_a_log_of_the_models_flight(tmp_path: Path, capsys: 
         "simulated.mcap",
     ]
     simulated = read_log(tmp_path / "a-refly" / "simulated.mcap")
-    assert (simulated.complete, simulated.setup.source) == (True, None)
+    assert (simulated.complete, simulated.setup.imported_log) == (True, None)
     assert main(["refly", str(flight), "--out", str(tmp_path / "a-refly")]) == 2
     assert "not empty" in capsys.readouterr().err
 

@@ -20,8 +20,8 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Mission
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.cli import main
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.mission_lines import mission, wp
 from world.scenario import scenario_from_spec
 
@@ -90,8 +90,8 @@ CASES = {
 
 def answer(law: str, read: Mission) -> str:
     scenario = scenario_from_spec(SPEC, "items")
-    airframe = replace(load_airframe(scenario), autopilot=LAWS[law]())
-    return judge_geometry(make_setup(scenario, airframe, read, 1)).answer
+    uav = replace(load_uav(scenario), autopilot=LAWS[law]())
+    return judge_geometry(make_setup(scenario, uav, read, 1)).answer
 
 
 @pytest.mark.parametrize(("law", "line"), CASES)

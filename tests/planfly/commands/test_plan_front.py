@@ -8,7 +8,7 @@ import pytest
 
 from planfly.cli import main
 from planfly.terminal.plan_answers import fewer_plans_line
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.plan import read_plan
 from planner.search.plan_front import plan_front
 from planner.search.plan_path import plan_path
@@ -83,7 +83,7 @@ def test_what_does_not_go_with_a_front_is_refused_in_a_line(
 
 def test_a_front_that_its_budget_ended_says_so() -> None:
     scenario = load_scenario("tight")
-    limits = load_airframe(scenario).limits
+    limits = load_uav(scenario).limits
     default = plan_path(scenario, limits, seed=1)
     front = plan_front(scenario, limits, 10, seed=1, default=default, stop=lambda: "budget")
     # The search stops after the first seed, which is the default plan.

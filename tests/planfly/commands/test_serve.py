@@ -20,7 +20,7 @@ from flight.live.telemetry import MODE_NAMES
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from tests.planfly.conftest import FIELD, Served
 from tests.planfly.misuse.test_listeners import listening, table
 from tests.soak import SOAK, only_in_soak, scaled, tally, widen
@@ -97,7 +97,7 @@ def test_a_served_flight_is_the_flight_of_fly_at_real_time(real: Served) -> None
     log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
     assert log.complete
     assert log.ended == "completed"
-    again = fly_to_end(Flight(log.setup, load_airframe(log.setup.scenario).aircraft))
+    again = fly_to_end(Flight(log.setup, load_uav(log.setup.scenario).aircraft))
     assert again.track.position.tobytes() == log.track.position.tobytes()
     assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 0
 
@@ -132,7 +132,7 @@ def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], real: 
         log = read_log(path)
         assert not log.complete
         assert log.end_time >= seconds - 1.0
-        whole = fly_to_end(Flight(log.setup, load_airframe(log.setup.scenario).aircraft)).track
+        whole = fly_to_end(Flight(log.setup, load_uav(log.setup.scenario).aircraft)).track
         count = len(log.track)
         assert count > 30
         assert np.array_equal(whole.position[:count], log.track.position)

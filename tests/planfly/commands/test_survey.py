@@ -16,7 +16,7 @@ from planfly.api import surveying
 from planfly.cli import main
 from planfly.surveys import survey_remedies
 from planfly.surveys.survey_remedies import SurveyRemedy, TriedRemedies
-from planfly.workflow.airframe import Airframe
+from planfly.workflow.uav import Uav
 from tests.soak import SOAK
 
 FIELD_SURVEY = Path(__file__).with_name("field.waypoints")
@@ -92,7 +92,7 @@ def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.Captur
 def test_a_parameter_that_would_help_is_written_beside_ones_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def found(setup: FlightSetup, _: Airframe, verdict: Verdict, *__: Any) -> TriedRemedies:
+    def found(setup: FlightSetup, _: Uav, verdict: Verdict, *__: Any) -> TriedRemedies:
         laid = replace(setup.mission, items=setup.mission.items[:-1])
         of = SurveyRemedy("parameter", "ROLL_LIMIT_DEG", 35.0, 47.0, "deg", verdict, laid, 5000.0, 150.0)
         return TriedRemedies((of,))
@@ -115,7 +115,7 @@ def test_a_layout_for_a_plan_is_a_plan_with_all_that_it_holds(
 ) -> None:
     """With fence, rally points and firmwareType; its items hold no camera, so that the next command states it."""
 
-    def found(setup: FlightSetup, _: Airframe, verdict: Verdict, *__: Any) -> TriedRemedies:
+    def found(setup: FlightSetup, _: Uav, verdict: Verdict, *__: Any) -> TriedRemedies:
         laid = replace(setup.mission, items=setup.mission.items[:-1])
         return TriedRemedies((SurveyRemedy("turn-around", "", 0.0, 150.0, "m", verdict, laid, 5000.0, 150.0),))
 

@@ -11,7 +11,7 @@ from flight.mission_files.formats import read_mission
 from flight.mission_files.qgc_plan import parse_plan_file
 from flight.mission_files.wpl import HEADER, parse_waypoints
 from logs.recording.reader import read_log
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.plan import read_plan
 from planner.search.algorithms import find_algorithm
 from tests.world.made.made_scenario import SMALL
@@ -27,7 +27,7 @@ _PARAMETERS = "WP_RADIUS\t90\nROLL_LIMIT_DEG\t{}\n"
 def _params(folder: Path, text: str) -> object:
     file = folder / "my.parm"
     file.write_text(text)
-    return load_airframe(with_flight(load_scenario("tight"), params=str(file)))
+    return load_uav(with_flight(load_scenario("tight"), params=str(file)))
 
 
 # What is refused, and the file, field, value and words of it.

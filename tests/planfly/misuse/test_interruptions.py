@@ -66,7 +66,7 @@ class Case:
 FEW = (
     # It is ended by Ctrl-C in tests/planfly/commands/test_plan.py.
     *((Case(("plan", "endless.toml", "--out", "plan.json"), "planning", 0.5, signal.SIGTERM),) if SOAK else ()),
-    # What is left of its log is seen in tests/planfly/workflow/test_crash_safe_log.py.
+    # What is left of its log is seen in tests/logs/recording/test_crash_safe_recorder.py.
     *((Case(FLY, "flying", 0.2, signal.SIGINT, grown="f.mcap"),) if SOAK else ()),
     # Each vehicle of the other tests is ended so.
     *((Case(SERVE, "flight logs", 0.3, signal.SIGINT),) if SOAK else ()),

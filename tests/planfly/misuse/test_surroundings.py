@@ -15,8 +15,8 @@ from typing import TypeAlias
 import pytest
 
 from logs.recording.example_log import example_log
+from logs.recording.recorder import CrashSafeRecorder
 from planfly.cli import main
-from planfly.workflow.crash_safe_log import CrashSafeLog
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
 from tests.soak.test_hostile_files import WPL
@@ -233,11 +233,11 @@ def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[st
 def test_two_flights_into_one_log(folder: Path) -> None:
     """The second does not touch the first's log."""
     path, setup = folder / "f.mcap", example_log().setup
-    with CrashSafeLog(path, setup) as first:
+    with CrashSafeRecorder(path, setup) as first:
         size = path.stat().st_size
         with pytest.raises(PlanflyError, match=r"f\.mcap: another planfly process is writing there"):
-            CrashSafeLog(path, setup)
+            CrashSafeRecorder(path, setup)
         assert path.stat().st_size == size
         del first
-    with CrashSafeLog(path, setup):
+    with CrashSafeRecorder(path, setup):
         pass

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from planfly.planning.expected_failures import expected_failures
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
-from planner.ground_ways import DepartureAndApproach, Descent
+from planfly.workflow.uav import load_uav
 from planner.plan import Plan
+from planner.procedures import DepartureAndApproach, Descent
 from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 GLIDE = 0.1
@@ -21,11 +21,11 @@ GLIDE = 0.1
 @cache
 def plan_of(name: str) -> Plan:
     scenario = load_scenario(name)
-    return make_plan(scenario, load_airframe(scenario), 1)
+    return make_plan(scenario, load_uav(scenario), 1)
 
 
 def said_of(plan: Plan) -> tuple[str, ...]:
-    return expected_failures(plan, load_airframe(plan.scenario))
+    return expected_failures(plan, load_uav(plan.scenario))
 
 
 def landing_plan(turbulence: str = "none", **strip: Any) -> Plan:
@@ -36,7 +36,7 @@ def landing_plan(turbulence: str = "none", **strip: Any) -> Plan:
     spec["wind"] = {"speed_mps": 5.0, "from_deg": 250.0, "turbulence": turbulence}
     scenario: Scenario = scenario_from_spec(spec, "landing")
     descent = Descent(np.zeros((0, 3)), np.zeros((2, 3)), np.zeros(3), 0.0, GLIDE, 70.0)
-    return replace(plan, scenario=scenario, ways=DepartureAndApproach(None, descent))
+    return replace(plan, scenario=scenario, procedures=DepartureAndApproach(None, descent))
 
 
 @pytest.mark.parametrize(("name", "part"), [("steep", "leg 4: climbs 18.3 deg"), ("tight", "leg 9: 30 m long")])

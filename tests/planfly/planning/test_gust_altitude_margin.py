@@ -15,8 +15,8 @@ from planfly.planning.gust_altitude_margin import (
     limits_for_alternatives,
     limits_in_gusts,
 )
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import finish_plan, make_plan
+from planfly.workflow.uav import Uav, load_uav
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
 from planner.plan import Plan
@@ -45,11 +45,11 @@ def scenario_of(turbulence: str, height: float = 60.0, **tables: Any) -> Scenari
     return scenario_from_spec(spec_around(ends, buffer=3000.0, ceiling=GROUND + 800.0) | made | tables, "gusts")
 
 
-def plan_along(airframe: Airframe, scenario: Scenario, way: Any) -> Plan:
+def plan_along(uav: Uav, scenario: Scenario, way: Any) -> Plan:
     """A plan of given waypoints, with its certificate."""
-    found = plan_path(scenario, airframe.limits, seed=SEED)
+    found = plan_path(scenario, uav.limits, seed=SEED)
     waypoints = np.array(way, dtype=np.float64)
-    certificate = certify(make_problem(scenario, airframe.limits), waypoints)
+    certificate = certify(make_problem(scenario, uav.limits), waypoints)
     return replace(found, waypoints=waypoints, certificate=certificate)
 
 
@@ -73,33 +73,33 @@ def test_who_keeps_it_otherwise_and_calm_air_are_left_as_they_were() -> None:
         scenario_of("none"),
         scenario_of("moderate", flight={"aircraft": "aerosonde", "autopilot": "ardupilot"}),
     ):
-        airframe = load_airframe(scenario)
-        plan = plan_path(scenario, airframe.limits, seed=SEED)
-        assert ensure_altitude_margin(plan, airframe, lambda limits: pytest.fail("searched for another")) is plan
-        assert limits_for_alternatives(plan, airframe) == airframe.limits
+        uav = load_uav(scenario)
+        plan = plan_path(scenario, uav.limits, seed=SEED)
+        assert ensure_altitude_margin(plan, uav, lambda limits: pytest.fail("searched for another")) is plan
+        assert limits_for_alternatives(plan, uav) == uav.limits
 
 
-def needed(airframe: Airframe, climbs: float = 0.0) -> float:
+def needed(uav: Uav, climbs: float = 0.0) -> float:
     """Height (m) that downdrafts may take from the Zagi in moderate turbulence while it climbs, by plain sums."""
-    return 12.0 * (2.33 * GUST - (airframe.limits.max_climb_and_sink_rates(GROUND + 80.0)[0] - climbs))
+    return 12.0 * (2.33 * GUST - (uav.limits.max_climb_and_sink_rates(GROUND + 80.0)[0] - climbs))
 
 
 @pytest.mark.parametrize("over", [0.5, -0.5])
 def test_a_level_path_keeps_what_a_downdraft_may_take(over: float) -> None:
-    airframe = load_airframe(scenario_of("moderate"))
-    height = 50.0 + needed(airframe) + over
+    uav = load_uav(scenario_of("moderate"))
+    height = 50.0 + needed(uav) + over
     scenario = scenario_of("moderate", height=height)
-    plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
     assert plan.safe
-    settled = ensure_altitude_margin(plan, airframe)
+    settled = ensure_altitude_margin(plan, uav)
     assert (settled is plan) is (over > 0.0)
     assert settled.safe is (over > 0.0)
 
 
 def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
     """At 0.5 m/s of climb 6 m more than level; the leg begins with 30 m above its clearance."""
-    airframe = load_airframe(scenario_of("moderate"))
-    steep = 0.5 / airframe.airspeed
+    uav = load_uav(scenario_of("moderate"))
+    steep = 0.5 / uav.airspeed
     way = np.array([[0, 0, 80], [2000, 0, 80], [2000 + 70 / steep, 0, 150], [4000 + 70 / steep, 0, 150]])
     scenario = scenario_from_spec(
         scenario_of("moderate").to_json()
@@ -108,10 +108,10 @@ def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
         | {"area": {"east_m": [-3000, 9000], "north_m": [-3000, 3000], "ceiling_amsl_m": GROUND + 800}},
         "gusts",
     )
-    plan = plan_along(airframe, scenario, way + np.array([0.0, 0.0, GROUND]))
+    plan = plan_along(uav, scenario, way + np.array([0.0, 0.0, GROUND]))
     assert plan.safe
-    (problem,) = ensure_altitude_margin(plan, airframe).certificate.problems
-    lacks = needed(airframe, 0.5) - 30.0
+    (problem,) = ensure_altitude_margin(plan, uav).certificate.problems
+    lacks = needed(uav, 0.5) - 30.0
     assert (
         f"downdrafts may take the aircraft {lacks:.0f} m into the clearance of 50 m on leg 1; less turbulence"
         in problem
@@ -121,20 +121,20 @@ def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
 def test_near_a_low_end_half_is_kept() -> None:
     """15 m above the clearance at both ends no plan keeps 28 m there, and one that climbs from them is taken."""
     scenario = scenario_of("moderate", height=65.0)
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     asked = list[Limits]()
 
     def search(limits: Limits) -> Plan:
         asked.append(limits)
         return plan_path(scenario, limits, seed=SEED)
 
-    first = plan_path(scenario, airframe.limits, seed=SEED)
-    plan = ensure_altitude_margin(first, airframe, search)
+    first = plan_path(scenario, uav.limits, seed=SEED)
+    plan = ensure_altitude_margin(first, uav, search)
     assert first.safe
     assert plan.safe
     assert len(asked) == 1
     # Over the middle, far from the ends, it has all that the searched limits keep.
-    reserve = min(1.2 * GUST, 0.25 * airframe.limits.max_climb_and_sink_rates(float(first.waypoints[:, 2].max()))[0])
+    reserve = min(1.2 * GUST, 0.25 * uav.limits.max_climb_and_sink_rates(float(first.waypoints[:, 2].max()))[0])
     assert asked[0].reserve_climb == pytest.approx(reserve, rel=5e-3)
     assert asked[0].reserve_height == pytest.approx(12.0 * (2.33 * GUST - reserve), rel=5e-3)
     middle = np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) - GROUND - 50.0
@@ -143,13 +143,13 @@ def test_near_a_low_end_half_is_kept() -> None:
 
 @pytest.mark.parametrize("over", [0.5, -0.5])
 def test_an_end_that_lies_too_low_is_named_and_nothing_is_searched_for(over: float) -> None:
-    airframe = load_airframe(scenario_of("moderate"))
-    half = 0.5 * 12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(GROUND + 64.0)[0])
+    uav = load_uav(scenario_of("moderate"))
+    half = 0.5 * 12.0 * (2.33 * GUST - uav.limits.max_climb_and_sink_rates(GROUND + 64.0)[0])
     scenario = scenario_of("moderate", height=50.0 + half + over)
-    found = plan_path(scenario, airframe.limits, seed=SEED)
+    found = plan_path(scenario, uav.limits, seed=SEED)
     assert found.safe
     plan = ensure_altitude_margin(
-        found, airframe, None if over > 0.0 else lambda limits: pytest.fail("searched for another")
+        found, uav, None if over > 0.0 else lambda limits: pytest.fail("searched for another")
     )
     (problem,) = plan.certificate.problems
     assert ("at its start; less turbulence" in problem) is (over < 0.0)
@@ -159,11 +159,11 @@ def test_an_end_that_lies_too_low_is_named_and_nothing_is_searched_for(over: flo
 @pytest.mark.parametrize(("away", "safe"), [(1700.0, False), (400.0, True)])
 def test_the_whole_is_kept_1500_m_from_an_end(away: float, safe: bool) -> None:
     """A path that sinks to 20 m above its clearance, 8 m less than level flight takes and 6 m more than half of it."""
-    airframe = load_airframe(scenario_of("moderate"))
+    uav = load_uav(scenario_of("moderate"))
     scenario = scenario_of("moderate", height=100.0)
     low = [[0, 0, 100], [away, 0, 70], [away + 50, 0, 70], [away + 1550, 0, 100], [8000, 0, 100]]
-    plan = plan_along(airframe, scenario, np.array(low) + np.array([0.0, 0.0, GROUND]))
-    shortfalls = find_shortfalls(plan, airframe)
+    plan = plan_along(uav, scenario, np.array(low) + np.array([0.0, 0.0, GROUND]))
+    shortfalls = find_shortfalls(plan, uav)
     assert bool(shortfalls) is not safe
     assert {one.hazard for one in shortfalls} <= {"into the clearance of 50 m"}
 
@@ -171,12 +171,12 @@ def test_the_whole_is_kept_1500_m_from_an_end(away: float, safe: bool) -> None:
 def test_below_a_height_limit_more_climb_is_left_in_place_of_height() -> None:
     """97 m above ground leave 47 m: less than 39 m and the margins of a search, and more than level flight takes."""
     scenario = scenario_of("moderate", height=65.0, limits={"min_clearance_m": 50.0, "max_height_m": 97.0})
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, SEED)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, SEED)
     assert plan.safe
-    assert not find_shortfalls(plan, airframe)
-    level = plan_along(airframe, scenario, [scenario.start, scenario.destination])
-    (problem,) = ensure_altitude_margin(level, airframe).certificate.problems
+    assert not find_shortfalls(plan, uav)
+    level = plan_along(uav, scenario, [scenario.start, scenario.destination])
+    (problem,) = ensure_altitude_margin(level, uav).certificate.problems
     assert "or a higher limit on its height would help" in problem
 
 
@@ -190,9 +190,9 @@ def test_an_aircraft_that_hardly_climbs_is_not_sent_into_gusts(ground: float, en
         "area": {"east_m": [-3000, 11000], "north_m": [-3000, 3000], "ceiling_amsl_m": ground + 800},
     }
     scenario = scenario_from_spec(scenario_of("moderate").to_json() | far, "gusts")
-    airframe = load_airframe(scenario)
-    assert (airframe.limits.max_climb_and_sink_rates(ground + 300.0)[0] > 0.6 * GUST) is enough
-    plan = make_plan(scenario, airframe, SEED)
+    uav = load_uav(scenario)
+    assert (uav.limits.max_climb_and_sink_rates(ground + 300.0)[0] > 0.6 * GUST) is enough
+    plan = make_plan(scenario, uav, SEED)
     assert plan.safe is enough
     assert any("with less than 0.92 m/s, downdrafts" in one for one in plan.certificate.problems) is not enough
 
@@ -200,12 +200,12 @@ def test_an_aircraft_that_hardly_climbs_is_not_sent_into_gusts(ground: float, en
 def test_a_leg_counts_with_the_least_climb_that_it_leaves() -> None:
     """A leg that sinks begins where the air is thinner: it leaves less there than at its end, where it is lowest."""
     scenario = scenario_of("moderate", height=100.0)
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     way = np.array([[0, 0, 780], [6000, 0, 79], [8000, 0, 79]]) + np.array([0.0, 0.0, GROUND])
-    (lacks,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
+    (lacks,) = find_shortfalls(plan_along(uav, scenario, way), uav)
     assert lacks.place == "on leg 0"
     assert lacks.depth == pytest.approx(
-        12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(GROUND + 780.0)[0]) - 29.0, abs=0.3
+        12.0 * (2.33 * GUST - uav.limits.max_climb_and_sink_rates(GROUND + 780.0)[0]) - 29.0, abs=0.3
     )
 
 
@@ -214,14 +214,14 @@ def test_a_tailwind_makes_a_climb_faster(from_deg: float, sign: float) -> None:
     """The same slope over the ground takes more climb with the wind, and leaves less against downdrafts."""
     wind = {"speed_mps": 5.0, "from_deg": from_deg, "turbulence": "moderate"}
     scenario = scenario_of("moderate", height=150.0, wind=wind)
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     slope = 0.03
     way = np.array([[0, 0, 150], [2000, 0, 80], [2000 + 70 / slope, 0, 150], [8000, 0, 150]])
-    plan = plan_along(airframe, scenario, way + np.array([0.0, 0.0, GROUND]))
+    plan = plan_along(uav, scenario, way + np.array([0.0, 0.0, GROUND]))
     # The guidance keeps the true airspeed, and the wind is the same at every height.
-    climbs = slope * (airframe.airspeed + sign * 5.0)
-    left = min(airframe.limits.max_climb_and_sink_rates(GROUND + up)[0] for up in (80.0, 150.0)) - climbs
-    (lacks,) = find_shortfalls(plan, airframe)
+    climbs = slope * (uav.airspeed + sign * 5.0)
+    left = min(uav.limits.max_climb_and_sink_rates(GROUND + up)[0] for up in (80.0, 150.0)) - climbs
+    (lacks,) = find_shortfalls(plan, uav)
     assert lacks.place == "on leg 1"
     assert lacks.depth == pytest.approx(12.0 * (2.33 * GUST - left) - 30.0, abs=0.5)
 
@@ -241,14 +241,14 @@ MAST = {"name": "mast", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "
 def test_what_lies_below_counts(tables: dict[str, Any], into: str) -> None:
     """20 m above both: a path that high keeps enough above ground, and another is searched for that keeps away."""
     scenario = scenario_of("moderate", height=120.0, **tables)
-    airframe = load_airframe(scenario)
-    plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    uav = load_uav(scenario)
+    plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
     assert plan.safe
-    (problem,) = ensure_altitude_margin(plan, airframe).certificate.problems
-    assert f"downdrafts may take the aircraft {needed(airframe) - 20.0:.0f} m into {into} on leg 0;" in problem
-    made = make_plan(scenario, airframe, SEED)
+    (problem,) = ensure_altitude_margin(plan, uav).certificate.problems
+    assert f"downdrafts may take the aircraft {needed(uav) - 20.0:.0f} m into {into} on leg 0;" in problem
+    made = make_plan(scenario, uav, SEED)
     assert made.safe
-    assert ensure_altitude_margin(made, airframe) is made
+    assert ensure_altitude_margin(made, uav) is made
 
 
 @pytest.mark.parametrize("tables", [{"zones": [MAST]}, {"threats": [SAM]}], ids=["zone", "missile"])
@@ -258,10 +258,10 @@ def test_what_is_thinner_than_the_height_is_not_jumped_over(tables: dict[str, An
     sphere = {"amsl_m": GROUND + 96.0, "kill_radius_m": 4.0, "kill_scale_m": 2.0}
     thin = {name: [entries[0] | (zone if name == "zones" else sphere)] for name, entries in tables.items()}
     scenario = scenario_of("moderate", height=112.0, **thin)
-    airframe = load_airframe(scenario)
-    plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    uav = load_uav(scenario)
+    plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
     assert plan.safe
-    (shortfall,) = find_shortfalls(plan, airframe)
+    (shortfall,) = find_shortfalls(plan, uav)
     assert shortfall.is_threat
     assert 1.0 < shortfall.depth <= 4.1
 
@@ -271,22 +271,22 @@ def test_near_a_low_end_a_zone_needs_as_little_as_the_ground() -> None:
     mast = {"name": "shed", "kind": "exclusion", "east_m": 0.0, "north_m": 0.0, "radius_m": 100.0}
     zones = [mast | {"ceiling_amsl_m": GROUND + 40.0}]
     scenario = scenario_of("moderate", height=65.0, zones=zones)
-    assert make_plan(scenario, load_airframe(scenario), SEED).safe
+    assert make_plan(scenario, load_uav(scenario), SEED).safe
 
 
 def test_a_search_that_was_cut_short_is_not_taken_for_proof() -> None:
     """Without its end a higher plan would have been found, as it is without a budget."""
     scenario = scenario_of("moderate", height=65.0)
-    airframe = load_airframe(scenario)
-    first = plan_path(scenario, airframe.limits, seed=SEED)
-    whole = make_plan(scenario, airframe, SEED)
+    uav = load_uav(scenario)
+    first = plan_path(scenario, uav.limits, seed=SEED)
+    whole = make_plan(scenario, uav, SEED)
     assert whole.safe
     assert whole.ended == "completed"
     assert whole.evaluations > first.evaluations
     # A straight line is found at once, and what is left then is less than a population.
     budget = first.evaluations + scenario.planner.population - 1
     table = scenario.planner.model_copy(update={"budget": budget})
-    cut = make_plan(replace(scenario, planner=table), airframe, SEED)
+    cut = make_plan(replace(scenario, planner=table), uav, SEED)
     assert not cut.safe
     assert cut.ended == "budget"
     assert cut.evaluations == first.evaluations
@@ -297,8 +297,8 @@ def test_a_search_that_was_cut_short_is_not_taken_for_proof() -> None:
         return replace(found, ended=next(searches), certificate=first.certificate, waypoints=first.waypoints)
 
     shared = SharedBudget(search)
-    low = shared(scenario, airframe.limits)
-    refused = ensure_altitude_margin(low, airframe, lambda limits: shared(scenario, limits))
+    low = shared(scenario, uav.limits)
+    refused = ensure_altitude_margin(low, uav, lambda limits: shared(scenario, limits))
     assert not refused.safe
     assert shared.with_total_evaluations(refused).ended == "interrupted"
     assert shared.with_total_evaluations(refused).evaluations > 2 * first.evaluations
@@ -307,22 +307,22 @@ def test_a_search_that_was_cut_short_is_not_taken_for_proof() -> None:
 def test_no_other_plan_of_a_front_is_lower() -> None:
     """A path that was found is refused where it lacks height, and nothing is searched for."""
     scenario = scenario_of("moderate", height=70.0)
-    airframe = load_airframe(scenario)
-    low = plan_path(scenario, airframe.limits, seed=SEED)
+    uav = load_uav(scenario)
+    low = plan_path(scenario, uav.limits, seed=SEED)
     assert low.safe
-    assert not finish_plan(low, airframe).safe
+    assert not finish_plan(low, uav).safe
 
 
 def test_plans_beside_one_that_leads_above_a_missile_keep_above_it_too() -> None:
     wall = [SAM | {"name": f"sam {k}", "north_m": 150.0 * k} for k in range(-19, 20)]
     scenario = scenario_of("moderate", height=120.0, threats=wall)
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, SEED)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, SEED)
     assert plan.safe
-    kept = limits_for_alternatives(plan, airframe)
+    kept = limits_for_alternatives(plan, uav)
     assert kept.reserve_threats == kept.reserve_height > 30.0
     beside = replace(scenario, threats=scenario_of("moderate").threats)
-    assert limits_for_alternatives(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
+    assert limits_for_alternatives(make_plan(beside, uav, SEED), uav).reserve_height > 30.0
 
 
 @pytest.mark.usefixtures("short_fronts")
@@ -330,13 +330,13 @@ def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
     radar = {"name": "radar", "east_m": 4000.0, "north_m": 500.0, "amsl_m": GROUND}
     reach = {"detection_radius_m": 1500.0, "detection_scale_m": 800.0}
     scenario = scenario_of("moderate", height=70.0, threats=[radar | reach])
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     front = planfly.plan_front(scenario, 4, seed=SEED)
     assert len(front.plans) >= 3
-    assert limits_for_alternatives(front.default.plan, airframe).reserve_height > 30.0
+    assert limits_for_alternatives(front.default.plan, uav).reserve_height > 30.0
     for one in [*(found.plan for found in front.plans), planfly.plan(scenario, seed=SEED)]:
         assert one.safe
-        assert ensure_altitude_margin(one, airframe) is one
+        assert ensure_altitude_margin(one, uav) is one
 
 
 # --- Updrafts ---
@@ -370,64 +370,64 @@ def test_an_updraft_lifts_those_who_keep_their_airspeed(
     sink: float, turbulence: Turbulence, rise: float, autopilot: str
 ) -> None:
     expected = 0.0 if autopilot == "planfly" else rise
-    found = load_airframe(band_of(300.0, autopilot)).autopilot.deviations.gust_rise(sink, turbulence)
+    found = load_uav(band_of(300.0, autopilot)).autopilot.deviations.gust_rise(sink, turbulence)
     assert found == pytest.approx(expected, abs=0.3)
 
 
 @pytest.mark.parametrize("over", [0.5, -0.5])
 def test_a_level_path_leaves_what_an_updraft_may_give(over: float) -> None:
     """Below the maximum height: the rise, and ArduPlane's own error of height."""
-    airframe = load_airframe(band_of(300.0))
-    error = airframe.limits.tracking
+    uav = load_uav(band_of(300.0))
+    error = uav.limits.tracking
     assert error is not None
-    rise = 12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(150.0)[1])
+    rise = 12.0 * (2.33 * GUST - uav.limits.max_climb_and_sink_rates(150.0)[1])
     assert rise > 5.0
     scenario = band_of(150.0 + rise + error.up + over)
-    plan = plan_along(airframe, scenario, [scenario.start, [4000.0, 0.0, 150.0], scenario.destination])
-    shortfalls = find_shortfalls(plan, airframe)
+    plan = plan_along(uav, scenario, [scenario.start, [4000.0, 0.0, 150.0], scenario.destination])
+    shortfalls = find_shortfalls(plan, uav)
     assert bool(shortfalls) is (over < 0.0)
     assert {one.gust for one in shortfalls} <= {"updrafts"}
-    assert ensure_altitude_margin(plan, airframe).safe is (over > 0.0)
+    assert ensure_altitude_margin(plan, uav).safe is (over > 0.0)
 
 
 def test_a_leg_that_sinks_leaves_less() -> None:
     """It begins 40 m below the maximum height, and its sink of 1.4 m/s leaves less than 0.6 standard deviations."""
     scenario = band_of(230.0)
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     way = np.array([[0, 0, 190], [2000, 0, 190], [3500, 0, 80], [8000, 0, 80]], dtype=np.float64)
-    sinks = 110.0 / 1500.0 * airframe.limits.performance().airspeed
-    assert airframe.limits.max_climb_and_sink_rates(190.0)[1] - sinks < 0.6 * GUST
-    (shortfall,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
+    sinks = 110.0 / 1500.0 * uav.limits.performance().airspeed
+    assert uav.limits.max_climb_and_sink_rates(190.0)[1] - sinks < 0.6 * GUST
+    (shortfall,) = find_shortfalls(plan_along(uav, scenario, way), uav)
     assert shortfall.hazard == "above the allowed 230 m above ground"
     assert shortfall.place in {"on leg 0", "on leg 1"}
-    assert shortfall.depth == pytest.approx(60.0 * GUST - 40.0 + airframe.limits.tracking.up, abs=5.0)  # type: ignore[union-attr]
+    assert shortfall.depth == pytest.approx(60.0 * GUST - 40.0 + uav.limits.tracking.up, abs=5.0)  # type: ignore[union-attr]
     # Without a limit above it nothing is wrong.
     free = scenario_from_spec(band_of(230.0).to_json() | {"limits": {"min_clearance_m": 50.0}}, "free")
-    assert not find_shortfalls(plan_along(airframe, free, way), airframe)
+    assert not find_shortfalls(plan_along(uav, free, way), uav)
 
 
 def test_a_zone_above_counts() -> None:
     """1 m less above the path than an updraft gives and ArduPlane strays is too little, 1 m more is enough."""
     over = {"name": "corridor", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 500.0}
     free = {"limits": {"min_clearance_m": 50.0}}
-    airframe = load_airframe(band_of(300.0))
-    assert airframe.limits.tracking is not None
-    rise = 12.0 * (2.33 * GUST - airframe.limits.max_climb_and_sink_rates(150.0)[1]) + airframe.limits.tracking.up
+    uav = load_uav(band_of(300.0))
+    assert uav.limits.tracking is not None
+    rise = 12.0 * (2.33 * GUST - uav.limits.max_climb_and_sink_rates(150.0)[1]) + uav.limits.tracking.up
     for above, wrong in ((rise - 1.0, True), (rise + 1.0, False)):
         scenario = band_of(300.0, zones=[over | {"floor_amsl_m": 150.0 + above}], **free)
-        plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
-        assert bool(find_shortfalls(plan, airframe)) is wrong
+        plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
+        assert bool(find_shortfalls(plan, uav)) is wrong
 
 
 @pytest.mark.parametrize("aircraft", ["x8", "zagi", "aerosonde"])
 def test_a_search_below_a_maximum_height_leaves_sink_unused(aircraft: str) -> None:
     """At most one standard deviation and 0.6 of the sink that there is, but 0.6 standard deviations at least."""
     scenario = band_of(300.0, flight={"aircraft": aircraft, "autopilot": "ardupilot"})
-    airframe = load_airframe(scenario)
-    sink = airframe.limits.max_climb_and_sink_rates(150.0)[1]
-    plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    uav = load_uav(scenario)
+    sink = uav.limits.max_climb_and_sink_rates(150.0)[1]
+    plan = plan_along(uav, scenario, [scenario.start, scenario.destination])
     least, share, most = 0.6 * GUST, 0.6 * sink, GUST
-    kept = limits_in_gusts(plan, airframe).reserve_sink
+    kept = limits_in_gusts(plan, uav).reserve_sink
     assert kept == pytest.approx({"zagi": least, "x8": share, "aerosonde": most}[aircraft], rel=3e-3)
     assert (share < least, share > most) == (aircraft == "zagi", aircraft == "aerosonde")
 
@@ -435,15 +435,15 @@ def test_a_search_below_a_maximum_height_leaves_sink_unused(aircraft: str) -> No
 def test_below_a_zone_alone_the_first_search_keeps_from_it() -> None:
     over = {"name": "corridor", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 500.0}
     scenario = band_of(300.0, zones=[over | {"floor_amsl_m": 165.0}], limits={"min_clearance_m": 50.0})
-    airframe, asked = load_airframe(scenario), list[Limits]()
+    uav, asked = load_uav(scenario), list[Limits]()
 
     def search(limits: Limits) -> Plan:
         asked.append(limits)
         return plan_path(scenario, limits, seed=SEED)
 
-    found = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    found = plan_along(uav, scenario, [scenario.start, scenario.destination])
     assert found.safe
-    assert ensure_altitude_margin(found, airframe, search).safe
+    assert ensure_altitude_margin(found, uav, search).safe
     assert [one.reserve_threats > 20.0 for one in asked] == [True]
 
 
@@ -453,32 +453,30 @@ def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
     11 m below, half of the rise and ArduPlane's error of height are more than there is at the ends.
     """
     scenario = band_of(170.0)
-    airframe = load_airframe(scenario)
-    first = plan_path(scenario, airframe.limits, seed=SEED)
+    uav = load_uav(scenario)
+    first = plan_path(scenario, uav.limits, seed=SEED)
     assert first.safe
-    assert find_shortfalls(first, airframe)
-    plan = make_plan(scenario, airframe, SEED)
+    assert find_shortfalls(first, uav)
+    plan = make_plan(scenario, uav, SEED)
     assert plan.safe
-    assert not find_shortfalls(plan, airframe)
+    assert not find_shortfalls(plan, uav)
     assert np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) < 145.0
-    (problem,) = make_plan(band_of(161.0), airframe, SEED).certificate.problems
+    (problem,) = make_plan(band_of(161.0), uav, SEED).certificate.problems
     assert "in moderate turbulence updrafts may take the aircraft" in problem
     assert "above the allowed 161 m above ground at its start" in problem
     assert "an aircraft that sinks faster or a start that is 2 m lower would help" in problem
     held = band_of(164.0)
-    (problem,) = ensure_altitude_margin(
-        plan_path(held, airframe.limits, seed=SEED), load_airframe(held)
-    ).certificate.problems
+    (problem,) = ensure_altitude_margin(plan_path(held, uav.limits, seed=SEED), load_uav(held)).certificate.problems
     assert "on leg " in problem
     assert "an aircraft that sinks faster or a higher limit on its height would help" in problem
 
 
 def test_an_end_too_near_the_maximum_height_is_not_searched_for() -> None:
     scenario = band_of(161.0)
-    airframe = load_airframe(scenario)
-    found = plan_path(scenario, airframe.limits, seed=SEED)
+    uav = load_uav(scenario)
+    found = plan_path(scenario, uav.limits, seed=SEED)
     assert found.safe
-    assert not ensure_altitude_margin(found, airframe, lambda limits: pytest.fail("searched for another")).safe
+    assert not ensure_altitude_margin(found, uav, lambda limits: pytest.fail("searched for another")).safe
 
 
 def test_with_a_low_maximum_height_a_gentle_way_down_from_the_ends_is_found() -> None:
@@ -488,5 +486,5 @@ def test_with_a_low_maximum_height_a_gentle_way_down_from_the_ends_is_found() ->
     for end in ends.values():
         end.pop("amsl_m", None)
     low = scenario_from_spec(scenario.to_json() | ends, "low")
-    plan = make_plan(low, load_airframe(low), SEED)
+    plan = make_plan(low, load_uav(low), SEED)
     assert plan.safe

@@ -11,8 +11,8 @@ import pytest
 from flight.autopilots.px4.autopilot import Px4
 from planfly.planning.gust_altitude_margin import find_shortfalls
 from planfly.planning.gust_orbits import MAX_EXPECTED_ORBITS, expected_orbits, limit_waypoint_orbits
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
+from planfly.workflow.uav import Uav, load_uav
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from tests.setups import spec_around, with_path
@@ -32,12 +32,12 @@ def scenario_of(turbulence: str, autopilot: str = "px4", **tables: Any) -> Scena
     return scenario_from_spec(spec_around(ends, buffer=3000.0, ceiling=800.0) | made | tables, "gusts")
 
 
-def searching(airframe: Airframe, asked: list[int]) -> Callable[[Scenario], Plan]:
+def searching(uav: Uav, asked: list[int]) -> Callable[[Scenario], Plan]:
     """A search that notes how many waypoints it was asked for."""
 
     def search(scenario: Scenario) -> Plan:
         asked.append(scenario.planner.waypoints)
-        return plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
+        return plan_path(scenario, uav.limits.with_margin(), seed=SEED)
 
     return search
 
@@ -45,32 +45,32 @@ def searching(airframe: Airframe, asked: list[int]) -> Callable[[Scenario], Plan
 @pytest.mark.parametrize(("turbulence", "autopilot"), [("none", "px4"), ("light", "px4"), ("moderate", "ardupilot")])
 def test_plans_of_calmer_air_and_of_who_flies_on_are_as_they_were(turbulence: str, autopilot: str) -> None:
     scenario = scenario_of(turbulence, autopilot)
-    airframe, asked = load_airframe(scenario), list[int]()
-    plan = plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
+    uav, asked = load_uav(scenario), list[int]()
+    plan = plan_path(scenario, uav.limits.with_margin(), seed=SEED)
     assert plan.safe
-    assert limit_waypoint_orbits(plan, airframe, searching(airframe, asked)) is plan
+    assert limit_waypoint_orbits(plan, uav, searching(uav, asked)) is plan
     assert not asked
 
 
 def test_a_straight_way_in_gusts_has_no_waypoints_to_circle_at() -> None:
     scenario = scenario_of("moderate", zones=[])
-    plan = make_plan(scenario, load_airframe(scenario), SEED)
+    plan = make_plan(scenario, load_uav(scenario), SEED)
     assert plan.safe
     assert plan.waypoints.tolist() == [scenario.start.tolist(), scenario.destination.tolist()]
 
 
 def test_a_way_round_has_as_many_waypoints_as_gusts_allow() -> None:
     scenario = scenario_of("moderate")
-    airframe, asked = load_airframe(scenario), list[int]()
-    search = searching(airframe, asked)
-    plan = limit_waypoint_orbits(search(scenario), airframe, search)
+    uav, asked = load_uav(scenario), list[int]()
+    search = searching(uav, asked)
+    plan = limit_waypoint_orbits(search(scenario), uav, search)
     assert plan.safe
-    assert 0.0 < expected_orbits(plan, airframe.autopilot, airframe.limits) <= MAX_EXPECTED_ORBITS
+    assert 0.0 < expected_orbits(plan, uav.autopilot, uav.limits) <= MAX_EXPECTED_ORBITS
     assert asked[0] == 12
     assert plan.scenario is scenario
 
 
-def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: Airframe) -> None:
+def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: Uav) -> None:
     """A climb takes its rate from what the aircraft can climb, and leaves what it can sink.
 
     The slope is one over the ground, and the wind carries the aircraft along: 4 m/s from 200 degrees, and eastwards.
@@ -101,34 +101,34 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
 def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
     """22 m below the maximum height a level way has too little against updrafts; what is found then is settled too."""
     scenario = scenario_of("moderate", limits={"min_clearance_m": 50.0, "max_height_m": 172.0})
-    airframe = load_airframe(scenario)
-    limits = airframe.limits.with_margin()
-    first = limit_waypoint_orbits(plan_path(scenario, limits, seed=SEED), airframe, searching(airframe, []))
+    uav = load_uav(scenario)
+    limits = uav.limits.with_margin()
+    first = limit_waypoint_orbits(plan_path(scenario, limits, seed=SEED), uav, searching(uav, []))
     assert first.safe
-    assert find_shortfalls(first, airframe)
-    plan = make_plan(scenario, airframe, SEED)
-    assert expected_orbits(plan, airframe.autopilot, limits) <= MAX_EXPECTED_ORBITS
+    assert find_shortfalls(first, uav)
+    plan = make_plan(scenario, uav, SEED)
+    assert expected_orbits(plan, uav.autopilot, limits) <= MAX_EXPECTED_ORBITS
     assert plan.safe or "updrafts may take the aircraft" in plan.certificate.problems[0]
 
 
-def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -> None:
+def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Uav) -> None:
     """With a NAV_FW_ALT_RAD of 5 m nothing leads past a zone; 5 m less than the value that it names do not help."""
     scenario = scenario_of("moderate")
     found = plan_path(scenario, airframe_of_x8.limits.with_margin(), seed=SEED)
     tight = Px4(airframe_of_x8.autopilot.with_parameters(NAV_FW_ALT_RAD=5.0).parameters)  # type: ignore[arg-type]
-    airframe = replace(airframe_of_x8, autopilot=tight)
-    plan = limit_waypoint_orbits(found, airframe)
+    uav = replace(airframe_of_x8, autopilot=tight)
+    plan = limit_waypoint_orbits(found, uav)
     assert not plan.feasible
     (problem,) = plan.certificate.problems
     assert "in moderate turbulence PX4 circles at a waypoint if gusts push it off the waypoint's altitude" in problem
     value = float(problem.split("NAV_FW_ALT_RAD of ")[1].split(" m ")[0])
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
-    assert expected_orbits(plan, enough, airframe.limits) <= MAX_EXPECTED_ORBITS
-    assert expected_orbits(plan, less, airframe.limits) > MAX_EXPECTED_ORBITS
+    assert expected_orbits(plan, enough, uav.limits) <= MAX_EXPECTED_ORBITS
+    assert expected_orbits(plan, less, uav.limits) > MAX_EXPECTED_ORBITS
 
 
 @pytest.mark.parametrize(("aside", "taken"), [(300.0, True), (2000.0, False)])
-def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: bool, airframe_of_x8: Airframe) -> None:
+def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: bool, airframe_of_x8: Uav) -> None:
     """Of 30 m, less 8 m for gusts: atan(300 / 4000) twice turns by 9 degrees, atan(2000 / 4000) twice by 53."""
     wide = {"name": "city", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 1600.0}
     scenario = scenario_of("moderate", zones=[wide])
@@ -147,12 +147,12 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     assert (len(wide), taken) in ((0, True), (1, False))
 
 
-def plan_of(airframe: Airframe, waypoints: np.ndarray) -> Plan:
+def plan_of(uav: Uav, waypoints: np.ndarray) -> Plan:
     scenario = scenario_of("moderate")
-    found = plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
+    found = plan_path(scenario, uav.limits.with_margin(), seed=SEED)
     return with_path(found, waypoints)
 
 
 @pytest.fixture(scope="module")
-def airframe_of_x8() -> Airframe:
-    return load_airframe(scenario_of("moderate"))
+def airframe_of_x8() -> Uav:
+    return load_uav(scenario_of("moderate"))

@@ -13,8 +13,8 @@ from planfly.cli import main
 from planfly.planning import pareto_plans
 from planfly.planning.local_wind import limits_at_ground_speed, max_ground_speed_ratio
 from planfly.planning.pareto_plans import make_pareto_plans
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import open_flight
+from planfly.workflow.uav import load_uav
 from planner.plan import Plan
 from tests.planner.search.test_search_in_forecast import LATITUDES, LEVELS, SCENARIO, scenario_in
 from tests.world.made.forecast_files import ISSUED, LONGITUDES, wind_dataset, write_netcdf
@@ -77,7 +77,7 @@ def test_a_path_of_ones_own_that_does_not_hold_names_the_leg_and_the_wind(tmp_pa
 
 @pytest.mark.parametrize("ratio", [1.0, 1.5])
 def test_slopes_are_inverse_to_the_ground_speed_and_radii_to_its_square(ratio: float, tmp_path: Path) -> None:
-    limits = load_airframe(load_scenario(scenario_in(tmp_path, np.zeros((1, 1))))).limits
+    limits = load_uav(load_scenario(scenario_in(tmp_path, np.zeros((1, 1))))).limits
     tight = limits_at_ground_speed(limits, ratio)
     for slope, tight_slope in zip(limits.slopes(0.0, 300.0), tight.slopes(0.0, 300.0), strict=True):
         # tan of the slope over the ground is the climb rate over the ground speed.
@@ -132,5 +132,5 @@ def test_an_alternative_beyond_the_forecast_is_left_out_of_a_front(
         raise ForecastError("winds.nc: time: too long")
 
     monkeypatch.setattr(pareto_plans, "finish_plan", refuse)
-    front = make_pareto_plans(scenario, load_airframe(scenario), 1, 3, stop=stop_condition(1.0, None))
+    front = make_pareto_plans(scenario, load_uav(scenario), 1, 3, stop=stop_condition(1.0, None))
     assert [one.plan for one in front.plans] == [front.default.plan]

@@ -12,8 +12,8 @@ import pytest
 from benchmarks.airspace.flights import fly, kept_by
 from benchmarks.airspace.many_zones import crowded_scenario
 from benchmarks.airspace.scenarios import draw_scenario, passable, ring_distance
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
+from planfly.workflow.uav import load_uav
 from tests.soak import SOAK, some
 
 # Of the bench's: the first draws of these numbers that the grid search passes.
@@ -39,7 +39,7 @@ def test_no_sample_of_a_plan_keeps_less_than_its_certificate() -> None:
     scenario = draw_scenario(3, DRAWS[3])
     assert scenario is not None
     assert passable(scenario)
-    plan = make_plan(scenario, load_airframe(scenario), 4)
+    plan = make_plan(scenario, load_uav(scenario), 4)
     assert plan.safe
     kept = kept_by(scenario, sampled(plan.waypoints))
     assert kept.zones >= plan.certificate.zone_distance - 0.01
@@ -55,14 +55,14 @@ def test_without_its_zones_and_its_greatest_height_the_same_way_is_planned_throu
     assert scenario is not None
     limits = scenario.limits.model_copy(update={"max_height_m": None})
     free = dataclasses.replace(scenario, zones=(), limits=limits)
-    plan = make_plan(free, load_airframe(free), 4)
+    plan = make_plan(free, load_uav(free), 4)
     assert plan.safe
     assert kept_by(scenario, sampled(plan.waypoints)).least < 0.0
 
 
 def test_a_way_between_many_zones_of_many_corners() -> None:
     scenario = crowded_scenario(*((200, 50) if SOAK else (60, 30)))
-    plan = make_plan(scenario, load_airframe(scenario), 1)
+    plan = make_plan(scenario, load_uav(scenario), 1)
     assert plan.safe
     places = sampled(plan.waypoints)[:, :2]
     rings = [np.array(zone.polygon_m) for zone in scenario.spec.zones or ()]

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from flight.mission.from_plan import plan_mission
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import load_uav
 from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
 from tests.autopilots import need_arduplane
 from tests.soak import SOAK, scaled
@@ -21,11 +21,11 @@ REAL_NUMBERS = range(scaled(100, 0)) if SOAK else (7,)
 def fly(number: int, autopilot: Path | None) -> None:
     """Plan, export and fly the scenario of this number with satellites' errors, in its wind and gusts."""
     scenario = plan_scenario(number)
-    airframe = load_airframe(scenario)
-    plan = make_plan(scenario, airframe, number + 1)
+    uav = load_uav(scenario)
+    plan = make_plan(scenario, uav, number + 1)
     assert plan.safe, plan.certificate.problems
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+    setup = make_setup(scenario, uav, mission, number + 1, plan=plan)
     assert setup.nav == "gnss"
     flown = fly_and_judge(setup, autopilot=autopilot)
     assert flown.ended == "completed"

@@ -13,10 +13,10 @@ import pytest
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Command, Mission, MissionItem
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge
+from planfly.workflow.uav import Uav, load_uav
 from tests.autopilots import need_arduplane
 from tests.ground_missions import draw_field
 from tests.soak import SOAK, note, scaled
@@ -43,11 +43,9 @@ def outside(scenario: Scenario, points: Floats) -> float:
     return min((float(a - r) for a, r in zip(away, threats.kill_radius, strict=True)), default=math.inf)
 
 
-def heights_over_ground(
-    scenario: Scenario, airframe: Airframe, course: float, amsl: float, speed: float
-) -> tuple[float, float]:
+def heights_over_ground(scenario: Scenario, uav: Uav, course: float, amsl: float, speed: float) -> tuple[float, float]:
     """Steepest climb and descent over the ground on a course, m per m: the wind's triangle, by hand."""
-    climb, dive = airframe.limits.with_margin().envelope.air_angles(speed, amsl)
+    climb, dive = uav.limits.with_margin().envelope.air_angles(speed, amsl)
     east, north = scenario.wind.velocity_at(amsl)
     along, across = (
         east * math.sin(course) + north * math.cos(course),
@@ -69,28 +67,26 @@ def course_of(a: Floats, b: Floats) -> float:
     return math.atan2(b[0] - a[0], b[1] - a[1])
 
 
-def check_climb(scenario: Scenario, airframe: Airframe, points: Floats, until: int) -> None:
+def check_climb(scenario: Scenario, uav: Uav, points: Floats, until: int) -> None:
     """From home to the plan's first waypoint: within 0.7 of the climb, and over the ground all the way."""
     assert scenario.terrain is not None
     ground = float(scenario.terrain.height(*points[0, :2]))
     up, least = ground, 0.7
     for k, (a, b) in enumerate(pairwise(points[: until + 1])):
         # ArduPlane commands equivalent airspeeds: the true one is higher up here.
-        speed = airframe.airspeed * airframe.autopilot.speeds.true_airspeed_factor(float(b[2]))
-        steepest, _ = heights_over_ground(scenario, airframe, course_of(a, b), float(b[2]), speed)
+        speed = uav.airspeed * uav.autopilot.speeds.true_airspeed_factor(float(b[2]))
+        steepest, _ = heights_over_ground(scenario, uav, course_of(a, b), float(b[2]), speed)
         up = min(up + least * steepest * math.dist(a[:2], b[:2]), max(float(b[2]), points[0, 2]))
         assert up >= b[2] - 0.5, f"leg {k} is not climbed at {least} of the steepest"
     # The straight climb itself, from the ground: it passes over the ground, and outside every missile.
     first, run = points[1], math.dist(points[0, :2], points[1, :2])
-    steepest, _ = heights_over_ground(
-        scenario, airframe, course_of(points[0], first), float(first[2]), airframe.airspeed
-    )
+    steepest, _ = heights_over_ground(scenario, uav, course_of(points[0], first), float(first[2]), uav.airspeed)
     line = metres(np.array([*points[0, :2], ground]), np.array([*first[:2], ground + 0.7 * steepest * run]))
     assert above(scenario, line)[60:].min() > 0.0
     assert outside(scenario, line) > 0.0
 
 
-def check_landing(scenario: Scenario, airframe: Airframe, points: Floats, land: MissionItem, home: float) -> None:
+def check_landing(scenario: Scenario, uav: Uav, points: Floats, land: MissionItem, home: float) -> None:
     """Line-up, glide and go-around: on one course into the wind, over the ground, and no steeper than can be flown."""
     assert scenario.terrain is not None
     begin, last, point = points[-3:]
@@ -101,11 +97,11 @@ def check_landing(scenario: Scenario, airframe: Airframe, points: Floats, land: 
     run, height = math.dist(last[:2], point[:2]), float(last[2] - point[2])
     assert begin[2] == pytest.approx(last[2], abs=1e-3)
     tail = scenario.wind.components_on_course(course, float(point[2]))[0]
-    speed = airframe.autopilot.ground.airspeed(airframe.airspeed, tail, float(point[2]))
-    _, steepest = heights_over_ground(scenario, airframe, course, float(point[2]), speed)
+    speed = uav.autopilot.ground.airspeed(uav.airspeed, tail, float(point[2]))
+    _, steepest = heights_over_ground(scenario, uav, course, float(point[2]), speed)
     assert height / run < steepest
     assert above(scenario, metres(last, point))[: int(run) - 60].min() > 0.0
-    climb, _ = heights_over_ground(scenario, airframe, course, home + land.params[0], airframe.airspeed)
+    climb, _ = heights_over_ground(scenario, uav, course, home + land.params[0], uav.airspeed)
     top = home + land.params[0]
     ahead = (top - point[2]) / (0.7 * climb)
     turned = np.array([point[0] + ahead * math.sin(course), point[1] + ahead * math.cos(course), top])
@@ -113,7 +109,7 @@ def check_landing(scenario: Scenario, airframe: Airframe, points: Floats, land: 
     assert above(scenario, metres(turned, begin)).min() > 20.0
 
 
-def check_mission(scenario: Scenario, airframe: Airframe, mission: Mission) -> None:
+def check_mission(scenario: Scenario, uav: Uav, mission: Mission) -> None:
     commands = [Command(one.command) for one in mission.items]
     assert commands[:2] == [Command.NAV_TAKEOFF, Command.DO_CHANGE_SPEED]
     assert commands[-4:] == [Command.DO_LAND_START, Command.NAV_WAYPOINT, Command.NAV_WAYPOINT, Command.NAV_LAND]
@@ -122,8 +118,8 @@ def check_mission(scenario: Scenario, airframe: Airframe, mission: Mission) -> N
     assert scenario.terrain is not None
     assert mission.home.alt == pytest.approx(float(scenario.terrain.height(*points[0, :2])), abs=0.1)
     start = int(np.argmin(np.linalg.norm(points - scenario.start, axis=1)))
-    check_climb(scenario, airframe, points, start)
-    check_landing(scenario, airframe, points, mission.items[-1], mission.home.alt)
+    check_climb(scenario, uav, points, start)
+    check_landing(scenario, uav, points, mission.items[-1], mission.home.alt)
     # What is flown between take-off and glide keeps the scenario's clearance, and keeps out of every missile's reach.
     for a, b in pairwise(points[:-1]):
         way = metres(a, b)
@@ -144,14 +140,14 @@ def test_no_way_of_a_fresh_plan_from_the_ground_meets_anything() -> None:
     while planned < wanted:
         scenario = draw_field(number)
         number += 1
-        airframe = load_airframe(scenario)
-        plan = make_plan(scenario, airframe, 1)
+        uav = load_uav(scenario)
+        plan = make_plan(scenario, uav, 1)
         if not plan.safe:
             assert plan.certificate.problems
             continue
-        mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-        check_mission(scenario, airframe, mission)
-        verdict = judge_geometry(make_setup(scenario, airframe, mission, 1, plan=plan))
+        mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+        check_mission(scenario, uav, mission)
+        verdict = judge_geometry(make_setup(scenario, uav, mission, 1, plan=plan))
         assert verdict.flyable, verdict.headline
         planned += 1
     note("plans from the ground to the ground", planned=planned, drawn=number - first)
@@ -173,13 +169,13 @@ def test_fresh_plans_do_no_harm(launch: str, aircraft: str, wanted: int, whose: 
     while planned < wanted:
         scenario = draw_field(number, launch, {"autopilot": "ardupilot", "aircraft": aircraft})
         number += 1
-        airframe = load_airframe(scenario)
-        plan = make_plan(scenario, airframe, 1)
+        uav = load_uav(scenario)
+        plan = make_plan(scenario, uav, 1)
         if not plan.safe:
             continue
         planned += 1
-        mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-        setup = make_setup(scenario, airframe, mission, 1, plan=plan)
+        mission = plan_mission(plan, uav.airspeed, uav.max_bank, tracking=uav.limits.tracking)
+        setup = make_setup(scenario, uav, mission, 1, plan=plan)
         flown = fly_and_judge(setup, reference="never", autopilot=program)
         harm, low = harm_of_flight(scenario, setup.route.positions[-1], flown.track.position)
         least = min(least, low)

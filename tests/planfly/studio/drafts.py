@@ -10,8 +10,8 @@ from planfly.flight_options import MissionOptions
 from planfly.studio.documents import Document
 from planfly.studio.session import Session, TriedChanges
 from planfly.studio.worker_tasks import try_planned_suggestions
-from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import Uav, load_uav
 from world.errors import MissionError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
@@ -21,9 +21,9 @@ _KINDS = (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME, Command.NAV_LOITER_
 
 
 @cache
-def world_of(name: str) -> tuple[Scenario, Airframe]:
+def world_of(name: str) -> tuple[Scenario, Uav]:
     scenario = load_scenario(name)
-    return scenario, load_airframe(scenario)
+    return scenario, load_uav(scenario)
 
 
 def draw_mission(rng: np.random.Generator, count: int, scenario: Scenario, *, jumps: bool = True) -> Mission:
@@ -70,8 +70,8 @@ def _item(before: int, command: Command, frame: Frame, params: tuple[float, floa
 
 def session_of(mission: Mission, name: str = "jacksboro") -> Session:
     """A session of a mission in a scenario's world."""
-    scenario, airframe = world_of(name)
-    setup = make_setup(scenario, airframe, mission, 1)
+    scenario, uav = world_of(name)
+    setup = make_setup(scenario, uav, mission, 1)
     return Session.from_document(
         Document("drawn.waypoints", "drawn", setup, "waypoints"), MissionOptions(scenario=name)
     )

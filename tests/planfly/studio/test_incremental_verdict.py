@@ -171,7 +171,7 @@ def test_a_moved_route_is_the_one_that_is_laid() -> None:
                 laid = context.route(mission)
             except MissionError:
                 continue
-            made = update_moved_route(setup.route, setup.mission, mission, context.scenario, context.airframe)
+            made = update_moved_route(setup.route, setup.mission, mission, context.scenario, context.uav)
             if made is None:
                 continue
             moved += 1
@@ -191,7 +191,7 @@ def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
 
     def made(k: int, place: MissionItem, north: float = 0.0) -> Route | None:
         after = edits.move_item(mission, k, place.lat_deg + north, place.lon_deg)
-        return update_moved_route(setup.route, mission, after, context.scenario, context.airframe)
+        return update_moved_route(setup.route, mission, after, context.scenario, context.uav)
 
     assert made(free, mission.items[free], 0.001) is not None
     assert made(beside, mission.items[beside], 0.001) is None

@@ -59,7 +59,7 @@ def test_a_path_is_planned_at_the_speed_of_the_mission(
     first, last = ends
     jobs.plan(messages.Plan(kind="plan", seed=1, first=first, last=last), session)
     request = asked(jobs, LONG_WORKER)[0].payload
-    assert request.airframe.airspeed == airspeed
+    assert request.uav.airspeed == airspeed
     # The path of the whole mission states this speed.
     plan = straight_plan(session.context.scenario, 1)
     session._show_plan(plan)

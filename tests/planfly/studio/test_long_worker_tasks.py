@@ -94,7 +94,7 @@ def test_the_aircraft_of_a_data_sheet_varies_as_in_the_commands(sheet: Path, tmp
     base = open_campaign(str(tmp_path / "short.waypoints"), default_dispersions(), options)
     assert own.dispersions.draws is not None
     assert own.inputs() == base.inputs()
-    assert own.airframe.battery == base.airframe.battery
+    assert own.uav.battery == base.uav.battery
 
 
 def test_the_flights_of_a_data_sheets_aircraft_are_those_of_the_api(

@@ -127,7 +127,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     file, again = tmp_path / "plan.json", tmp_path / "again.json"
     file.write_bytes(default_run()[2]["plan.json"])
     base = read_plan(file)
-    assert base.ways is not None
+    assert base.procedures is not None
     session, _ = open_session(str(file), MissionOptions())
     places = edits.movable_indices(session.mission)
     first = next(

@@ -373,7 +373,7 @@ def test_an_option_of_the_command_replaces_a_kept_setting_and_this_is_said(
     other, _ = open_session(str(file), world | named, kept)
     assert other.settings_json()["aircraft"] == "own"
     assert other.settings_json()["parameters"] == {}
-    assert other.context.airframe.autopilot.stated_value("WP_RADIUS") == 70.0
+    assert other.context.uav.autopilot.stated_value("WP_RADIUS") == 70.0
     for part in ("aircraft aerosonde \u2192 own", "airspeed 26 \u2192 25", "parameter WP_RADIUS 55"):
         assert part in other.replaced_text
     assert other.settings_json()["wind_speed"] == 9.0

@@ -21,8 +21,8 @@ from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
 from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text
-from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.open_flight import open_flight
+from planfly.workflow.uav import uav_of_setup
 from tests.mission_lines import mission, setup_of, wp
 from tests.synthetic import fly_path
 
@@ -70,7 +70,7 @@ def test_a_trigger_distance_for_the_required_overlap_is_tried(monkeypatch: pytes
         return SimpleNamespace(setup=flown, flight_verdict=verdict_of(flown))
 
     monkeypatch.setattr(remedies, "Trial", fly)
-    [remedy] = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict_of(setup)).remedies
+    [remedy] = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict_of(setup)).remedies
     assert (remedy.kind, remedy.current, remedy.value, remedy.unit) == ("trigger", 75.0, 24.0, "m")
     assert remedy_text(remedy, 5000.0).startswith("photos every 24 m instead of 75 m: flown, ")
     distances = [item.params[0] for item in remedy.mission.items if item.command == Command.DO_SET_CAM_TRIGG_DIST]

@@ -23,8 +23,8 @@ from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
 from planfly.surveys.survey_remedies import TriedRemedies
 from planfly.surveys.survey_text import near_miss_text, remedy_text
-from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.open_flight import open_flight
+from planfly.workflow.uav import uav_of_setup
 from tests.mission_lines import mission, wp
 
 FIELD = Path(__file__).parents[1] / "commands" / "field.waypoints"
@@ -65,7 +65,7 @@ def opened(path: Path) -> FlightSetup:
 def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
     flights, mission = Flights(answer), opened(path)
     monkeypatch.setattr(remedies, "Trial", flights)
-    found = remedies.find_survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
+    found = remedies.find_survey_remedies(mission, uav_of_setup(mission), verdict_of(mission, answer))
     return found, flights.flown
 
 
@@ -97,7 +97,7 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
         return found
 
     monkeypatch.setattr(remedies, "Trial", fly)
-    found = remedies.find_survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
+    found = remedies.find_survey_remedies(mission, uav_of_setup(mission), verdict_of(mission, answer))
     longer, second = found.remedies
     assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
     assert (second.kind, second.value, second.turn_around, second.lead_in) == ("every", 2.0, 50.0, 150.0)
@@ -140,9 +140,7 @@ def judged_by(
 
     mission = opened(path)
     monkeypatch.setattr(remedies, "Trial", fly)
-    return remedies.find_survey_remedies(
-        mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {}))
-    )
+    return remedies.find_survey_remedies(mission, uav_of_setup(mission), verdict_of(mission, lambda _: (False, {})))
 
 
 def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,7 +194,7 @@ def test_the_airspeed_for_a_slow_camera_follows_from_its_ground_speed(
 
     monkeypatch.setattr(remedies, "Trial", fly)
     verdict = fly(setup).flight_verdict
-    found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict, overlaps=(measure,))
+    found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict, overlaps=(measure,))
     slower = [each for each in flown if each < 18.0]
     assert slower[0] == pytest.approx(speed, abs=0.11)
     assert min(slower) == 13.2
@@ -241,9 +239,7 @@ def test_nearest_trial_is_the_one_that_makes_more_of_each_line_usable(monkeypatc
 
     mission = opened(FIELD)
     monkeypatch.setattr(remedies, "Trial", fly)
-    found = remedies.find_survey_remedies(
-        mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {}))
-    )
+    found = remedies.find_survey_remedies(mission, uav_of_setup(mission), verdict_of(mission, lambda _: (False, {})))
     assert found.nearest is not None
     assert "0 of 4 photo lines can be used, the worst one to 92 % of its length" in near_miss_text(found.nearest)
     assert found.nearest.what == "turn-arounds of 350 m"
@@ -323,10 +319,10 @@ def test_gates_at_the_ends_of_lines_that_lose_their_photos_to_the_acceptance_rad
     for autopilot, kinds in (("px4", ["gates"]), ("ardupilot", [])):
         setup = open_flight(file, {"aircraft": "x8", "autopilot": autopilot})
         verdict = verdict_of(setup, lambda _: (False, {}))
-        found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict)
+        found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict)
         assert [one.kind for one in found.remedies] == kinds
     setup = open_flight(file, {"aircraft": "x8", "autopilot": "px4"})
-    found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict_of(setup, lambda _: (False, {})))
+    found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict_of(setup, lambda _: (False, {})))
     [gated] = found.remedies
     assert [item.seq for item in gated.mission.items if item.command == Command.CONDITION_GATE] == [
         *(2, 4, 8, 10, 14, 16)
@@ -351,7 +347,7 @@ def test_gates_with_longer_turn_arounds_are_tried_together(monkeypatch: pytest.M
 
     monkeypatch.setattr(remedies, "Trial", fly)
     setup = open_flight(file, {"aircraft": "x8", "autopilot": "px4"})
-    found = remedies.find_survey_remedies(setup, airframe_for_setup(setup), verdict_of(setup, lambda _: (False, {})))
+    found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict_of(setup, lambda _: (False, {})))
     [both] = found.remedies
     assert (both.kind, both.turn_around) == ("gates", 125.0)
     assert "instead of waypoints where the camera is switched, with turn-arounds of 125 m: " in remedy_text(both, 5e3)

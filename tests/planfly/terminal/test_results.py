@@ -13,7 +13,8 @@ from logs.verdict.verdict import Verdict
 from planfly.cli import main
 from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import error_text
-from planfly.terminal.results import print_verdict, print_warnings
+from planfly.terminal.results import print_warnings
+from planfly.terminal.verdict_lines import print_verdict
 from tests.logs.made_flight import make_setup
 from world.errors import LogError, PlanflyError
 

@@ -207,8 +207,8 @@ def test_a_task_without_heights_gets_those_that_were_flown(tmp_path: Path) -> No
     task = replace(raw.missions[0], with_heights=False)
     flight = judged(tmp_path, replace(raw, missions=(task,)), LogOptions(aircraft="aerosonde"))
     assert [item.ok for item in flight.verdict.findings if item.rule == "slope"] == [None, None]
-    assert flight.setup.source is not None
-    assert not flight.setup.source.plan_heights
+    assert flight.setup.imported_log is not None
+    assert not flight.setup.imported_log.plan_heights
 
 
 def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
@@ -293,6 +293,6 @@ def test_a_throttle_that_never_moves_is_noted(tmp_path: Path, throttle: float | 
         "2\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.012\t500.0\t1\n",
         encoding="utf-8",
     )
-    source = import_flight(table, LogOptions(plan=str(plan))).setup.source
+    source = import_flight(table, LogOptions(plan=str(plan))).setup.imported_log
     assert source is not None
     assert ("the throttle never moves: 0 in all rows" in source.notes) == (throttle is not None)

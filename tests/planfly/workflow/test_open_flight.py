@@ -23,9 +23,9 @@ from planfly.flight_logs import is_log
 from planfly.flight_options import MissionOptions, read_named_fences
 from planfly.live.served_flights import ServeOptions, load_served_scenario
 from planfly.plan_fence import add_plan_fence
-from planfly.workflow.airframe import airframe_for_setup, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import _capacity_notes, _item_count_notes, mission_of_plan, open_flight
+from planfly.workflow.uav import load_uav, uav_of_setup
 from planner.plan import plan_json
 from tests.mission_lines import a_plan, setup_of, wp
 from tests.planfly.conftest import FIELD
@@ -323,13 +323,13 @@ def test_a_mission_is_judged_in_the_scenario_that_is_named(short_mission: Path) 
     slower = open_flight(short_mission, {"scenario": short_mission.parent / "field.toml", "seed": 9, "airspeed": 21.0})
     assert (slower.scenario.name, slower.seed) == ("field", 9)
     assert slower.scenario.wind.speed == 3.0
-    assert slower.airspeed == airframe_for_setup(slower).airspeed == 21.0
+    assert slower.airspeed == uav_of_setup(slower).airspeed == 21.0
     assert (slower.route.leg_airspeeds == 21.0).all()
 
 
 def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_mission: Path, tmp_path: Path) -> None:
     scenario = small_scenario()
-    plan = make_plan(scenario, load_airframe(scenario), 3)
+    plan = make_plan(scenario, load_uav(scenario), 3)
     file = tmp_path / "plan.json"
     file.write_text(plan_json(plan), encoding="utf-8")
     own = open_flight(file, {})
@@ -340,7 +340,7 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_miss
     other = open_flight(file, {"scenario": short_mission.parent / "field.toml", "seed": 4})
     assert (other.scenario.name, other.seed, other.name) == ("field", 4, "plan")
     assert other.plan is None
-    assert other.mission == own.mission == mission_of_plan(plan, airframe_for_setup(own))
+    assert other.mission == own.mission == mission_of_plan(plan, uav_of_setup(own))
 
 
 def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:

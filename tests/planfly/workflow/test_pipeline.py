@@ -8,9 +8,9 @@ import pytest
 
 from logs.recording.reader import read_log
 from logs.verdict.verdict import verdict_json
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.pipeline import fly_and_judge, plan_then_fly
+from planfly.workflow.uav import load_uav
 from tests.setups import small_scenario, waypoint_mission
 
 POINTS = np.array([[0.0, 0.0, 300.0], [900.0, 0.0, 300.0], [1500.0, 300.0, 320.0]])
@@ -18,10 +18,10 @@ POINTS = np.array([[0.0, 0.0, 300.0], [900.0, 0.0, 300.0], [1500.0, 300.0, 320.0
 
 def test_a_thinned_log_holds_the_rows_that_were_judged(tmp_path: Path) -> None:
     scenario = small_scenario(terrain={"kind": "flat", "amsl_m": 0}, threats=[])
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     mission = waypoint_mission(POINTS, np.array([25.0, 22.0]), scenario.origin)
-    setup = make_setup(scenario, airframe, mission, 7)
-    assert (setup.seed, setup.aircraft, setup.battery) == (7, "aerosonde", airframe.battery)
+    setup = make_setup(scenario, uav, mission, 7)
+    assert (setup.seed, setup.aircraft, setup.battery) == (7, "aerosonde", uav.battery)
     assert setup.route.leg_airspeeds.tolist() == [25.0, 22.0]
     np.testing.assert_allclose(setup.route.positions, POINTS, atol=0.02)
     reports: list[tuple[float, float, str]] = []

@@ -13,10 +13,10 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
 from planfly.cli import main
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
 from planfly.workflow.tighten_plan import NEXT_ROUND_REMARK, refine, tighten_limits
+from planfly.workflow.uav import load_uav
 from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path
 from world.scenario import Scenario, scenario_from_spec
@@ -103,12 +103,12 @@ FLAT = {
 def test_an_autopilot_that_strays_into_a_zones_edge_is_given_more_room() -> None:
     """It flies 16 m south of any plan, whose certificate keeps 10 m and whose search 15 m."""
     scenario = scenario_from_spec(FLAT, "edge")
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     kept = []
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
-        plan = make_plan(planned_in, airframe, 1)
-        setup = make_setup(scenario, airframe, plan_mission(plan, airframe.airspeed, airframe.max_bank), 1, plan=plan)
+        plan = make_plan(planned_in, uav, 1)
+        setup = make_setup(scenario, uav, plan_mission(plan, uav.airspeed, uav.max_bank), 1, plan=plan)
         track = fly_path(setup)
         track = replace(track, position=track.position - np.array([0.0, 16.0, 0.0]))
         away = np.hypot(track.position[:, 0] - MILL["east_m"], track.position[:, 1] - MILL["north_m"])

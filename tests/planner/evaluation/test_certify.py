@@ -11,7 +11,7 @@ import planfly
 from aircraft.path_limits import Limits, turn_tangents
 from flight.guidance.path import fly_by_path
 from flight.mission.route import Route, route_points
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, make_problem
 from planner.plan import Plan
@@ -123,7 +123,7 @@ def test_a_margin_is_negative_exactly_if_the_path_fails_by_it(
     base: str, tables: dict[str, Any], failing: set[str]
 ) -> None:
     scenario = planfly.make_scenario(base, **tables)
-    limits = load_airframe(scenario).limits.with_margin()
+    limits = load_uav(scenario).limits.with_margin()
     found = plan_path(scenario, limits, seed=1, algorithm=None if base == "tight" else "fda-seeded")
     problem = make_problem(scenario, limits_for(find_algorithm(scenario.planner.algorithm, base), limits))
     names = [name for _, name in MARGIN_OF_PROBLEM]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import PerformanceTable
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.travel_cost import LENGTH_COST, TravelCost, WindGrid, make_travel_cost, path_cost
 from tests.setups import falling_envelope
 from world.scenario import load_scenario
@@ -82,7 +82,7 @@ def test_a_leg_through_a_tailwind_that_rises_along_it_takes_the_integral_of_its_
 
 @pytest.mark.parametrize("climb", [-0.02, 0.0, 0.05])
 def test_energy_is_the_envelopes_power_over_the_time_of_the_wind_triangle(climb: float) -> None:
-    limits = load_airframe(load_scenario("tight")).limits
+    limits = load_uav(load_scenario("tight")).limits
     made = limits.performance()._replace(equivalent=0.0, wind_speed=5.0, wind_to=0.0, wind_gradient=0.0)
     travel = make_travel_cost("energy", limits.envelope, made)
     assert travel is not None

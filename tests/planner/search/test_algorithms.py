@@ -2,7 +2,7 @@
 
 import pytest
 
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.encoding import ENCODINGS
 from planner.search.algorithms import ALGORITHMS, DEFAULT, algorithm_lines, find_algorithm, limits_for
 from world.errors import ScenarioError
@@ -57,7 +57,7 @@ PAPERS = {"umda", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_those_that_count_violations_are_the_papers_and_know_no_autopilot(name: str) -> None:
-    limits = load_airframe(load_scenario("jacksboro-air")).limits
+    limits = load_uav(load_scenario("jacksboro-air")).limits
     assert limits.tracking is not None
     within = limits_for(find_algorithm(name, "a.toml"), limits)
     assert (within.tracking is None) == (name in PAPERS)

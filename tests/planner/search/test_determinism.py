@@ -20,12 +20,12 @@ ROOT = Path(__file__).parents[3]
 SCRIPT = """
 import hashlib
 from planfly.workflow.make_plan import make_plan
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.plan import plan_json
 from world.scenario import load_scenario
 for name in NAMES:
     scenario = load_scenario(name)
-    print(hashlib.sha256(plan_json(make_plan(scenario, load_airframe(scenario), 7)).encode()).hexdigest())
+    print(hashlib.sha256(plan_json(make_plan(scenario, load_uav(scenario), 7)).encode()).hexdigest())
 """
 NAMES = ("hard-07", "jacksboro-air", "paper-07") if SOAK else ("hard-07",)
 

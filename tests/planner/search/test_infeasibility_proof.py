@@ -9,7 +9,7 @@ import pytest
 
 import planner.search.plan_path as plan_path_module
 from aircraft.path_limits import Limits
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.search.explain_failure import explain_failure
 from planner.search.infeasibility_proof import blocking_missiles, highest_level_flight, is_closed
@@ -173,7 +173,7 @@ def test_the_search_ends_where_an_end_is_above_level_flight(monkeypatch: pytest.
     monkeypatch.setattr(plan_path_module, "search_turning_back", refused)
     # A Zagi at 3,348 m, where it climbs 4.5 degrees at sea level.
     scenario = fresh_scenario(1226)
-    limits = load_airframe(scenario).limits.with_margin()
+    limits = load_uav(scenario).limits.with_margin()
     plan = plan_path(scenario, limits, seed=1)
     assert not plan.safe
     line = next(line for line in explain_failure(plan, limits) if line.startswith("no path exists"))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.search.kernel_calls import PARTS, call_kernels
 from planner.search.plan_path import plan_path
 from world.compile_events import notify_before_compiling
@@ -11,7 +11,7 @@ from world.scenario import load_scenario
 
 def test_a_plan_compiles_nothing_after_them() -> None:
     scenario = load_scenario("tight")
-    limits = load_airframe(scenario).limits
+    limits = load_uav(scenario).limits
     for part in PARTS:
         call_kernels(part, scenario, limits)
     compiled: list[None] = []
@@ -23,4 +23,4 @@ def test_a_plan_compiles_nothing_after_them() -> None:
 def test_parts_are_named() -> None:
     scenario = load_scenario("tight")
     with pytest.raises(KeyError):
-        call_kernels("none", scenario, load_airframe(scenario).limits)
+        call_kernels("none", scenario, load_uav(scenario).limits)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.plan import Certificate, Plan
 from planner.search.lay_ground_ways import FinalModel, add_departure_and_approach
 from tests.setups import spec_around
@@ -53,7 +53,7 @@ def scenario_of(heights: Ground = level, **tables: Any) -> Scenario:
 
 @cache
 def limits() -> Limits:
-    return load_airframe(scenario_of(launch={"method": "hand"})).limits
+    return load_uav(scenario_of(launch={"method": "hand"})).limits
 
 
 def laid(heights: Ground = level, law: FinalModel = LAW, **tables: Any) -> Plan:
@@ -74,15 +74,15 @@ NORTH = {"launch": {"method": "catapult", "course_deg": 0.0}}
 
 def test_a_plan_that_stays_in_the_air_stays_as_it_is() -> None:
     plan = laid()
-    assert plan.ways is None
+    assert plan.procedures is None
     assert plan.feasible
 
 
 def test_the_climb_is_flown_from_the_ground_at_seven_tenths_of_the_steepest() -> None:
     plan = laid(**NORTH)
     assert plan.feasible
-    assert plan.ways is not None
-    climb = plan.ways.climb
+    assert plan.procedures is not None
+    climb = plan.procedures.climb
     assert climb is not None
     assert climb.home.tolist() == [0.0, 0.0, BASE]
     # 30 m of clearance, 5 m that the certificate keeps, and 2 m: below the 40 m that a take-off climbs at the least.
@@ -102,8 +102,8 @@ def test_the_climb_is_flown_from_the_ground_at_seven_tenths_of_the_steepest() ->
 def test_what_the_take_off_leaves_of_its_leg_holds_the_turn_at_its_end(course_deg: float) -> None:
     """It is over after four fifths of the way to its height; a turn by 90 degrees takes its radius of the leg."""
     plan = laid(launch={"method": "catapult", "course_deg": course_deg})
-    assert plan.ways is not None
-    climb = plan.ways.climb
+    assert plan.procedures is not None
+    climb = plan.procedures.climb
     assert climb is not None
     way = np.concatenate([climb.home[None], climb.waypoints, PATH[:1]])
     left = leg_runs(way)[0] - 0.8 * (climb.up - BASE) / climb.gradient
@@ -121,7 +121,7 @@ def test_what_a_drifting_take_off_leaves_of_its_leg_holds_the_turn_at_its_end(co
     The forecast is wrong by 1.95 m/s either way.
     """
     wind = {"speed_mps": 8.0, "from_deg": (course_deg + side * 90.0) % 360.0}
-    ways = laid(launch={"method": "catapult", "course_deg": course_deg}, wind=wind).ways
+    ways = laid(launch={"method": "catapult", "course_deg": course_deg}, wind=wind).procedures
     assert ways is not None
     climb = ways.climb
     assert climb is not None
@@ -144,7 +144,7 @@ def test_what_a_drifting_take_off_leaves_of_its_leg_holds_the_turn_at_its_end(co
 
 def test_the_way_to_the_line_up_leaves_room_for_the_error_of_the_elevation_file() -> None:
     """30 m of clearance, 5 m that the certificate keeps, and 1.645 standard deviations of 5.5 m: 44 m."""
-    ways = laid(landing=FIELD | {"course_deg": 90.0}).ways
+    ways = laid(landing=FIELD | {"course_deg": 90.0}).procedures
     assert ways is not None
     assert ways.descent is not None
     heights = np.concatenate([ways.descent.waypoints, ways.descent.final_waypoints])[:, 2] - BASE
@@ -155,19 +155,19 @@ def test_an_approach_without_room_for_the_error_of_the_elevation_file_is_still_l
     """A stated final that begins 37.5 m above the ground leaves 7.5 m above the clearance, and no other is tried."""
     ways = laid(
         landing=FIELD | {"course_deg": 90.0, "approach_m": 500.0, "slope_deg": math.degrees(math.atan(0.075))}
-    ).ways
+    ).procedures
     assert ways is not None
     assert ways.descent is not None
     assert float(ways.descent.final_waypoints[0, 2]) - BASE == pytest.approx(37.5)
 
 
 def test_a_stated_launch_course_is_flown_and_an_own_one_has_no_wind_from_behind() -> None:
-    stated = laid(launch={"method": "catapult", "course_deg": 215.0}).ways
+    stated = laid(launch={"method": "catapult", "course_deg": 215.0}).procedures
     assert stated is not None
     assert stated.climb is not None
     assert degrees(stated.climb.course) == pytest.approx(215.0)
     for from_deg in (90.0, 270.0):
-        windy = laid(wind={"speed_mps": 6.0, "from_deg": from_deg}, **CATAPULT).ways
+        windy = laid(wind={"speed_mps": 6.0, "from_deg": from_deg}, **CATAPULT).procedures
         assert windy is not None
         assert windy.climb is not None
         assert math.cos(windy.climb.course - math.radians(from_deg)) >= -0.1
@@ -188,13 +188,13 @@ def ring(top: float, gap: float = math.inf) -> Ground:
 def test_out_of_a_ring_the_launch_leads_through_its_gap_and_without_one_the_plan_says_so() -> None:
     through = laid(ring(200.0, gap=120.0), **CATAPULT)
     assert through.feasible, through.certificate.problems
-    assert through.ways is not None
-    assert through.ways.climb is not None
-    assert degrees(through.ways.climb.course) == pytest.approx(120.0, abs=12.0)
+    assert through.procedures is not None
+    assert through.procedures.climb is not None
+    assert degrees(through.procedures.climb.course) == pytest.approx(120.0, abs=12.0)
     none = laid(ring(200.0), **CATAPULT)
     assert not none.feasible
-    assert none.ways is not None
-    assert none.ways.climb is None
+    assert none.procedures is not None
+    assert none.procedures.climb is None
     assert len(none.certificate.problems) == 1
     said = none.certificate.problems[0]
     assert said.startswith("climb-out: none of 36 launch courses is clear of ground, missiles and zones at 70% of the")
@@ -224,12 +224,12 @@ def test_a_launch_into_a_missile_is_none() -> None:
 
 def test_what_is_flown_stays_and_is_not_laid_out_again() -> None:
     before = laid(**NORTH)
-    assert before.ways is not None
+    assert before.procedures is not None
     # Meanwhile walls stand about home.
-    flown = replace(before, scenario=scenario_of(ring(200.0), **NORTH), flown_legs=1, ways=None)
-    again = add_departure_and_approach(flown, limits(), LAW, before.ways.climb)
-    assert again.ways is not None
-    assert again.ways.climb is before.ways.climb
+    flown = replace(before, scenario=scenario_of(ring(200.0), **NORTH), flown_legs=1, procedures=None)
+    again = add_departure_and_approach(flown, limits(), LAW, before.procedures.climb)
+    assert again.procedures is not None
+    assert again.procedures.climb is before.procedures.climb
     assert again.feasible
 
 
@@ -241,10 +241,10 @@ def test_a_high_start_is_climbed_to_in_laps() -> None:
     plan = Plan(scenario, path, zeros, zeros, certificate, 1, "umda", 10, np.zeros((1, 3)))
     found = add_departure_and_approach(plan, limits(), LAW)
     assert found.feasible, found.certificate.problems
-    assert found.ways is not None
-    assert found.ways.climb is not None
-    way = np.concatenate([found.ways.climb.home[None], found.ways.climb.waypoints, path[:1]])
-    assert leg_runs(way).sum() * found.ways.climb.gradient >= 800.0 - 1e-6
+    assert found.procedures is not None
+    assert found.procedures.climb is not None
+    way = np.concatenate([found.procedures.climb.home[None], found.procedures.climb.waypoints, path[:1]])
+    assert leg_runs(way).sum() * found.procedures.climb.gradient >= 800.0 - 1e-6
 
 
 # ----------------------------------------------------------------------
@@ -255,8 +255,8 @@ def test_the_final_is_flown_into_the_wind_to_the_ground_below_the_field() -> Non
     for from_deg in (0.0, 200.0):
         plan = laid(landing=FIELD, wind={"speed_mps": 5.0, "from_deg": from_deg})
         assert plan.feasible, plan.certificate.problems
-        assert plan.ways is not None
-        down = plan.ways.descent
+        assert plan.procedures is not None
+        down = plan.procedures.descent
         assert down is not None
         assert degrees(down.course) == pytest.approx(from_deg, abs=1e-6)
         assert down.point.tolist() == [2000.0, 2500.0, BASE]
@@ -275,8 +275,8 @@ def test_the_final_is_flown_into_the_wind_to_the_ground_below_the_field() -> Non
 def test_a_stated_final_is_kept_and_one_that_is_too_steep_is_named() -> None:
     stated = FIELD | {"course_deg": 45.0, "approach_m": 1100.0, "slope_deg": 4.0}
     plan = laid(landing=stated)
-    assert plan.ways is not None
-    down = plan.ways.descent
+    assert plan.procedures is not None
+    down = plan.procedures.descent
     assert down is not None
     assert degrees(down.course) == pytest.approx(45.0)
     assert math.dist(down.final_waypoints[1, :2], down.point[:2]) == pytest.approx(1100.0)
@@ -302,10 +302,10 @@ def test_a_ridge_under_the_final_makes_it_steeper_or_is_named() -> None:
     into = {"landing": FIELD | {"course_deg": 0.0}}
     low, high = laid(ridge(BASE + 10.0), **into), laid(ridge(BASE + 38.0), **into)
     assert low.feasible, low.certificate.problems
-    assert low.ways is not None
-    assert low.ways.descent is not None
+    assert low.procedures is not None
+    assert low.procedures.descent is not None
     # 375 m before the point the glide is 10 m over a ridge of 10 m, at 3.1 degrees or more.
-    assert low.ways.descent.slope * 375.0 > 20.0
+    assert low.procedures.descent.slope * 375.0 > 20.0
     assert not high.feasible
     assert high.certificate.problems[0].startswith("landing: on a course of 0°, a final approach of")
     assert "too low above the ground" in high.certificate.problems[0]
@@ -333,7 +333,7 @@ def test_the_go_around_is_higher_over_a_mound_behind_the_field() -> None:
     into = {"landing": FIELD | {"course_deg": 90.0}}
     found = []
     for heights in (level, mound):
-        ways = laid(heights, **into).ways
+        ways = laid(heights, **into).procedures
         assert ways is not None
         assert ways.descent is not None
         found.append(ways.descent.go_around)
@@ -347,7 +347,7 @@ def test_a_field_higher_than_home_has_its_go_around_count_from_home() -> None:
     def plateau(east: Floats, north: Floats) -> Floats:
         return np.where(east > 800.0, 180.0, BASE) + 0.0 * north
 
-    ways = laid(plateau, landing=FIELD | {"course_deg": 0.0}).ways
+    ways = laid(plateau, landing=FIELD | {"course_deg": 0.0}).procedures
     assert ways is not None
     assert ways.descent is not None
     assert ways.descent.go_around >= 80.0 + 50.0

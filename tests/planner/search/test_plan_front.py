@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planfly.terminal.plan_answers import fewer_plans_line
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.certify import certify, least_height
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
@@ -37,7 +37,7 @@ def test_the_height_above_ground_is_the_paths_own() -> None:
     """As sampled each metre along a leg; the certificate's is less by what ArduPlane may deviate."""
     scenario = load_scenario("jacksboro-air")
     assert scenario.terrain is not None
-    problem = front_task(scenario, load_airframe(scenario).limits).problem
+    problem = front_task(scenario, load_uav(scenario).limits).problem
     leg = np.stack([scenario.start, scenario.destination])
     points = leg[0] + np.linspace(0.0, 1.0, 20_001)[:, None] * (leg[1] - leg[0])
     sampled = float((points[:, 2] - scenario.terrain.height(points[:, 0], points[:, 1])).min())

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.travel_cost import LENGTH_COST, make_energy_cost, path_cost
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
@@ -30,7 +30,7 @@ def plain(objective: str, from_deg: float, **tables: Any) -> Scenario:
 
 def planned(scenario: Scenario) -> tuple[Plan, float]:
     """A plan and its time, s."""
-    limits = load_airframe(scenario).limits
+    limits = load_uav(scenario).limits
     plan = plan_path(scenario, limits, seed=1)
     assert plan.safe, plan.certificate.problems
     seconds = path_cost(LENGTH_COST._replace(length=0.0, time=1.0), limits.performance(), np.array(plan.waypoints))
@@ -67,7 +67,7 @@ def test_in_the_same_wind_everywhere_a_straight_line_is_the_fastest() -> None:
 def test_a_plan_for_energy_takes_less_of_the_envelopes_power_than_the_straight_line() -> None:
     """At the bottom, against 8 m/s, 12 km take the power of level flight for 12000 / 17 s."""
     scenario = plain("energy", 0.0)
-    limits = load_airframe(scenario).limits
+    limits = load_uav(scenario).limits
     table = limits.performance()
     cost = make_energy_cost(limits.envelope, table)
     assert cost is not None
@@ -81,4 +81,4 @@ def test_energy_is_refused_where_the_power_of_the_aircraft_is_not_known(monkeypa
     scenario = plain("energy", 0.0)
     monkeypatch.setattr("planner.search.search_cheapest.make_travel_cost", lambda *_: None)
     with pytest.raises(ScenarioError, match="power of this aircraft is unknown"):
-        plan_path(scenario, load_airframe(scenario).limits, seed=1)
+        plan_path(scenario, load_uav(scenario).limits, seed=1)

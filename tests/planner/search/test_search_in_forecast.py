@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 import planfly
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.problem import make_problem
 from planner.evaluation.travel_cost import NO_WINDS
 from tests.world.made.forecast_files import ISSUED, wind_dataset, write_netcdf
@@ -96,7 +96,7 @@ def test_the_wind_of_a_place_is_that_of_the_time_of_passing_it(tmp_path: Path) -
     """A wind that rises from calm by 10 m/s in an hour, met at 25 m/s, 1.2 % faster at 250 m than the airspeed."""
     hours = np.arange(4.0)[:, None, None, None]
     scenario = load_scenario(str(scenario_in(tmp_path, 10.0 * hours)))
-    winds = make_problem(scenario, load_airframe(scenario).limits).search.travel.winds
+    winds = make_problem(scenario, load_uav(scenario).limits).search.travel.winds
     x, y, z = np.meshgrid(
         *(winds.first[k] + winds.step[k] * np.arange(winds.velocities.shape[k]) for k in range(3)), indexing="ij"
     )
@@ -105,4 +105,4 @@ def test_the_wind_of_a_place_is_that_of_the_time_of_passing_it(tmp_path: Path) -
     assert z.max() == pytest.approx(float(scenario.ceiling))
     np.testing.assert_allclose(winds.velocities[..., 0], expected, rtol=0.02, atol=0.005)
     calm = load_scenario("tight")
-    assert make_problem(calm, load_airframe(calm).limits).search.travel.winds is NO_WINDS
+    assert make_problem(calm, load_uav(calm).limits).search.travel.winds is NO_WINDS

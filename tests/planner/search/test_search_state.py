@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import Problem, make_problem
@@ -203,7 +203,7 @@ def test_no_two_slices_of_work_are_done_without_a_question(number: int, monkeypa
     """Among zones and below a greatest height, with no safe path where the numbers are larger: nearly all there is."""
     scenario = fresh_scenario(number)
     work = Work(monkeypatch)
-    plan_path(scenario, load_airframe(scenario).limits.with_margin(), seed=number + 1, stop=work.ask)
+    plan_path(scenario, load_uav(scenario).limits.with_margin(), seed=number + 1, stop=work.ask)
     assert work.most["continue_airspace_route"] == 1
     # Fitting and its rounds, which together are a few milliseconds.
     assert work.most.pop("_choose_candidates") <= 5
@@ -234,7 +234,7 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
 
 def test_among_zones_a_stop_ends_a_search_whenever_it_comes() -> None:
     scenario = fresh_scenario(4001)
-    limits = load_airframe(scenario).limits.with_margin()
+    limits = load_uav(scenario).limits.with_margin()
     asked: list[int] = []
 
     def end(after: int) -> str:

@@ -11,7 +11,7 @@ import planner.search.seeds as seeds_module
 import planner.seeding.lattice as lattice_module
 from aircraft.path_limits import Limits
 from benchmarks.planning.wild_instances import wild_scenario
-from planfly.workflow.airframe import load_airframe
+from planfly.workflow.uav import load_uav
 from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, ProblemArrays, make_problem
 from planner.plan import Certificate
@@ -133,7 +133,7 @@ def straight(search: Search) -> Floats:
 def test_a_path_that_fails_by_its_slopes_alone_is_shortened_with_gentler_ones() -> None:
     """The climb at the start of the shortest way is as steep as may be; its length is that of the lattice search."""
     scenario = wild_scenario(169, "planfly")
-    plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    plan = plan_path(scenario, load_uav(scenario).limits, seed=1)
     assert plan.safe
     assert plan.objectives[0] < 1.005 * 1.04238
 

@@ -154,7 +154,7 @@ def test_the_gradient_is_that_of_the_augmented_length(name: str, corners: str) -
 def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
     scenario = load_scenario("hard-07")
     task = make_task("hard-07")
-    data = make_problem(scenario, task.airframe.limits).search._replace(max_turn=9.0)
+    data = make_problem(scenario, task.uav.limits).search._replace(max_turn=9.0)
     path, limits = zigzag(data, 1.0, 6), precompute_limits(data)
     # High above all of it nothing but the length is left.
     path[:, 2] += 5000.0
@@ -188,10 +188,10 @@ def test_the_gradient_of_time_and_energy_is_that_of_their_values(
     objective: Literal["time", "energy"], is_forecast: bool
 ) -> None:
     task = make_task("jacksboro-air")
-    problem = make_problem(task.scenario, task.airframe.limits)
+    problem = make_problem(task.scenario, task.uav.limits)
     shear = problem.search.aircraft._replace(wind_speed=9.0, wind_gradient=0.005)
     winds = linear_winds() if is_forecast else NO_WINDS
-    travel = make_travel_cost(objective, task.airframe.limits.envelope, shear, winds)
+    travel = make_travel_cost(objective, task.uav.limits.envelope, shear, winds)
     assert travel is not None
     data = problem.search._replace(travel=travel, aircraft=shear, max_turn=9.0, legs_hold_turns=False)
     path, limits = zigzag(data, 0.1, 6), precompute_limits(data)

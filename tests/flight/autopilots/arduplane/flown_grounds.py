@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from aircraft.catalog import find_logged_aircraft
-from flight.mission.ground_ways import Approach
+from flight.mission.ground_phases import Approach
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from flight.simulation.track import Track
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.setups import spec_around
 from world.airfield import LandingStrip, Launch
 from world.arrays import Floats
@@ -72,7 +72,7 @@ def make_ground_setup(scenario: Scenario, mission: Mission, **parameters: float)
     """A setup by ArduPlane 4.6's law with these parameters over the aircraft's, and exact navigation."""
     exact = {"autopilot": "ardupilot", "arduplane_version": "4.6", "nav": "perfect"}
     made = replace(scenario, flight=scenario.flight.model_copy(update=exact))
-    return make_setup(made, load_airframe(made, parameters), mission, 1)
+    return make_setup(made, load_uav(made, parameters), mission, 1)
 
 
 def fly(setup: FlightSetup) -> Flown:

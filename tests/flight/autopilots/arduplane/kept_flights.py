@@ -15,8 +15,8 @@ from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
@@ -108,14 +108,14 @@ def return_mission(flight: str) -> Mission:
 def return_setup(flight: str, **parameters: float) -> FlightSetup:
     """A kept flight's setup with its parameters, and others that are changed."""
     row = KEPT[flight]
-    airframe = load_airframe(jacksboro())
+    uav = load_uav(jacksboro())
     stated = {
         "RTL_ALTITUDE": float(row["rtl_altitude_m"]),
         "RTL_CLIMB_MIN": float(row["rtl_climb_min_m"]),
         "FLIGHT_OPTIONS": float(row["flight_options"]),
     }
-    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft, None, "4.6")).with_parameters(**stated | parameters)
-    setup = make_setup(jacksboro(), replace(airframe, autopilot=law), return_mission(flight), 1)
+    law = ArduPlane(ArduPilotParameters.load(uav.aircraft, None, "4.6")).with_parameters(**stated | parameters)
+    setup = make_setup(jacksboro(), replace(uav, autopilot=law), return_mission(flight), 1)
     return replace(setup, nav="perfect")
 
 
@@ -123,7 +123,7 @@ def return_setup(flight: str, **parameters: float) -> FlightSetup:
 def flown_return(flight: str) -> Flown:
     """A kept flight's return by planfly's law."""
     setup = return_setup(flight)
-    done = fly_to_end(Flight(setup, load_airframe(jacksboro()).aircraft))
+    done = fly_to_end(Flight(setup, load_uav(jacksboro()).aircraft))
     return _measured(setup, flight, done.track, done.ended)
 
 

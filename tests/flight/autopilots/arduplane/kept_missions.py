@@ -15,8 +15,8 @@ from flight.mission.itinerary import stated_loiter
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_map
 from world.scenario import scenario_from_spec
@@ -130,18 +130,18 @@ def setup_by_law(mission: Mission, flight: str = "") -> FlightSetup:
         "wind": _WINDS.get(flight, {}),
     }
     scenario = scenario_from_spec(spec, flight or "circles")
-    airframe = load_airframe(scenario)
-    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft, None, "4.6"))
+    uav = load_uav(scenario)
+    law = ArduPlane(ArduPilotParameters.load(uav.aircraft, None, "4.6"))
     if flight in _ROLL_LIMITS:
         law = law.with_parameters(ROLL_LIMIT_DEG=_ROLL_LIMITS[flight])
-    return replace(make_setup(scenario, replace(airframe, autopilot=law), mission, 1), nav="perfect")
+    return replace(make_setup(scenario, replace(uav, autopilot=law), mission, 1), nav="perfect")
 
 
 @functools.cache
 def simulated(flight: str) -> SimulatedFlight:
     """The same mission by planfly's law, as it was recorded."""
     setup = kept_setup(flight)
-    return fly_to_end(Flight(setup, load_airframe(setup.scenario).aircraft))
+    return fly_to_end(Flight(setup, load_uav(setup.scenario).aircraft))
 
 
 def by_law(flight: str) -> Flown:

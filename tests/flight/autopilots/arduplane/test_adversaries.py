@@ -20,8 +20,8 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.rules.mission_rule import mission_findings
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.flight.autopilots.arduplane.kept_missions import setup_by_law
 from tests.mission_lines import mission, wp
 from world.arrays import Floats
@@ -89,8 +89,8 @@ def flown(
     aircraft = load_aircraft("aerosonde")
     law = ArduPlane(ArduPilotParameters.load(aircraft, None, version)).with_parameters(**dict(values))
     scenario = replace(setup_by_law(read).scenario, wind=Wind(wind[0], math.radians(wind[1])))
-    airframe = replace(load_airframe(scenario), autopilot=law)
-    done = fly_to_end(Flight(replace(make_setup(scenario, airframe, read, 1), nav="perfect"), aircraft))
+    uav = replace(load_uav(scenario), autopilot=law)
+    done = fly_to_end(Flight(replace(make_setup(scenario, uav, read, 1), nav="perfect"), aircraft))
     assert done.ended == "completed"
     track = done.track
     return Flown(track, np.degrees(np.abs(track.attitude[:, 0])), track.position[:, 2] - HOME_M)
@@ -363,5 +363,5 @@ def test_what_is_not_flown_leaves_the_verdict_open(name: str) -> None:
     read = mission(*lines)
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(**values)
     scenario = setup_by_law(read).scenario
-    made = make_setup(scenario, replace(load_airframe(scenario), autopilot=law), read, 1)
+    made = make_setup(scenario, replace(load_uav(scenario), autopilot=law), read, 1)
     assert any(finding.ok is None for finding in mission_findings(made))

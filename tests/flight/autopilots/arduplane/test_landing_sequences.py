@@ -8,7 +8,7 @@ import pytest
 from flight.autopilots.arduplane.go_around_point_mass import fly_go_arounds, make_abort_start
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.simulated_returns import RETURN_GROUND_IMPACT, RETURN_START
-from flight.mission.ground_ways import Approach
+from flight.mission.ground_phases import Approach
 from flight.mission.placing import landing_sequence
 from logs.verdict.returns.judge_returns import make_return_world
 from tests.flight.autopilots.arduplane.flown_grounds import LATER_M, Flown

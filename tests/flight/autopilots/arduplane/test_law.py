@@ -33,8 +33,8 @@ from flight.guidance.inner_loops import GUIDANCE_MEMORY, steer_elevator
 from flight.guidance.navigation_error import MOTION
 from flight.mission_files.formats import parse_mission
 from flight.simulation.simulate import Flight, fly_to_end
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup as setup_of
+from planfly.workflow.uav import load_uav
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, state, waypoints
 from tests.setups import MakeSetup
 from tests.soak import SOAK
@@ -664,7 +664,7 @@ def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft
         rows, ended = flight.fly_block(1)
         if ended:
             break
-        demanded.append(float(flight._workspace.own.memory.roll_demand))
+        demanded.append(float(flight._workspace.law_record.memory.roll_demand))
         flown.append(float(rows["attitude"][-1][0]))
     lag = round(ROLL_LAG_RATIO * usual.roll_time * 60)
 
@@ -715,9 +715,9 @@ def test_the_same_setup_gives_the_same_flight(
 @pytest.mark.parametrize("kept", KEPT, ids=[str(kept["seed"]) for kept in KEPT])
 def test_it_flies_as_arduplane_flew(kept: dict[str, Any]) -> None:
     scenario = scenario_from_spec(kept["scenario"], "kept")
-    airframe = load_airframe(scenario)
-    setup = setup_of(scenario, airframe, parse_mission(kept["mission"], "kept.waypoints"), kept["seed"])
-    law = fly_to_end(Flight(setup, airframe.aircraft))
+    uav = load_uav(scenario)
+    setup = setup_of(scenario, uav, parse_mission(kept["mission"], "kept.waypoints"), kept["seed"])
+    law = fly_to_end(Flight(setup, uav.aircraft))
     ours, real = flown_figures(setup, law.track, law.ended), kept["real"]
     assert ours.ended == real["ended"] == "completed"
     assert ours.clearance == pytest.approx(real["clearance"], abs=3.0)

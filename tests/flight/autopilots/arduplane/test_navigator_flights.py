@@ -11,8 +11,8 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.mission_rule import mission_findings
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.flight.autopilots.arduplane.kept_missions import (
     CIRCLES,
     CORNERS,
@@ -129,10 +129,10 @@ def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int
     read = mission(wp(0, 0, 0.0), wp(0, 1500, 0.0, command=command, p=params), *onward)
     setup = setup_by_law(read)
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
-    airframe = replace(load_airframe(setup.scenario), autopilot=law)
-    setup = replace(make_setup(setup.scenario, airframe, read, 1), nav="perfect")
+    uav = replace(load_uav(setup.scenario), autopilot=law)
+    setup = replace(make_setup(setup.scenario, uav, read, 1), nav="perfect")
     assert setup.route.arc_radii.max() == pytest.approx(radius, abs=0.5)
-    done = fly_to_end(Flight(setup, airframe.aircraft))
+    done = fly_to_end(Flight(setup, uav.aircraft))
     assert done.ended == "completed"
     track = Flown(done.track.time[::20], done.track.position[::20], np.zeros((0, 2)))
     assert track.radius(np.array([0.0, 1500.0])) == pytest.approx(radius, rel=0.02)
@@ -152,9 +152,9 @@ def test_loiters_that_a_jump_leads_back_to_are_flown_each_time(
 ) -> None:
     setup = setup_by_law(mission(wp(0, -2000, 500), *lines, home="36.5 -84.2 0"))
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
-    airframe = replace(load_airframe(setup.scenario), autopilot=law)
-    setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
-    done = fly_to_end(Flight(setup, airframe.aircraft))
+    uav = replace(load_uav(setup.scenario), autopilot=law)
+    setup = replace(make_setup(setup.scenario, uav, setup.mission, 1), nav="perfect")
+    done = fly_to_end(Flight(setup, uav.aircraft))
     assert done.ended == "completed"
     east, north = done.track.position[:, 0], done.track.position[:, 1]
     near = np.hypot(east, north) < 400.0
@@ -187,8 +187,8 @@ def test_a_bank_limit_of_circles_is_said_not_to_be_flown() -> None:
         law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(
             NAVL1_LIM_BANK=float(bank)
         )
-        airframe = replace(load_airframe(setup.scenario), autopilot=law)
-        made = make_setup(setup.scenario, airframe, read, 1)
+        uav = replace(load_uav(setup.scenario), autopilot=law)
+        made = make_setup(setup.scenario, uav, read, 1)
         assert any(note.startswith("NAVL1_LIM_BANK 30 is not simulated") for note in made.route.notes) == said
         # The circle may be narrower than the one that is judged: the verdict stays open.
         open_texts = [finding.reason for finding in mission_findings(made) if finding.ok is None]
@@ -201,8 +201,8 @@ def test_a_last_loiter_whose_height_was_given_up_has_not_been_flown(climb: float
     setup = setup_by_law(mission(wp(0, -2000, 500), wp(0, 0, 700, 31, p="0 55 0 0"), home="36.5 -84.2 0"))
     made = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde")))
     law = made.with_parameters(TECS_CLMB_MAX=climb, ROLL_LIMIT_DEG=55.0)
-    airframe = replace(load_airframe(setup.scenario), autopilot=law)
-    setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
-    done = fly_to_end(Flight(setup, airframe.aircraft))
+    uav = replace(load_uav(setup.scenario), autopilot=law)
+    setup = replace(make_setup(setup.scenario, uav, setup.mission, 1), nav="perfect")
+    done = fly_to_end(Flight(setup, uav.aircraft))
     assert done.ended.startswith(ended)
     assert (abs(done.track.position[-1, 2] - 700.0) < 10.0) == (ended == "completed")

@@ -21,7 +21,7 @@ from flight.autopilots.simulated_returns import (
     make_return_environment,
 )
 from flight.mission.return_path import ReturnCircle, ReturnPoint, choose_target
-from planfly.workflow.airframe import Airframe, load_airframe
+from planfly.workflow.uav import Uav, load_uav
 from tests.flight.autopilots.arduplane.kept_flights import HOME, KEPT, WIND, flown_return, jacksboro, kept_track, rally
 from tests.soak import SOAK
 from world.kernels import Records, read_only
@@ -37,13 +37,13 @@ ASIDE, HEIGHT, ARRIVAL = 80.0, 20.0, 4.0
 
 
 @functools.cache
-def airframe() -> Airframe:
-    return load_airframe(jacksboro())
+def uav() -> Uav:
+    return load_uav(jacksboro())
 
 
 @functools.cache
 def aerosonde(wind: Wind = WIND) -> PointMass:
-    made = airframe()
+    made = uav()
     return make_point_mass(made.aircraft, made.limits.envelope, made.airspeed, wind)
 
 
@@ -53,7 +53,7 @@ def around() -> ReturnEnvironment:
 
 
 def parameters(**values: float) -> ArduPilotParameters:
-    return ArduPilotParameters.load(airframe().aircraft).changed(**values)
+    return ArduPilotParameters.load(uav().aircraft).changed(**values)
 
 
 def start(**values: float) -> Records:
@@ -237,5 +237,5 @@ def test_one_that_grazes_the_ground_is_flown_on_and_its_depth_is_known() -> None
 def test_energy_is_power_over_time() -> None:
     # Level for 20 km: the envelope's level power at 26.2 m/s true (25 equivalent at 1,000 m) over the time.
     flown = returned(start(up=1000.0, velocity_north=26.2), ReturnCircle(0.0, 20_000.0, 1000.0, 120.0), flat(100.0))
-    power = airframe().limits.envelope.power(26.2, 1000.0, 0.0)
+    power = uav().limits.envelope.power(26.2, 1000.0, 0.0)
     assert flown["energy"] == pytest.approx(power * flown["end_time"] / 3600.0, rel=0.04)

@@ -22,7 +22,7 @@ from flight.autopilots.sitl.flight import launch_rail
 from flight.autopilots.sitl.mission import uploaded_mission
 from flight.guidance.navigation_error import MOTION
 from flight.mission.items import Command
-from flight.simulation.airborne import Release
+from flight.simulation.running_flight import Release
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_flight
 from tests.autopilots import arduplane_program

@@ -106,7 +106,7 @@ def by_law(flight: str) -> Flown:
     law = Px4(Px4Parameters.load(aerosonde, None, version).changed(**changed))
     setup = setup_maker(aerosonde)(waypoints, bank_deg=30.0)
     flying = Flight(replace(setup, autopilot=law), aerosonde)
-    memory = flying._workspace.own["memory"]
+    memory = flying._workspace.law_record["memory"]
     blocks, ended, leg, switches = [], "", 0, {}
     while not ended:
         rows, ended = flying.fly_block(2)

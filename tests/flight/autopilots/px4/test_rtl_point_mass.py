@@ -10,7 +10,7 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4.rtl_point_mass import fly_returns
 from flight.autopilots.simulated_returns import RETURN_ARRIVED, RETURN_GROUND_IMPACT, RETURN_TIMEOUT, SimulatedReturns
 from flight.mission.return_path import LandingStart, ReturnPoint, choose_target
-from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde, airframe, flat, start
+from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde, flat, start, uav
 from world.wind import Wind
 
 # Home is 8 km north of the start, at 0 m.
@@ -20,7 +20,7 @@ NEAR_M = 11.0
 
 
 def parameters(**values: float) -> Px4Parameters:
-    return Px4Parameters.load(airframe().aircraft).changed(**values)
+    return Px4Parameters.load(uav().aircraft).changed(**values)
 
 
 def returned(
@@ -65,7 +65,7 @@ def test_it_climbs_first_flies_level_and_descends_at_home(
 def test_a_climb_costs_its_height_in_energy_at_least() -> None:
     low, high = (returned(150.0, RTL_RETURN_ALT=height).results[0]["energy"] for height in (100.0, 300.0))
     # 11 kg are lifted by 150 m, without the losses of motor and propeller.
-    assert high - low > airframe().aircraft.mass * 9.81 * 150.0 / 3600.0
+    assert high - low > uav().aircraft.mass * 9.81 * 150.0 / 3600.0
 
 
 def test_a_hill_on_the_way_is_hit_at_the_return_altitude() -> None:

@@ -38,8 +38,8 @@ class FakePx4(Fake):
         self.fault = fault
         scripts = Path(args.w, "etc", "init.d-posix")
         assert (scripts / "rcS").is_file(), "the start-up files are copied"
-        (airframe,) = scripts.joinpath("airframes").glob("22000_*")
-        lines = [line.split() for line in airframe.read_text().splitlines() if line.startswith("param set ")]
+        (uav,) = scripts.joinpath("airframes").glob("22000_*")
+        lines = [line.split() for line in uav.read_text().splitlines() if line.startswith("param set ")]
         self.parameters = {name: float(value) for _, _, name, value in lines}
         self.port = int(re.search(r"simulator_mavlink start -c (\d+)", (scripts / "px4-rc.simulator").read_text())[1])
         ours, theirs = re.search(r"-u (\d+) -o (\d+) -t 127", (scripts / "px4-rc.mavlink").read_text()).groups()

@@ -63,7 +63,7 @@ def test_a_flight_that_ends_in_its_first_lap_has_flown_none_of_the_second() -> N
     assert (found.first, found.last, found.partial) == (0, 3, True)
 
 
-SETUP = replace(LOG.setup, source=ImportedLog("a", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),)))
+SETUP = replace(LOG.setup, imported_log=ImportedLog("a", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),)))
 
 
 def along(waypoints: list[list[float]]) -> FlightSetup:
@@ -113,6 +113,6 @@ def test_a_flight_that_went_home_half_way_is_not_another_plan() -> None:
 
 
 def test_without_stretches_nothing_is_said() -> None:
-    assert plan_mismatch(replace(SETUP, source=ImportedLog("a", "", "")), LOG.track) is None
+    assert plan_mismatch(replace(SETUP, imported_log=ImportedLog("a", "", "")), LOG.track) is None
     assert plan_mismatch(SETUP, LOG.track.rows(0, 0)) is None
     assert np.isfinite(LOG.track.position).all()

@@ -159,8 +159,8 @@ def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path:
     assert flight.verdict.undecided
     assert flight.verdict.headline.startswith("not judged from end to end: the log begins in flight, and leg 0 is not")
     setup = flight.setup
-    assert setup.source is not None
-    on_the_ground = replace(setup, source=replace(setup.source, begins_in_flight=False))
+    assert setup.imported_log is not None
+    on_the_ground = replace(setup, imported_log=replace(setup.imported_log, begins_in_flight=False))
     verdict = judge_flight(on_the_ground, flight.track, "")
     completion = next(item for item in verdict.findings if item.rule == "completion")
     assert (completion.ok, completion.margin) == (False, -1)

@@ -10,7 +10,7 @@ from logs.verdict.imported.flown_legs import FlownLegs, flown_legs
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 
 LOG = example_log()
-SETUP = replace(LOG.setup, source=ImportedLog("a.BIN", "", ""))
+SETUP = replace(LOG.setup, imported_log=ImportedLog("a.BIN", "", ""))
 
 
 def flown(track: Track) -> FlownLegs:

@@ -10,8 +10,8 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
 from logs.verdict.measures.bank_limit import bank_limit_text
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from tests.mission_lines import mission, wp
 from world.scenario import Scenario, with_flight
 
@@ -41,9 +41,9 @@ def test_the_lowest_bank_limit_is_named(
     roll_limit: float, scenario_limit: float | None, bank: float, owner: str
 ) -> None:
     scenario = scenario_with(scenario_limit, in_file=True)
-    airframe = load_airframe(scenario)
+    uav = load_uav(scenario)
     law = Px4(Px4Parameters.defaults()).with_parameters(FW_R_LIM=roll_limit)
-    limits = replace(airframe.limits, max_bank=min(airframe.limits.max_bank, law.turns.max_bank))
-    setup = make_setup(scenario, replace(airframe, autopilot=law, limits=limits), LOITER, 1)
+    limits = replace(uav.limits, max_bank=min(uav.limits.max_bank, law.turns.max_bank))
+    setup = make_setup(scenario, replace(uav, autopilot=law, limits=limits), LOITER, 1)
     assert math.degrees(setup.max_bank) == pytest.approx(bank)
     assert bank_limit_text(setup) == f"{owner} bank limit of {bank:.0f}°"

@@ -14,8 +14,8 @@ from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
-from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
+from planfly.workflow.uav import load_uav
 from world.scenario import load_scenario
 
 # Its destination is 100 m beyond the mission's end, so the return after the mission is judged.
@@ -69,7 +69,7 @@ def hill_setup(folder: Path, more: str = "", mission: str = "", rally: tuple[obj
     way.write_text(mission or mission_text(), encoding="utf-8")
     scenario, read = load_scenario(str(file)), read_mission(way)
     made = Mission(read.home, read.items, rally=rally, source=read.source)  # type: ignore[arg-type]
-    return make_setup(scenario, load_airframe(scenario), made, 1)
+    return make_setup(scenario, load_uav(scenario), made, 1)
 
 
 def hill_drawn(setup: FlightSetup, every: float = 10.0) -> DrawnReturns:

@@ -247,7 +247,7 @@ def test_the_leg_to_a_landing_that_is_not_flown_needs_no_height(last: float, low
 def logged(setup: FlightSetup) -> FlightSetup:
     """The same mission, flown in an imported log by a named aircraft."""
     source = ImportedLog("a.tlog", "", "telemetry log", heights=Heights("GPS", "amsl"), aircraft_known=True)
-    return replace(setup, source=source)
+    return replace(setup, imported_log=source)
 
 
 def test_the_take_off_and_the_landing_of_a_log_need_no_height() -> None:

@@ -19,8 +19,8 @@ from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
 from planfly.terminal.verdict_lines import verdict_lines
-from planfly.workflow.airframe import load_airframe, max_turn_bank
 from planfly.workflow.open_flight import make_setup, open_flight
+from planfly.workflow.uav import load_uav, max_turn_bank
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some
@@ -50,17 +50,17 @@ def loiter(item: str, parameters: dict[str, float], **tables: Any) -> FlightSetu
         "destination": end | {"north_m": 4000.0},
     }
     scenario = scenario_from_spec(spec | tables, "own")
-    airframe = load_airframe(scenario)
-    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft)).with_parameters(**parameters)
-    limits = replace(airframe.limits, max_bank=min(airframe.limits.max_bank, max_turn_bank(scenario, law)))
-    flown_by = replace(airframe, autopilot=law, limits=limits)
+    uav = load_uav(scenario)
+    law = ArduPlane(ArduPilotParameters.load(uav.aircraft)).with_parameters(**parameters)
+    limits = replace(uav.limits, max_bank=min(uav.limits.max_bank, max_turn_bank(scenario, law)))
+    flown_by = replace(uav, autopilot=law, limits=limits)
     return replace(make_setup(scenario, flown_by, parse_mission(text, "own.waypoints"), 1), nav="perfect")
 
 
 @functools.cache
 def flown(item: str, **parameters: float) -> Verdict:
     setup = loiter(item, parameters)
-    done = fly_to_end(Flight(setup, load_airframe(setup.scenario).aircraft))
+    done = fly_to_end(Flight(setup, load_uav(setup.scenario).aircraft))
     return judge_flight(setup, done.track, done.ended)
 
 
@@ -166,7 +166,7 @@ def test_a_stated_circle_needs_the_autopilots_own_bank() -> None:
 def judged_with(setup: FlightSetup, item: str, **parameters: float) -> Verdict:
     """A flight by the law with these parameters, judged as one of another setup."""
     own = loiter(item, parameters)
-    done = fly_to_end(Flight(own, load_airframe(own.scenario).aircraft))
+    done = fly_to_end(Flight(own, load_uav(own.scenario).aircraft))
     return judge_flight(setup, done.track, done.ended)
 
 

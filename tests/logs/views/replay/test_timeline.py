@@ -45,7 +45,7 @@ def test_a_real_flight_begins_where_its_log_does_without_seed_or_trim(log: Fligh
     def start(given: FlightLog) -> str:
         return timeline(given)[0].text
 
-    real = dataclasses.replace(log, setup=dataclasses.replace(log.setup, source=ImportedLog("a.BIN", "", "")))
+    real = dataclasses.replace(log, setup=dataclasses.replace(log.setup, imported_log=ImportedLog("a.BIN", "", "")))
     assert "seed" in start(log)
     assert log.setup.route.started in start(log)
     assert "; imported log a.BIN, from " in start(real)

@@ -20,7 +20,7 @@ from world.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True)
-class Airframe:
+class Uav:
     """Aircraft of a scenario, loaded once for planning, flying and judging.
 
     aircraft: the aircraft's entry in the catalog.
@@ -45,7 +45,7 @@ class Airframe:
         return self.limits.max_bank
 
 
-def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan | None = None) -> Plan:
+def with_departure_and_approach(plan: Plan, uav: Uav, flown_plan: Plan | None = None) -> Plan:
     """Return the plan with the departure and the approach that its scenario requires.
 
     If the scenario requires neither, the plan is returned unchanged.
@@ -59,16 +59,16 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
     >>> path = np.stack([scenario.start, scenario.destination])
     >>> certificate = Certificate(0.1, math.inf, 0.1, 9.0, 10.0, 50.0, ())
     >>> plan = Plan(scenario, path, np.zeros(4), np.zeros(4), certificate, 7, "umda", 60, np.zeros((0, 3)))
-    >>> with_departure_and_approach(plan, load_airframe(scenario)) is plan
+    >>> with_departure_and_approach(plan, load_uav(scenario)) is plan
     True
     """
-    autopilot, cruise = airframe.autopilot, airframe.airspeed
+    autopilot, cruise = uav.autopilot, uav.airspeed
     final_model = FinalModel(
         airspeed=lambda tailwind, amsl: autopilot.ground.airspeed(cruise, tailwind, amsl),
         slope=lambda height, distance, tailwind, amsl: autopilot.ground.glide(height, distance, tailwind, amsl).slope,
     )
-    flown_departure = None if flown_plan is None or flown_plan.ways is None else flown_plan.ways.climb
-    return add_departure_and_approach(plan, airframe.limits.with_margin(), final_model, flown_departure)
+    flown_departure = None if flown_plan is None or flown_plan.procedures is None else flown_plan.procedures.climb
+    return add_departure_and_approach(plan, uav.limits.with_margin(), final_model, flown_departure)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
@@ -78,7 +78,7 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
     return scenario.planner.seed if scenario.planner.seed is not None else 1
 
 
-def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
+def load_uav(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Uav:
     """Load a scenario's aircraft and autopilot, and the limits from scenario and aircraft.
 
     parameters: autopilot parameters that replace the file's parameters, by name and in the units of the autopilot.
@@ -86,8 +86,8 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     ParameterError for an unreadable parameter file, or values that are not allowed.
 
     >>> from world.scenario import load_scenario
-    >>> airframe = load_airframe(load_scenario("tight"))
-    >>> airframe.aircraft.name, airframe.airspeed, airframe.limits.min_clearance
+    >>> uav = load_uav(load_scenario("tight"))
+    >>> uav.aircraft.name, uav.airspeed, uav.limits.min_clearance
     ('aerosonde', 25.0, 60.0)
     """
     table = scenario.flight
@@ -99,20 +99,20 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot))
-    return Airframe(aircraft, with_tracking_error(limits, autopilot, scenario), battery, autopilot)
+    return Uav(aircraft, with_tracking_error(limits, autopilot, scenario), battery, autopilot)
 
 
-def airframe_for_setup(setup: FlightSetup) -> Airframe:
-    """Return the airframe of a flight setup.
+def uav_of_setup(setup: FlightSetup) -> Uav:
+    """Return the UAV of a flight setup.
 
     Raises FlightError if the catalog does not contain its aircraft.
 
     >>> from logs.recording.example_log import example_log
-    >>> airframe_for_setup(example_log().setup).aircraft.name
+    >>> uav_of_setup(example_log().setup).aircraft.name
     'aerosonde'
     """
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
-    return Airframe(aircraft, setup.limits, setup.battery, setup.autopilot)
+    return Uav(aircraft, setup.limits, setup.battery, setup.autopilot)
 
 
 def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
@@ -167,16 +167,14 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
     return airspeed
 
 
-def with_tightened_limits(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """Return the airframe with the limits of a tightened scenario.
+def with_tightened_limits(uav: Uav, scenario: Scenario) -> Uav:
+    """Return the UAV with the limits of a tightened scenario.
 
     Envelope, airspeed and tracking error are kept.
     """
-    old_limits = airframe.limits
-    limits = make_limits(
-        scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot)
-    )
-    return replace(airframe, limits=replace(limits, tracking=old_limits.tracking))
+    old_limits = uav.limits
+    limits = make_limits(scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, uav.autopilot))
+    return replace(uav, limits=replace(limits, tracking=old_limits.tracking))
 
 
 def check_level_flight(aircraft: Aircraft, envelope: Envelope) -> None:

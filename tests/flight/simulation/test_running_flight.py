@@ -10,7 +10,7 @@ from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
 from flight.mission.return_path import ReturnCircle
-from flight.simulation.airborne import TIME_LIMIT_BASE_S, TIME_LIMIT_FACTOR, Airborne
+from flight.simulation.running_flight import TIME_LIMIT_BASE_S, TIME_LIMIT_FACTOR, RunningFlight
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import SPEED, loiter, radius_at
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
@@ -21,7 +21,7 @@ MAKE = setup_maker(AEROSONDE)
 NOTHING = Mission(None, ())
 
 
-class Gliding(Airborne):
+class Gliding(RunningFlight):
     """Nobody steers it."""
 
     def _fly_ticks(self, count: int) -> int:
@@ -100,7 +100,7 @@ def test_a_flight_that_still_circles_when_its_time_is_over_says_so() -> None:
     for leg, said in ((0, "circled: at the loiter of item 2, "), (setup.route.legs - 1, "time limit: ")):
         flight = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
         flight._start_disturbances(setup)
-        flight.max_ticks, flight.memory.leg = 0, leg
+        flight.max_ticks, flight.guidance_memory.leg = 0, leg
         assert flight.fly_block(10)[1] == f"{said}not finished after 0 s"
 
 

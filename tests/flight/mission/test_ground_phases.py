@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.mission.ground_ways import DEFAULT_CLIMB_PITCH, airborne_route
+from flight.mission.ground_phases import DEFAULT_CLIMB_PITCH, airborne_route
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_geometry import judge_geometry

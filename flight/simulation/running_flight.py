@@ -20,7 +20,7 @@ from flight.guidance.equivalent_airspeed import eas_to_tas_ratio
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.path import fly_by_path, waypoint_records
-from flight.mission.ground_ways import GroundPhases, TakeOff
+from flight.mission.ground_phases import GroundPhases, TakeOff
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, rtl_loiter_timeout
@@ -66,14 +66,14 @@ class Start:
     ground: float
 
 
-class Airborne:
+class RunningFlight:
     """One flight in progress, advanced by `fly_block`.
 
     dt: duration of a tick, s.
     setup: setup of the flight, with the program that flies once that is known.
     path: reference path.
     map: local map from JSBSim's positions, around area and route.
-    memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    guidance_memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the simulated aircraft.
     max_ticks: time limit, ticks.
     engine: flight model in use, and the reason for it, as in "JSBSim, as requested".
@@ -135,12 +135,12 @@ class Airborne:
         self._airspeeds = setup.autopilot.speeds.flown_airspeeds(setup.route.leg_airspeeds, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
-        own = None if self._law is None else self._law.memory
-        self._workspace = Workspace(self._gains, self.path, waypoints, own, setup.scenario.wind.field)
+        law_memory = None if self._law is None else self._law.memory
+        self._workspace = Workspace(self._gains, self.path, waypoints, law_memory, setup.scenario.wind.field)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
-        self.memory = self._work.memory
+        self.guidance_memory = self._work.memory
         self._work.timing.dt = self.dt
         self._work.settings.min_airspeed = 0.94 * aircraft.stall_speed
         self._work.settings.center_longitude = self.map.center_longitude
@@ -241,33 +241,27 @@ class Airborne:
 
     def fly_block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, and return their rows and the reason for the flight's end, "" if it continues."""
-        row_blocks: list[Rows] = []
-        end_reason = ""
+        workspace, row_blocks, end_reason = self._workspace, list[Rows](), ""
         while count > 0 and not end_reason:
-            rows, end_reason = self._fill_workspace(min(count, BLOCK_TICKS))
-            row_blocks.append(rows)
-            count -= BLOCK_TICKS
+            # The rows of these ticks fit in the workspace.
+            ticks = min(count, BLOCK_TICKS)
+            workspace.turbulence[:ticks] = self._random.standard_normal((ticks, 3))
+            if self._navigation_random is not None:
+                workspace.navigation[:ticks] = self._navigation_random.standard_normal((ticks, 3))
+            remaining_ticks = self.max_ticks - int(workspace.ticks_flown[0])
+            workspace.rows_filled[0] = 0
+            status = self._fly_ticks(min(ticks, remaining_ticks))
+            row_blocks.append(quantise(workspace.rows[: workspace.rows_filled[0]]))
+            if status:
+                end_reason = ENDS[status]
+            elif remaining_ticks <= ticks:
+                end_reason = self._timeout_text()
+            count -= ticks
         return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
-
-    def _fill_workspace(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, whose rows must fit in the workspace; return values as for `fly_block`."""
-        workspace = self._workspace
-        workspace.turbulence[:count] = self._random.standard_normal((count, 3))
-        if self._navigation_random is not None:
-            workspace.navigation[:count] = self._navigation_random.standard_normal((count, 3))
-        remaining_ticks = self.max_ticks - int(workspace.ticks_flown[0])
-        workspace.rows_filled[0] = 0
-        status = self._fly_ticks(min(count, remaining_ticks))
-        rows = quantise(workspace.rows[: workspace.rows_filled[0]])
-        if status:
-            return rows, ENDS[status]
-        if remaining_ticks <= count:
-            return rows, self._timeout_text()
-        return rows, ""
 
     def _timeout_text(self) -> str:
         """Return the end reason of a flight that exceeded its time limit; in a loiter, name the loiter's item."""
-        route, next_waypoint = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
+        route, next_waypoint = self.setup.route, min(int(self.guidance_memory.leg) + 1, self.setup.route.legs)
         time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
         if route.arc_radii[next_waypoint] > 0.0 and route.rtl_start is None:
             return f"circled: at the loiter of item {route.items[next_waypoint]}, {time_text}"
