@@ -155,7 +155,8 @@ _KEYWORDS_IN_MESSAGES = {"served_speed": "speed", "front": "count", "sample_flig
 _MAX_CAMERA_SIZES_MM = (1000.0, 1000.0, 10_000.0)
 # Description of the numbers of a camera, in messages.
 CAMERA_FORMAT = (
-    "the sensor's size across and along the track and the focal length, mm, maybe overlaps along and across, %"
+    "the sensor's size across and along the track and the focal length, mm, and optionally the overlaps along and"
+    " across, %"
 )
 
 

@@ -109,13 +109,14 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     ValueError: not a plain file; expected a mission file
     """
     status = path.stat()
+    file_text = f"{'an' if kind.startswith('a') else 'a'} {kind} file"
     if stat.S_ISREG(status.st_mode) and status.st_size > max_bytes:
-        raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {max_bytes:,}")
+        raise ValueError(f"{status.st_size:,} bytes: {file_text} has at most {max_bytes:,}")
     if stat.S_ISDIR(status.st_mode):
-        raise ValueError(f"{missing_text(path)}; expected a {kind} file")
+        raise ValueError(f"{missing_text(path)}; expected {file_text}")
     is_shell_pipe = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
     if not (stat.S_ISREG(status.st_mode) or is_shell_pipe):
-        raise ValueError(f"not a plain file; expected a {kind} file")
+        raise ValueError(f"not a plain file; expected {file_text}")
     with path.open("rb") as file:
         data = file.read(max_bytes + 1)
     if len(data) > max_bytes:

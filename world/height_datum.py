@@ -24,7 +24,7 @@ MAX_SEA_LEVEL = 200.0
 # satellite receivers and autopilots.
 GEOIDS = {"EGM96": 5773, "EGM2008": 3855}
 _MEAN_SEA_LEVEL = "mean sea level"
-UNSTATED = f"{_MEAN_SEA_LEVEL}, as assumed for the file's heights"
+UNSTATED = f"{_MEAN_SEA_LEVEL} (assumed, because the file states no datum)"
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,15 +70,13 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
     banded_names = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
     notes = []
     if banded_names:
-        notes.append(f"a fence has no floor and no ceiling: {_joined_names(banded_names)} in the fence at every height")
+        notes.append(f"a fence has no floor and no ceiling: {_joined_names(banded_names)} fenced at every height")
     if closed_names:
-        notes.append(
-            f"an excluded area of a fence has no holes: {_joined_names(closed_names)} in the fence without them"
-        )
+        notes.append(f"an exclusion of a fence cannot have holes: {_joined_names(closed_names)} written without holes")
     if omitted_names:
         notes.append(
-            f"a flight must be inside every inclusion of a fence: {_joined_names(omitted_names)} "
-            "omitted because of several parts"
+            f"a flight must stay inside every inclusion of a fence: {_joined_names(omitted_names)} "
+            "omitted, because of several separate parts"
         )
     return items, notes
 
@@ -218,7 +216,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     if missile_zones:
         count = "1 missile sphere" if len(missile_zones) == 1 else f"{len(missile_zones)} missile spheres"
         change_text = "became an exclusion circle" if len(missile_zones) == 1 else "became exclusion circles"
-        notes.append(f"{count} {change_text}: a fence has no height, so that each is a cylinder")
+        notes.append(f"{count} {change_text}: a fence has no height limits, so it applies at every height")
     omitted_names = [*omitted_missiles, *omitted_zones]
     if omitted_names:
         names = ", ".join(omitted_names[:_MAX_NAMES]) + (

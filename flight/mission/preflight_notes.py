@@ -113,7 +113,7 @@ def _note_misread_altitudes(mission: Mission, scenario: Scenario) -> Iterator[st
             numbers = [str(mission.items[reading.item_index].seq) for reading in readings]
             yield (
                 f"item{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: flown as {stated_as}:"
-                f" {_heights_text([reading.height for reading in readings])}; check the frame, because as {other} they"
+                f" {_heights_text([reading.height for reading in readings])}; check the frame: read as {other}, they"
                 f" are {_heights_text([reading.other_height for reading in readings])}"
             )
 

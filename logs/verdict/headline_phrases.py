@@ -31,6 +31,13 @@ def event_phrase(noun: str, finding: Finding) -> str:
     return f"{noun} ({shorten_statement(finding.brief)})"
 
 
+def return_phrase(noun: str, finding: Finding) -> str:
+    """Return the statement on a return after the last item; for the whole flight, a phrase with the reason."""
+    if finding.place.kind == "waypoint":
+        return shorten_statement(finding.brief)
+    return reason_phrase(noun, finding)
+
+
 def shortfall_phrase(noun: str, finding: Finding) -> str:
     """Return a phrase such as "speed on leg 2 (11.9 m/s < 12 m/s)"; the reason if no value is too low."""
     value, limit = finding.value, finding.effective_limit

@@ -112,7 +112,8 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
     >>> import numpy as np
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
-    >>> certificate = Certificate(0.1, math.inf, -0.05, 12.0, 100.0, 50.0, ("leg 2: climbs 16.6 deg, allowed 13.7",))
+    >>> problems = ("leg 2: climbs 16.6°; at most 13.7° are allowed",)
+    >>> certificate = Certificate(0.1, math.inf, -0.05, 12.0, 100.0, 50.0, problems)
     >>> way, none = np.zeros((2, 3)), np.zeros((0, 3))
     >>> plan = Plan(load_scenario("tight"), way, np.array([0, 2, 0, 0]), np.zeros(4), certificate, 1, "umda", 1, none)
     >>> print(judge_plan_only(plan).headline)

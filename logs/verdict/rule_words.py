@@ -13,6 +13,7 @@ from logs.verdict.headline_phrases import (
     missile_phrase,
     photo_line_phrase,
     reason_phrase,
+    return_phrase,
     shortfall_phrase,
     slope_phrase,
     small_circle_phrase,
@@ -282,6 +283,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             title="return",
             question="Where does the return to launch lead, by which path, and did the flight arrive there?",
             margin=None,
+            phrase=return_phrase,
         ),
         RuleWords(
             name="link",

@@ -46,12 +46,12 @@ def setup_notes(setup: FlightSetup, findings: Sequence[Finding]) -> tuple[str, .
     There is no note on home's altitude if a finding already reports it.
     """
     source, height = setup.envelope.source, home_height(setup)
-    notes = [f"an aircraft from {source}"] if source else []
+    notes = [f"the aircraft's model is from {source}"] if source else []
     is_found = any(finding.rule == "clearance" and finding.place == FLIGHT for finding in findings)
     # The height is NaN if it is unknown.
     if abs(height) > HOME_ERROR_M and not is_found:
         side = "above" if height > 0.0 else "below"
-        notes.append(f"home is {abs(height):.0f} m {side} the ground there, and all heights above home with it")
+        notes.append(f"home is {abs(height):.0f} m {side} the ground there, which shifts all heights above home")
     return tuple(notes)
 
 

@@ -80,11 +80,15 @@ def noun_with_place(noun: str, place: Place, *, within: bool = False) -> str:
     ('slope at leg 7, to item 9', 'energy')
     >>> noun_with_place("mission", Place("mission", item=3)), noun_with_place("mission", Place("mission"))
     ('mission item 3', 'mission')
+    >>> noun_with_place("waypoint", Place("waypoint", 12, item=14))
+    'waypoint 12 (item 14)'
     """
     if place.kind in ("flight", "plan") or (place.kind == "mission" and place.item is None):
         return noun
     name = place_text_within(place) if within else place_text(place)
-    return f"{noun} {name}" if place.kind == "mission" else f"{noun} at {name}"
+    if place.kind == "mission":
+        return f"{noun} {name}"
+    return name if noun == place.kind else f"{noun} at {name}"
 
 
 def threat_text(place: Place) -> str:
@@ -151,7 +155,7 @@ def change_text(change: Change) -> str:
         case "inset":
             return f"bring the path {requested_value:.0f} m further inside the area"
         case "distance":
-            return f"pass {threat_text(change.place)} {requested_value:.0f} m further away"
+            return f"pass {requested_value:.0f} m further away from {threat_text(change.place)}"
     return _other_change_text(change)
 
 
@@ -183,7 +187,7 @@ def _other_change_text(change: Change) -> str:
             return "state the climb of the aircraft at full throttle: planfly aircraft --new ... --climb DEGREES"
         case "stated bank":
             return (
-                f"state the bank limit of the aircraft, of which {change.current:.0f}° are a guess: planfly aircraft"
+                f"state the aircraft's bank limit, because its {change.current:.0f}° are a guess: planfly aircraft"
                 " --new ... --bank DEGREES"
             )
     return f"use a {change.what} {requested_value:.2f} times as large"
@@ -236,7 +240,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
     'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
     >>> moves = (ItemMove(3, 0.0, 412.0, 0.0),)
     >>> suggestion_text((Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m", moves=moves),))
-    'with a move of 412 m, pass town 40 m further north (move item 3 412 m north)'
+    'with a move of 412 m, pass town 40 m further north (move item 3 by 412 m north)'
     """
     if all(change.what == "terrain height" for change in suggestion):
         text = _terrain_height_text(suggestion)
@@ -304,9 +308,9 @@ def moves_text(moves: Sequence[ItemMove]) -> str:
     """List moves of items; items with the same move are named together.
 
     >>> moves_text([ItemMove(8, -1.96, 48.9, 0.0), ItemMove(9, 0.0, 0.0, -6.5), ItemMove(10, 0.0, 0.0, -6.5)])
-    'item 8 48.9 m north and 2 m west, items 9 and 10 6.5 m down'
+    'item 8 by 48.9 m north and 2 m west, items 9 and 10 by 6.5 m down'
     >>> moves_text([ItemMove(item, 40.0, 0.0, 12.0) for item in (3, 4, 5, 9)])
-    'items 3 to 5 and 9 40 m east and 12 m up'
+    'items 3 to 5 and 9 by 40 m east and 12 m up'
     """
     items_by_offset: dict[str, list[int]] = {}
     for move in sorted(moves, key=lambda move: move.item):
@@ -317,7 +321,7 @@ def moves_text(moves: Sequence[ItemMove]) -> str:
             if round(abs(step), 1) > 0.0
         ]
         items_by_offset.setdefault(_join_with_and(steps), []).append(move.item)
-    return ", ".join(f"{_items_text(items)} {offset}" for offset, items in items_by_offset.items())
+    return ", ".join(f"{_items_text(items)} by {offset}" for offset, items in items_by_offset.items())
 
 
 def _items_text(items: Sequence[int]) -> str:

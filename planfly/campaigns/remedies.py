@@ -13,11 +13,11 @@ _REMEDIES = {
     "fence": "more distance to the fence",
     "launch": "a faster launch, or another launch course",
     "loiter": "a larger loiter radius",
-    "slope": "gentler legs, by smaller values of [limits] max_climb_deg and max_dive_deg",
+    "slope": "gentler legs (smaller values of [limits] max_climb_deg and max_dive_deg)",
     "speed": "a lower cruise airspeed",
     "stall": "a higher cruise airspeed",
-    "threat": "more distance to missiles, by planning with larger kill radii than the flight is judged with",
-    "turn": "gentler turns, by a smaller value of [limits] max_turn_deg, or fewer waypoints",
+    "threat": "more distance to missiles (plan with larger kill radii than the flight is judged with)",
+    "turn": "gentler turns (a smaller value of [limits] max_turn_deg) or fewer waypoints",
 }
 # Rules whose margin is a height above ground, m.
 _HEIGHT_RULES = ("clearance", "approach", "climbout")
@@ -50,5 +50,5 @@ def _measured_remedies(rule: str, low_margin: float | None, scenario: Scenario) 
         return [*texts, "another approach ([landing] course_deg, approach_m, slope_deg)"]
     if rule in _HEIGHT_RULES:
         higher = f"{math.ceil(shortfall)} m higher" if shortfall else "higher"
-        return [f"a path that is {higher} above ground, by planning with a larger [limits] min_clearance_m"]
+        return [f"a path that is {higher} above ground (plan with a larger [limits] min_clearance_m)"]
     return [_REMEDIES[rule]] if rule in _REMEDIES else []

@@ -56,8 +56,8 @@ def _loose_limits_text(plan: Plan, uav: Uav) -> str:
     if not problems:
         return ""
     return (
-        "flights are expected to fail, because the limits of the scenario are looser than those of the aircraft:"
-        f' {problems[0]}; "aircraft" instead of the numbers in [limits] plans within both'
+        "flights are expected to fail, because the limits of the scenario are looser than those of the aircraft"
+        f' ({problems[0]}); to plan within both, write "aircraft" instead of the numbers in [limits]'
     )
 
 

@@ -103,7 +103,7 @@ def overlap_lines(measure: OverlapMeasure | None, *, is_flown: bool = True) -> t
     for number, (check, (name, spacing)) in enumerate(zip((FRONT_OVERLAP, SIDE_OVERLAP), needs, strict=True)):
         if check in faults and spacing is not None and spacing >= 1.0:
             texts[number] += (
-                f": this requires {name} at most {math.floor(spacing)} m apart, because the lowest photos are taken"
+                f": {name} must be at most {math.floor(spacing)} m apart, because the lowest photos are taken"
                 f" {measure.min_height:.0f} m above ground"
             )
     if measure.unusable_fraction > MIN_STATED_FRACTION:
@@ -211,6 +211,6 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     return (
-        f"{change}: flown, and all lines can be used; the path is {remedy.length / 1000.0:.1f} km long instead"
-        f" of {length / 1000.0:.1f} km"
+        f"{change}; all lines could be used in a trial flight, whose path is {remedy.length / 1000.0:.1f} km long"
+        f" instead of {length / 1000.0:.1f} km"
     )

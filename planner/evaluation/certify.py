@@ -133,7 +133,7 @@ def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) ->
             (
                 data.max_turn - turn,
                 f"waypoint {i}",
-                f"turns {math.degrees(turn):.1f} deg, allowed {math.degrees(data.max_turn):.1f} deg",
+                f"turns {math.degrees(turn):.1f}°; at most {math.degrees(data.max_turn):.1f}° are allowed",
             )
             for i, turn in enumerate(turns.tolist())
             if data.max_turn - turn < -_EPSILON
@@ -147,7 +147,7 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     runs = leg_runs(waypoints)
     problems += _summarise_faults(
         [
-            (length, f"leg {i}", f"{length:.1f} m long, at least {MIN_CERTIFIED_LEG_M:g} m are required")
+            (length, f"leg {i}", f"{length:.1f} m long; at least {MIN_CERTIFIED_LEG_M:g} m are required")
             for i, length in enumerate(runs.tolist())
             if length < MIN_CERTIFIED_LEG_M
         ]
@@ -165,8 +165,8 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
         min_margin = min(min_margin, margin)
         if margin < -_EPSILON:
             description = (
-                f"{length:.0f} m long, its turns need {turns_length:.0f} m and {settling_and_roll:.0f} m to settle"
-                " with a plan's margins for the autopilot's turns"
+                f"{length:.0f} m long, but its turns need {turns_length:.0f} m, and the flight then needs"
+                f" {settling_and_roll:.0f} m to settle, with a plan's margins for the autopilot's turns"
             )
             faults.append((margin, f"leg {i}", description))
     problems += _summarise_faults(faults)
@@ -229,8 +229,10 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
     verb, limit, stated, rate = (
         ("climbs", climb, data.max_climb, "climb") if slope > 0 else ("sinks", dive, data.max_dive, "sink")
     )
-    margins = f" with a plan's margins for gusts and the autopilot's {rate} rate" if math.isnan(stated) else ""
-    return f"{verb} {math.degrees(abs(slope)):.1f} deg{place_text}, allowed {math.degrees(limit):.1f} deg{margins}"
+    margins = f", with a plan's margins for gusts and the autopilot's {rate} rate" if math.isnan(stated) else ""
+    return (
+        f"{verb} {math.degrees(abs(slope)):.1f}°{place_text}; at most {math.degrees(limit):.1f}° are allowed{margins}"
+    )
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:

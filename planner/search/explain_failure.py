@@ -177,11 +177,9 @@ def closed_bands(problem: Problem) -> list[str]:
     space, min_height = data.airspace, data.clearance + data.buffer
     if min_height > space.max_height - space.buffer:
         lines.append(
-            f"the band above ground is too narrow: from limits.min_clearance_m {data.clearance:g} m to"
-            f" limits.max_height_m {space.max_height:g} m a plan needs margins of {data.buffer:.1f} m at the lower"
-            f" edge and {space.buffer:.1f} m at the upper, {min_height + space.buffer - space.max_height:.1f} m"
-            " more than"
-            " available"
+            f"the band from limits.min_clearance_m {data.clearance:g} m to limits.max_height_m {space.max_height:g} m"
+            f" is {min_height + space.buffer - space.max_height:.1f} m too narrow: a plan needs margins of"
+            f" {data.buffer:.1f} m at its lower edge and {space.buffer:.1f} m at its upper edge"
         )
     for required in space.zones.required:
         zone = problem.scenario.zones[int(required["number"])]
@@ -194,8 +192,8 @@ def closed_bands(problem: Problem) -> list[str]:
         name, bottom_height = max(bottoms.items(), key=lambda entry: entry[1], default=("", -math.inf))
         if bottom_height > ceiling.height - margin:
             lines.append(
-                f"{zone.name} is too narrow a band: above {name} and below its ceiling at {ceiling.height:g} m a plan's"
-                f" margins require {bottom_height + margin - ceiling.height:.1f} m more than available"
+                f"{zone.name} is {bottom_height + margin - ceiling.height:.1f} m too low for a plan's margins above"
+                f" {name} and below its ceiling at {ceiling.height:g} m"
             )
     return lines
 
@@ -339,9 +337,9 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
         min_altitude = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
         if min_altitude + margin > ceiling:
             return [
-                f"{distance:.0f} m from the start, too little height is left over the whole width of the map: over the"
-                f" lowest ground there, the clearance and a margin of {margin:.1f} m require"
-                f" {min_altitude + margin:.0f} m AMSL, and {name} allows {ceiling:.0f} m"
+                f"{distance:.0f} m from the start, the ground is too high across the whole map: over its lowest point"
+                f" the clearance and a margin of {margin:.1f} m require {min_altitude + margin:.0f} m AMSL, but"
+                f" {name} allows {ceiling:.0f} m"
             ]
     return []
 

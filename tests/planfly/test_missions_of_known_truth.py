@@ -209,7 +209,10 @@ def test_a_corner_whose_arc_would_miss_its_waypoint_is_flown_over(turn_deg: floa
     beside = RADIUS * (1.0 - math.cos(math.radians(turn_deg)))
     for verdict in (judge_geometry(setup), flown.verdict):
         reason = turn_of(verdict).reason
-        assert f"flown over, because its arc would pass at {passes:.0f} m and its acceptance radius is 10 m" in reason
+        assert (
+            f"flown over, because a fly-by arc would pass {passes:.0f} m away, outside the acceptance radius of 10 m"
+            in reason
+        )
         assert f"up to {beside:.0f} m off the next leg" in reason
     (at,) = [item for item in flown.verdict.findings if item.rule == "waypoint" and item.place.index == 1]
     assert at.flown is not None

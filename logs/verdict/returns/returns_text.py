@@ -28,10 +28,10 @@ _SINGULAR_TEXTS: dict[Kind, str] = {
     "threat": "enters a missile's sphere",
     "zone": "violates a zone",
     "lost": "does not arrive",
-    "energy": "takes more energy than may be used",
+    "energy": "uses more energy than allowed",
     "unknown": "flies where the terrain is unknown",
-    "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
-    "used": "cannot be judged by energy, as the energy used before is unknown",
+    "power": "may use more energy than allowed, because the aircraft's power is uncertain",
+    "used": "cannot be judged by energy, because the energy used before it is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "comes lower than {limit:.0f} m above ground",
 }
@@ -40,10 +40,10 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "threat": "enter a missile's sphere",
     "zone": "violate a zone",
     "lost": "do not arrive",
-    "energy": "take more energy than may be used",
+    "energy": "use more energy than allowed",
     "unknown": "fly where the terrain is unknown",
-    "power": "may take more energy than may be used, as the power of the aircraft is uncertain",
-    "used": "cannot be judged by energy, as the energy used before is unknown",
+    "power": "may use more energy than allowed, because the aircraft's power is uncertain",
+    "used": "cannot be judged by energy, because the energy used before it is unknown",
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
@@ -220,8 +220,8 @@ def point_of_no_return_text(returns: Returns) -> str:
             text = f"{name}: none, because every return leaves {reserve} ({left_text})"
     if not point.skipped_count:
         return text
-    verb = "does" if point.skipped_count == 1 else "do"
-    return f"{text}; this leaves out {count_text(point.skipped_count, 'return')} that {verb} not arrive"
+    verb, be = ("does", "is") if point.skipped_count == 1 else ("do", "are")
+    return f"{text}; {count_text(point.skipped_count, 'return')} that {verb} not arrive {be} left out"
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:

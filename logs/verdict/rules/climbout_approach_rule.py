@@ -292,6 +292,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
         check = ""
         ok = True
     else:
+        subject = f"the flight starts in the air, but a straight climb from home to {_item_text(place)}"
         fault = obstacles.obstacle_message(subject, "from home", ", even at the steepest climb")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
@@ -358,7 +359,7 @@ def _climb_text(climb: _Climb, launch: _Launch, item_text: str, end_height: floa
     # The take-off holds its course until it has reached its height.
     if climb.length > launch.leg_length:
         text += (
-            f", straight on past {item_text}, {launch.leg_length:.0f} m from home, until it is {end_height:.0f} m above"
+            f"; the climb passes {item_text}, {launch.leg_length:.0f} m from home, and ends {end_height:.0f} m above"
             f" home after {climb.length:.0f} m"
         )
     return text

@@ -155,9 +155,10 @@ def _zone_finding(
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
-                f"; the {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, is {deepest_text} at"
-                f" {visit.at_time:.1f} s and {exit_text} at {visit.exit_time:.1f} s; {visit.violation_time:.1f} s"
-                f" {side_text} in all" + (f" ({visit.entries} violations)" if visit.entries > 1 else ""),
+                f", {visit.violation_time:.1f} s in all"
+                + (f" ({visit.entries} times)" if visit.entries > 1 else "")
+                + f"; the {subject} {entry_text} at {_event_text(requirements, visit, 'entry')}, and {exit_text} at"
+                f" {visit.exit_time:.1f} s; it is {deepest_text} at {visit.at_time:.1f} s",
             )
         )
     elif visit.depth > 0.0:

@@ -213,14 +213,19 @@ def _link_text(along: LinkAlongPath, leg: Place | None) -> str:
     if points.diffraction_loss[k] >= _MIN_STATED_LOSS_DB:
         sight_text += f", {points.diffraction_loss[k]:.1f} dB lost by diffraction"
     text = (
-        f"link margin {abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the required"
-        f" fade margin on {place_text_within(leg)} at {along.time[k]:.0f} s, east {east:.0f} m, north {north:.0f} m,"
-        f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
+        f"the link margin is at least {abs(points.margin[k]):.1f} dB above the required fade margin"
+        if points.margin[k] >= 0.0
+        else f"the link margin is up to {abs(points.margin[k]):.1f} dB below the required fade margin"
+    )
+    place = (
+        f"; it is lowest on {place_text_within(leg)} at {along.time[k]:.0f} s (east {east:.0f} m, north {north:.0f} m,"
+        f" {points.distance[k] / 1000.0:.1f} km from the station, {sight_text})"
     )
     if along.outages:
         count = len(along.outages)
         times_text = f", {count} times, at most {duration_text(along.longest_outage)} at a time" if count > 1 else ""
-        text += f"; it is too weak for {duration_text(along.time_below_margin)}{times_text}"
+        text += f" for {duration_text(along.time_below_margin)}{times_text}"
+    text += place
     return text if along.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
 
 

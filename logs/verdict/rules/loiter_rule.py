@@ -201,7 +201,8 @@ def _loiter_finding(
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
             facts.append(
-                f"{parameter_name} is smaller than the {min_radius:.0f} m that the bank limit needs: flown wider"
+                f"flown wider, because {parameter_name} is less than the {min_radius:.0f} m that the bank limit"
+                " requires"
             )
             faults = []
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)

@@ -138,8 +138,10 @@ def _flown_messages(
     error is then only reported.
     """
     faults = [*_rate_limit_faults(requirements, leg, measure), *_performance_faults(requirements, leg, measure)]
-    need_text = f"; the leg needs {math.degrees(abs(float(requirements.slopes[leg]))):.1f}°"
-    # The text on the leg's slope is added to the first fault only.
+    planned_slope = abs(float(requirements.slopes[leg]))
+    # A leg that is too steep as planned has a fault that states its slope; otherwise the first fault states it.
+    is_planned_steep = planned_slope > limit + PLAN_TOLERANCE_RAD
+    need_text = "" if is_planned_steep else f"; the leg needs {math.degrees(planned_slope):.1f}°"
     performance_faults = [message(f"{fault.brief}{need_text if fault is faults[0] else ''}") for fault in faults]
     flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
     facts = [text for name, text in _flown_facts(requirements, leg, measure) if name not in flown_faults]
@@ -213,7 +215,7 @@ def _steep_ground_message(requirements: RouteRequirements, leg: int, ground: _St
         f"leg {requirements.leg(leg).number} follows the ground up {math.degrees(ground.slope):.1f}°"
         f" for {_distance_text(ground.length)}"
     )
-    rest = f"; {limit_text}, so that it misses the height over the ground by up to {ground.excess:.0f} m"
+    rest = f"; {limit_text}; the aircraft would fly up to {ground.excess:.0f} m too low over the ground"
     return message(brief, rest, placed=True)
 
 
@@ -293,15 +295,12 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int, measure: SlopeM
     verb = "climbs" if arc.tangent > 0.0 else "descends"
     slopes = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     first, second = requirements.leg(leg).number, requirements.leg(corner).number
-    arc_text = (
-        f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {first} "
-        f"and {second} have {slopes}: the fly-by arc is shorter than the "
-        f"{2.0 * float(requirements.length_before[corner]):.0f} m of leg that it replaces"
-    )
+    arc_text = f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m"
     side = "below" if arc.tangent > 0.0 else "above"
     limit = (
-        f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, and leaves the arc"
-        f" {arc.missing_height:.0f} m {side} its end"
+        f"; the aircraft can fly at most {math.degrees(math.atan(arc.limit)):.1f}° there, and would end"
+        f" {arc.missing_height:.0f} m {side} the arc's end; the arc is steeper than legs {first} and {second}"
+        f" ({slopes}), because it replaces {2.0 * float(requirements.length_before[corner]):.0f} m of leg"
     )
     # A headline names the waypoint, not its item.
     brief = arc_text if place.item is None else f"the arc at {place_text(replace(place, item=None))}"
@@ -373,12 +372,8 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
-    calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if is_climb else 1]
     wind_text = _wind_text(tailwind, crosswind)
-    calm_text = f"at most {math.degrees(calm_limit):.1f}°" if math.isfinite(calm_limit) else "no slope"
-    return (
-        f"{condition} the aircraft can fly {calm_text} in calm air, but {math.degrees(limit):.1f}° in this {wind_text}"
-    )
+    return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in this {wind_text}"
 
 
 def _wind_text(tailwind: float, crosswind: float) -> str:
@@ -426,7 +421,7 @@ def _flown_facts(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
     arc = steep_arc(requirements, leg)
     if arc is not None and _is_arc_kept(arc, measure):
         place = place_text(requirements.waypoint(leg + 1))
-        facts.append(("arc", f"the arc at {place} is too steep by {arc.missing_height:.1f} m only"))
+        facts.append(("arc", f"the arc at {place} misses its height by only {arc.missing_height:.1f} m"))
     return facts
 
 
@@ -556,15 +551,10 @@ def _rate_limit_faults(requirements: RouteRequirements, leg: int, measure: Slope
         return []
     speed = float(requirements.route.leg_airspeeds[leg])
     altitude = float(requirements.points[leg : leg + 2, 2].mean())
-    speeds = requirements.setup.autopilot.speeds
-    rate = (speeds.climb_limit if sign > 0.0 else speeds.sink_limit).rate
-    calm_slope = math.asin(min(1.0, rate / speed))
-    text = (
-        f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(calm_slope):.1f}° at {speed:.1f} m/s"
-    )
+    text = f"{name} permits a {'climb' if sign > 0.0 else 'descent'} of {math.degrees(slope):.1f}° at {speed:.1f} m/s"
     tailwind, crosswind = requirements.wind_on(leg).components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) >= CALM_WIND_MPS:
-        text += f" in calm air, but {math.degrees(slope):.1f}° in this {_wind_text(tailwind, crosswind)}"
+        text += f" in this {_wind_text(tailwind, crosswind)}"
     return [message(text)]
 
 

@@ -280,15 +280,15 @@ def _level_speed_range(
         faults.append(message(f"the wind is too strong to hold the course of leg {number} at {commanded:.0f} m/s"))
     max_altitude = max(altitudes)
     if math.isnan(min_speed) or math.isnan(max_speed):
-        faults.append(message(f"no level flight at {max_altitude:.0f} m"))
+        faults.append(message(f"the aircraft cannot fly level at {max_altitude:.0f} m AMSL"))
     if commanded < min_speed:
         slow_text = (
-            f"{commanded:.1f} m/s is below the slowest level flight, {min_speed:.1f} m/s at {max_altitude:.0f} m"
+            f"{commanded:.1f} m/s is below the slowest level flight, {min_speed:.1f} m/s at {max_altitude:.0f} m AMSL"
         )
         faults.append(message(slow_text))
     if commanded > max_speed:
         fast_text = (
-            f"{commanded:.1f} m/s is above the fastest level flight, {max_speed:.1f} m/s at {max_altitude:.0f} m"
+            f"{commanded:.1f} m/s is above the fastest level flight, {max_speed:.1f} m/s at {max_altitude:.0f} m AMSL"
         )
         faults.append(message(fast_text))
     return min_speed, max_speed, faults

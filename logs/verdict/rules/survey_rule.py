@@ -166,8 +166,8 @@ def _unflyable_turnaround_findings(requirements: RouteRequirements, survey: Surv
             end_names = {0: "the turn onto the first line", len(turnarounds) - 1: "the turn off the last line"}
             reason = (
                 f"{end_names.get(number, f'turn-around {number}')} is too {'tight' if is_tight else 'steep'} to be "
-                f"flown as drawn, and within {reach:.0f} m of it {'; '.join(hazards)}: only a simulated "
-                "flight shows whether it is safe"
+                f"flown as drawn; within {reach:.0f} m of it {'; '.join(hazards)}; only a simulated "
+                "flight shows whether the turn is safe"
             )
             place, method = requirements.leg(first), "its surroundings"
             findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_PATH, method=method))
@@ -364,7 +364,7 @@ def _line_finding(
         measurements = [
             Fact("distance from the line", measure.max_lateral_offset, "m"),
             Fact("height error", measure.max_height_error, "m"),
-            Fact("lost at its begin", measure.lost_at_start, "m"),
+            Fact("lost at its start", measure.lost_at_start, "m"),
             Fact("lost at its end", measure.lost_at_end, "m"),
             Fact("photos missed", float(measure.missed_photos), ""),
         ]

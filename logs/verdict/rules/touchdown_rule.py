@@ -254,7 +254,7 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     width_text = f"; the strip is {2.0 * half_width:.0f} m wide"
     for verb, offset in (("touches down", abs(touchdown[1])), ("comes to rest", abs(stop[1]))):
         if offset > half_width:
-            faults.append(message(f"{verb} {offset:.0f} m beside the strip's center line", width_text))
+            faults.append(message(f"{verb} {offset:.0f} m to the side of the strip's center line", width_text))
             break
     return faults
 

@@ -27,7 +27,7 @@ from logs.verdict.tolerances import (
     SETTLED_CROSS_TRACK_M,
     STRAIGHT_RADIUS_RATIO,
 )
-from logs.verdict.wording import place_text_within
+from logs.verdict.wording import count_text, place_text_within
 from world.geometry import fly_by_offset
 
 
@@ -149,9 +149,9 @@ def _unflown_turn_text(
     active_time, leg_length = min(active_times), float(requirements.runs[leg])
     radius = acceptance_condition(requirements, leg + 1).radius
     return (
-        f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of"
-        f" {leg_length:.0f} m for"
-        f" {active_time:.1f} s, because it considers a waypoint reached within {radius:.0f} m"
+        f"{requirements.setup.autopilot.title} flew {place_text_within(requirements.leg(leg))} for only"
+        f" {active_time:.1f} s: the leg is {leg_length:.0f} m long, and a waypoint counts as reached within"
+        f" {radius:.0f} m"
     )
 
 
@@ -169,8 +169,8 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
         return []
     lateral = radius * (1.0 - math.cos(turn))
     return [
-        f"flown over, because its arc would pass at {offset:.0f} m and its acceptance radius is {acceptance:.0f} m;"
-        f" the turn then swings up to {lateral:.0f} m off the next leg"
+        f"flown over, because a fly-by arc would pass {offset:.0f} m away, outside the acceptance radius of"
+        f" {acceptance:.0f} m; after the waypoint the turn swings up to {lateral:.0f} m off the next leg"
     ]
 
 
@@ -199,13 +199,15 @@ def _sharp_turn_message(
     if requirements.length_after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
         length_text = f"the turn takes {requirements.length_after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:
-            length_text = f"flying over it takes {requirements.length_after[i]:.0f} m of the next leg"
+            length_text = f"the turn takes {requirements.length_after[i]:.0f} m of the next leg, after the waypoint"
     length_before, length_after = requirements.runs[i - 1], requirements.runs[i]
-    room_text = f"the neighbouring turns leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
+    legs_text = f"its legs of {length_before:.0f} m and {length_after:.0f} m"
+    room_text = (
+        f"{legs_text} have room for only {math.degrees(limit):.1f}°" if limit > 0.0 else f"{legs_text} have no room"
+    )
     return message(
-        f"{turn_text} between legs of {length_before:.0f} m and {length_after:.0f} m:"
-        f" at {speed:.0f} m/s and {bank_text}",
-        f" (radius {radius:.0f} m) {length_text}, and {room_text}",
+        f"{turn_text}, but {room_text}",
+        f" next to the neighbouring turns; {length_text} at {speed:.0f} m/s and {bank_text} (radius {radius:.0f} m)",
     )
 
 
@@ -275,7 +277,7 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
         offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
         faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
     if measure.full_circles:
-        faults["circles"] = message(f"{measure.full_circles} full circle(s) flown at the corner")
+        faults["circles"] = message(f"{count_text(measure.full_circles, 'full circle')} flown at the corner")
     return faults
 
 
@@ -298,9 +300,9 @@ def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeas
     if measure.min_distance >= min_distance - tolerance:
         return None
     return message(
-        f"passes its waypoint at {measure.min_distance:.1f} m, closer than its bank limit permits",
-        f": with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the arc has a radius of"
-        f" {min_radius:.0f} m and passes the waypoint at {min_distance:.1f} m",
+        f"passes its waypoint {measure.min_distance:.1f} m away, closer than the bank limit permits",
+        f"; an arc at {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind (radius {min_radius:.0f}"
+        f" m) passes the waypoint {min_distance:.1f} m away",
     )
 
 

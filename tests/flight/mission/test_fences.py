@@ -196,9 +196,7 @@ def test_a_hole_of_an_inclusion_is_excluded() -> None:
 def test_a_hole_of_an_exclusion_is_closed_and_said() -> None:
     zones = [Zone("ring", "exclusion", make_polygon([SQUARE, HOLE]))]
     assert not inside(zones, 450.0, 450.0)
-    assert zone_fences(zones, ORIGIN)[1] == [
-        "an excluded area of a fence has no holes: ring is in the fence without them"
-    ]
+    assert zone_fences(zones, ORIGIN)[1] == ["an exclusion of a fence cannot have holes: ring is written without holes"]
 
 
 def test_parts_of_an_exclusion_are_polygons_and_an_inclusion_of_parts_is_left_out_and_said() -> None:
@@ -206,7 +204,9 @@ def test_parts_of_an_exclusion_are_polygons_and_an_inclusion_of_parts_is_left_ou
     assert [inside([Zone("it", "exclusion", both)], *p) for p in ((450.0, 450.0), (2400.0, 100.0))] == [False, False]
     items, notes = zone_fences([Zone("it", "inclusion", both)], ORIGIN)
     assert items == []
-    assert notes == ["a flight must be inside every inclusion of a fence: it is omitted because of several parts"]
+    assert notes == [
+        "a flight must stay inside every inclusion of a fence: it is omitted, because of several separate parts"
+    ]
 
 
 def test_floors_and_ceilings_are_said() -> None:
@@ -216,7 +216,7 @@ def test_floors_and_ceilings_are_said() -> None:
         Zone("high", "exclusion", make_polygon([SQUARE]), floor=ZoneLevel(600.0, "amsl")),
     ]
     _, notes = zone_fences(zones, ORIGIN)
-    assert notes == ["a fence has no floor and no ceiling: low, high are in the fence at every height"]
+    assert notes == ["a fence has no floor and no ceiling: low, high are fenced at every height"]
 
 
 def planned(**tables: Any) -> Plan:
@@ -249,7 +249,7 @@ def test_a_scenarios_zones_come_back_from_every_form(kind: Any) -> None:
     assert {replace(item, seq=0) for item in again} == {replace(item, seq=0) for item in mission.fences}
     assert len(again) == len(mission.fences)
     assert notes == (
-        "a fence has no floor and no ceiling: mast is in the fence at every height",
+        "a fence has no floor and no ceiling: mast is fenced at every height",
         "a fence does not follow the ground: the maximum height of 400 m above ground is not part of it",
     )
 

@@ -211,7 +211,7 @@ def test_an_item_that_states_its_height_above_home_as_amsl_is_named() -> None:
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 80, frame=0), LAND)
     assert note == (
         "item 3: flown as altitudes above mean sea level (frame 0): 20 m below ground;"
-        " check the frame, because as heights above home (frame 3) they are 80 m above ground"
+        " check the frame: read as heights above home (frame 3), they are 80 m above ground"
     )
     # Above the ground in its own frame, and below the ground in both: nothing is said.
     assert notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 180, frame=0), LAND) == []
@@ -224,7 +224,7 @@ def test_a_mission_that_states_amsl_as_heights_above_home_is_named() -> None:
     (note,) = notes(*raised)
     assert note == (
         "items 1, 2, 3, 4: flown as heights above home (frame 3): 100 to 180 m above ground;"
-        " check the frame, because as altitudes above mean sea level (frame 0) they are 0 to 80 m above ground"
+        " check the frame: read as altitudes above mean sea level (frame 0), they are 0 to 80 m above ground"
     )
     # One item that is higher than the others by home's altitude, and one that is 1 m short of it.
     (note,) = notes(TAKE_OFF, wp(0, 2000, 80), wp(1500, 2000, 160), LAND)

@@ -31,13 +31,16 @@ def mission(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 def test_a_first_waypoint_behind_a_ridge_is_not_judged_in_full(
     mission: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    first = "not judged in full: the climb from home to item 1 hits the ground"
+    first = "not judged in full: the flight starts in the air, but a straight climb from home to item 1 hits the ground"
     assert main(["check", mission, "--terrain", "jacksboro"]) == 3
     assert capsys.readouterr().out.splitlines()[0] == first
     assert main(["fly", mission, "--terrain", "jacksboro", "--levels", "--log", str(tmp_path / "f.mcap")]) == 3
     out = capsys.readouterr().out
     assert out.splitlines()[0] == first
-    assert "  open    climb-out at waypoint 0 (item 1): the climb from home to item 1 hits the ground: " in out
+    assert (
+        "  open    climb-out at waypoint 0 (item 1): the flight starts in the air, but a straight climb from home"
+        in out
+    )
     # The flight itself is well: no autopilot is blamed.
     assert "The aircraft can" not in out
     assert "Uav alone (planfly's guidance, exact navigation): flyable in the air; both flights agree" in out

@@ -39,7 +39,7 @@ def landing_plan(turbulence: str = "none", **strip: Any) -> Plan:
     return replace(plan, scenario=scenario, procedures=DepartureAndApproach(None, descent))
 
 
-@pytest.mark.parametrize(("name", "part"), [("steep", "leg 4: climbs 18.3 deg"), ("tight", "leg 9: 30 m long")])
+@pytest.mark.parametrize(("name", "part"), [("steep", "leg 4: climbs 18.3°"), ("tight", "leg 9: 30 m long")])
 def test_limits_that_are_looser_than_the_aircraft_are_said(name: str, part: str) -> None:
     (text,) = said_of(plan_of(name))
     assert text.startswith("flights are expected to fail")

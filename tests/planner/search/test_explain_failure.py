@@ -96,12 +96,12 @@ MakeLimits = Callable[[Scenario], Limits]
 Small = Callable[..., Scenario]
 
 
-@pytest.mark.parametrize(("more", "said"), [(0.5, []), (-0.5, ["0.5 m more than available"])])
+@pytest.mark.parametrize(("more", "said"), [(0.5, []), (-0.5, ["0.5 m too narrow"])])
 def test_a_band_of_the_limits(more: float, said: list[str], small: Small, make_limits: MakeLimits) -> None:
     limits = {"min_clearance_m": 145.0, "max_height_m": 145.0 + 2.0 * CERTIFIED_BUFFER_M + more}
     scenario = small(**GROUND, limits=limits)
     lines = closed_bands(make_problem(scenario, make_limits(scenario)))
-    assert [line[-len(end) :] for line, end in zip(lines, said, strict=True)] == said
+    assert all(f" is {end}: " in line for line, end in zip(lines, said, strict=True))
     assert all("min_clearance_m 145 m" in line and "max_height_m" in line for line in lines)
 
 
@@ -111,7 +111,7 @@ def test_an_inclusions_band_is_named_where_the_plan_cannot_keep_both_edges(
     zone = {"name": "corridor", "kind": "inclusion", "east_m": 3000, "north_m": 0, "radius_m": 8000}
     scenario = small(**GROUND, limits={"min_clearance_m": 148.0}, zones=[zone | {"ceiling_agl_m": 151.0}])
     (line,) = closed_bands(make_problem(scenario, make_limits(scenario)))
-    assert "corridor is too narrow a band: above the clearance of 148 m and below its ceiling at 151 m" in line
+    assert "m too low for a plan's margins above the clearance of 148 m and below its ceiling at 151 m" in line
     wide = small(**GROUND, limits={"min_clearance_m": 100.0}, zones=[zone | {"ceiling_agl_m": 200.0}])
     assert closed_bands(make_problem(wide, make_limits(wide))) == []
 
@@ -146,7 +146,10 @@ def test_ground_clearance_and_reserve_against_the_ceiling(
     scenario = small(**tables)
     limits = make_limits(scenario)
     lines = explain_failure(plan_path(scenario, limits, seed=1, algorithm="umda"), limits)
-    assert any("too little height is left" in line and "margin of 5.0 m" in line for line in lines) is said
+    assert (
+        any("the ground is too high across the whole map" in line and "margin of 5.0 m" in line for line in lines)
+        is said
+    )
     assert not any("terrain blocks the whole width" in line for line in lines)
 
 

@@ -89,7 +89,7 @@ def test_ground_that_is_too_steep_fails_the_leg_that_follows_it(step: float, ok:
     if not ok:
         assert (item.planned, item.limit) == pytest.approx((math.degrees(math.atan(0.266)), CALM_CLIMB), abs=0.01)
         assert item.reason.startswith("leg 1 follows the ground up 14.9° for 500 m; at 25 m/s")
-        assert "misses the height over the ground by up to 11 m" in item.reason
+        assert "the aircraft would fly up to 11 m too low over the ground" in item.reason
 
 
 @pytest.mark.parametrize(("share", "ok"), [(0.92, True), (0.87, False), (0.0, False)])
@@ -108,7 +108,7 @@ def test_the_autopilots_climb_limit_is_named_where_it_is_lower() -> None:
     setup = replace(over_step(), autopilot=law)
     item = slope_of(setup, flown(setup))
     assert (
-        "TECS_CLMB_MAX 2 m/s permits a climb of 4.5°, so that it misses the height over the ground by up to 111 m"
+        "TECS_CLMB_MAX 2 m/s permits a climb of 4.5°; the aircraft would fly up to 111 m too low over the ground"
         in (item.reason)
     )
 

@@ -80,7 +80,10 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
     into_it, verdict = judged("climbout", wall(1000.0, up + 2.0), *FAR)
     assert into_it.ok is None
     assert verdict.undecided
-    assert verdict.headline == "not judged in full: the climb from home to item 1 hits the ground"
+    assert (
+        verdict.headline
+        == "not judged in full: the flight starts in the air, but a straight climb from home to item 1 hits the ground"
+    )
     assert into_it.reason.endswith(": 1000 m from home it is 2 m below the surface, even at the steepest climb")
 
 
@@ -142,7 +145,7 @@ def test_a_climb_past_its_item_states_its_angle_and_its_end(deviation_deg: float
     assert found.reason == (
         f"the climb from home towards item 2, at 70 % of the steepest {certain_text}climb, hits the ground: 400 m from"
         f" home it is {80.0 - 400.0 * slope:.0f} m below the surface (climb angle"
-        f" {math.degrees(math.atan(slope)):.1f}°, straight on past item 2, 300 m from home, until it is 100 m above"
+        f" {math.degrees(math.atan(slope)):.1f}°; the climb passes item 2, 300 m from home, and ends 100 m above"
         f" home after {100.0 / slope:.0f} m{f'{reason} for this aircraft' if deviation_deg else ''})"
     )
 
@@ -205,7 +208,7 @@ def test_a_zone_in_the_way_up_counts_as_ground_does() -> None:
     town = Zone("town", "exclusion", Cylinder(0.0, 300.0, 100.0), ceiling=low)
     assert zoned(town, *TAKEOFF).ok is False
     assert zoned(town, *FAR).ok is None
-    assert "the climb from home to item 1 enters town (exclusion)" in zoned(town, *FAR).reason
+    assert "a straight climb from home to item 1 enters town (exclusion)" in zoned(town, *FAR).reason
     # Below the climb, beside it, or around home: nothing.
     for free in (
         replace(town, ceiling=ZoneLevel(100.0 + 0.7 * 180.0 * climb(), "amsl")),

@@ -304,5 +304,5 @@ def test_the_return_after_the_last_item_needs_its_energy() -> None:
     # The mission leaves 30 %; the return is as long again.
     verdict = judge_geometry(replace(setup, battery=needed / 0.7))
     assert of(verdict, "energy").ok
-    assert "takes more energy than may be used" in of(verdict, "return").reason
+    assert "uses more energy than allowed" in of(verdict, "return").reason
     assert not verdict.flyable

@@ -56,7 +56,7 @@ def test_wind_flattens_the_limit_and_is_named() -> None:
     item = of(judge_geometry(setup), "slope", leg(1))
     wanted = math.degrees(math.atan2(25 * math.sin(math.radians(13.7)), 25 * math.cos(math.radians(13.7)) + 10))
     assert item.limit == pytest.approx(wanted, abs=0.01)
-    assert "13.7° in calm air, but 9.8° in this 10 m/s tailwind" in item.reason
+    assert "the aircraft can fly at most 9.8° in this 10 m/s tailwind" in item.reason
     assert not judge_geometry(make_setup(hill(14.0), wind={"speed_mps": 8.0, "from_deg": 0.0})).summary.count("slope")
 
 
@@ -166,12 +166,12 @@ def test_the_arc_and_both_legs_are_named() -> None:
     steep = math.atan(tangent * (math.tan(math.radians(7.0)) + math.tan(math.radians(6.0))) / (bank_radius() * turn))
     length = bank_radius() * turn
     arc_slope = f"{math.degrees(steep):.1f}° for {length:.0f} m"
-    asks = f"the arc at waypoint 1 (item 1) descends {arc_slope}, where legs 0 and 1 have"
+    asks = f"the arc at waypoint 1 (item 1) descends {arc_slope}; the aircraft can fly at most"
     assert item.reason.startswith(asks)
     assert item.brief == "the arc at waypoint 1"
-    assert "have 7.0° and 6.0°" in item.reason
+    assert "steeper than legs 0 and 1 (7.0° and 6.0°)" in item.reason
     missing = (math.tan(steep) - math.tan(math.radians(7.8))) * length
-    assert f"the aircraft can fly at most 7.8° there, and leaves the arc {missing:.0f} m above its end" in item.reason
+    assert f"the aircraft can fly at most 7.8° there, and would end {missing:.0f} m above the arc's end" in item.reason
 
 
 def test_its_suggestion_passes() -> None:
@@ -279,7 +279,7 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
         assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
         assert verdict.headline == (
             "not judged in full: slope on leg 1, to item 2, is too close to the limit to judge, because the"
-            " aircraft's limits are uncertain; an aircraft from a data sheet"
+            " aircraft's limits are uncertain; the aircraft's model is from a data sheet"
         )
         assert verdict.levels[0].undecided
 
@@ -319,7 +319,7 @@ def test_what_is_sure_of_an_unsure_aircraft_is_judged() -> None:
         verdict = judge_geometry(setup)
         assert of(verdict, "slope", leg(1)).ok is ok
         assert verdict.flyable is ok
-        assert verdict.headline.endswith("; an aircraft from a data sheet")
+        assert verdict.headline.endswith("; the aircraft's model is from a data sheet")
         assert not verdict.undecided
 
 

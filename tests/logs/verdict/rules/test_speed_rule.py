@@ -53,7 +53,7 @@ def test_where_there_is_no_level_flight_no_speed_is_one_of_it() -> None:
         none = replace(envelope(), level_speed_max=np.full(3, np.nan), fastest_sd=sd)
         item = of(judge_geometry(make_setup(STRAIGHT, table=none)), "speed", leg(0))
         assert (item.ok, item.check) == (False, "")
-        assert item.reason.startswith("no level flight at 300 m")
+        assert item.reason.startswith("the aircraft cannot fly level at 300 m AMSL")
 
 
 def test_a_leg_that_climbs_to_where_there_is_no_level_flight_has_none() -> None:
@@ -61,7 +61,7 @@ def test_a_leg_that_climbs_to_where_there_is_no_level_flight_has_none() -> None:
     climb = [[0.0, 0.0, 900.0], [0.0, 9000.0, 1500.0]]
     item = of(judge_geometry(make_setup(climb, table=low)), "speed", leg(0))
     assert item.ok is False
-    assert item.reason.startswith("no level flight at 1500 m")
+    assert item.reason.startswith("the aircraft cannot fly level at 1500 m AMSL")
 
 
 @pytest.mark.parametrize(("speed", "ok"), [(28.0, True), (30.0, None), (32.5, False), (16.5, True)])

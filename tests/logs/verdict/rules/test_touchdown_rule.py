@@ -84,7 +84,7 @@ def test_a_strip_lies_along_its_stated_course_and_may_be_landed_on_either_way(co
 
 @pytest.mark.parametrize(
     ("east", "north", "fault"),
-    [(-500.0, 600.0, "before the strip's"), (500.0, 560.0, "touches down 39 m beside the strip's center line")],
+    [(-500.0, 600.0, "before the strip's"), (500.0, 560.0, "touches down 39 m to the side of the strip's center line")],
 )
 def test_a_mission_that_lands_beside_the_strip_fails(east: float, north: float, fault: str) -> None:
     """What the scenario says can be landed on is where it says, wherever the landing item is."""

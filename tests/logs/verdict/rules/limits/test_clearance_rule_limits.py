@@ -86,6 +86,6 @@ def test_heights_over_a_home_above_the_ground_are_open_where_they_are_too_low_fr
         # An altitude that leaves the verdict undecided is said once.
         is_noted = frame == 3 and not open_ and abs(alt) > 50.0
         side = "above" if alt > 0.0 else "below"
-        note = f"; home is {abs(alt):.0f} m {side} the ground there, and all heights above home with it"
+        note = f"; home is {abs(alt):.0f} m {side} the ground there, which shifts all heights above home"
         assert verdict.headline.endswith(note) is is_noted
         assert ("above the ground there" in verdict.headline or is_noted) is (frame == 3 and abs(alt) > 50.0)
