@@ -3,9 +3,17 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from logs.verdict.places import Place, Suggestion
-from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text, within_tolerance_text
+from logs.verdict.wording import (
+    compared_texts,
+    place_text,
+    quantity_text,
+    shorten_statement,
+    suggestions_text,
+    within_tolerance_text,
+)
 from world.json_schema import DocumentConfig
 
 # Fact of a slope finding: the largest error of the height above ground that its leg follows.
@@ -32,6 +40,11 @@ NO_HOME = "no home"
 # Checks on which a flight gives no evidence, so that a flight may pass without them.
 APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN)
 _UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_PATH, NOT_FLOWN, *APART_FROM_FLIGHT)
+
+
+# State of a finding, of the findings of a rule, or of a verdict, as shown by signs and colors: "open" if something that
+# is not judged leaves the verdict undecided, "unjudged" if it does not.
+State = Literal["ok", "fail", "open", "unjudged"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +97,17 @@ class Finding:
     check: str = ""
     facts: tuple[Fact, ...] = ()
     at_least: bool = False
+
+    @property
+    def state(self) -> State:
+        """State of the finding.
+
+        >>> make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT).state
+        'open'
+        """
+        if self.ok is None:
+            return "open" if self.check in _UNDECIDED else "unjudged"
+        return "ok" if self.ok else "fail"
 
     @property
     def effective_limit(self) -> float | None:
@@ -155,6 +179,15 @@ class Finding:
         return place_text(self.place)
 
     @property
+    def place_and_value(self) -> str:
+        """Text of the place with the value, if there is one, such as "leg 4 (12.3 m)".
+
+        If a failed finding's value is within its limit, it fails for another reason, which then replaces the value.
+        """
+        value = self.compared_texts()[0] if self.margin is not None else shorten_statement(self.brief)
+        return self.where + (f" ({value})" if value else "")
+
+    @property
     def suggestion(self) -> str:
         """Text of the suggestions; "" without suggestions."""
         return suggestions_text(self.suggestions)
@@ -190,7 +223,7 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     >>> undecided_findings([slope]) == (slope,)
     True
     """
-    return tuple(finding for finding in findings if finding.ok is None and finding.check in _UNDECIDED)
+    return tuple(finding for finding in findings if finding.state == "open")
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:

@@ -6,8 +6,7 @@ from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
 from logs.verdict.findings import Finding
-from logs.verdict.presentation import Presentation
-from logs.verdict.rule_words import rule_word
+from logs.verdict.presentation import Presentation, finding_words
 
 
 class JunitCase(NamedTuple):
@@ -121,11 +120,11 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[JunitCase]:
         # Names of cases must be unique.
         number = counts[finding.rule, place]
         case = JunitCase(f"planfly.{finding.rule}", place if number == 1 else f"{place} ({number})")
-        if finding.ok is False:
-            message = f"{rule_word(finding.rule)}: {finding.reason}"
+        if finding.state == "fail":
+            message = f"{finding_words(finding).word}: {finding.reason}"
             text = f"would pass: {finding.suggestion}" if finding.suggestions else ""
             case = case._replace(result="failure", message=message, text=text)
-        elif finding.ok is None:
+        elif finding.state != "ok":
             case = case._replace(result="skipped", message=f"not judged: {finding.reason}")
         cases.append(case)
     return cases

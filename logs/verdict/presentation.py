@@ -1,15 +1,21 @@
-"""Define a verdict in the order in which it is shown: findings by rule, failed findings first, undecided findings.
+"""Define a verdict as it is shown: its state, its answer, and its findings in their order, with their texts.
 
-Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
-makes.  A presentation holds data; `logs.verdict.wording` phrases places and suggestions.
+Every output reads a `Presentation`, which `logs.verdict.verdict.Verdict.present` makes, and only lays it out: terminal,
+report page, notebook, studio, JUnit and ground stations.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from logs.verdict.findings import Finding, closest_to_limit, undecided_findings
+from logs.verdict.findings import Finding, State, closest_to_limit, undecided_findings, worst_first_key
+from logs.verdict.places import DecidingParameter
 from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP, Margin, RuleWords
+from logs.verdict.wording import noun_with_place, quantity_text, text_after
 
+# Signs of states, for readers who see no color.
+STATE_SIGNS: dict[State, str] = {"ok": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
+# Words of states of findings.
+STATE_WORDS: dict[State, str] = {"ok": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
 # Words of the overlap of a survey's photos, which is shown apart from the photo lines: it is no share of a line.
 _OVERLAP_WORDS = replace(
     RULE_WORDS["survey"],
@@ -18,6 +24,43 @@ _OVERLAP_WORDS = replace(
     question="Do the photos of a survey overlap as required?",
     margin=Margin("overlap", "%", 5.0),
 )
+# Texts of all rules and of the parts that are shown apart, in the order in which they are shown.
+_SHOWN_WORDS = tuple(
+    words
+    for rule_words in RULE_WORDS.values()
+    for words in ((rule_words, _OVERLAP_WORDS) if rule_words.name == _OVERLAP_WORDS.name else (rule_words,))
+)
+
+
+def finding_words(finding: Finding) -> RuleWords:
+    """Return the texts of a finding's rule, or of the part of the rule that it is shown with."""
+    is_overlap = finding.rule == _OVERLAP_WORDS.name and finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
+    return _OVERLAP_WORDS if is_overlap else RULE_WORDS[finding.rule]
+
+
+def finding_heading(finding: Finding) -> str:
+    """Return the rule of a finding and its place, such as "slope at leg 7, to item 9"."""
+    word = finding_words(finding).word
+    # A fence item names its rule.
+    return finding.where if finding.where.startswith(f"{word} ") else noun_with_place(word, finding.place)
+
+
+def limit_with_tolerance_text(finding: Finding) -> str:
+    """Return the values that pass as text, with the tolerance and its purpose apart.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> numbers = {"limit": 9.5, "tolerance": 0.2, "unit": "m/s", "at_least": True}
+    >>> limit_with_tolerance_text(make_finding("stall", Place("flight"), ok=True, reason="", **numbers))
+    '≥ 9.5 m/s, less a tolerance of 0.2 m/s'
+    """
+    purpose = finding_words(finding).tolerance_purpose
+    tolerance_text = quantity_text(finding.tolerance or 0.0, finding.unit)
+    return (
+        f"{finding.limit_sign} {quantity_text(finding.limit or 0.0, finding.unit)},"
+        f" {'less' if finding.at_least else 'plus'}"
+        f" {f'{tolerance_text} for {purpose}' if purpose else f'a tolerance of {tolerance_text}'}"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +85,20 @@ class RuleFindings:
         return sum(finding.ok is not None for finding in self.findings)
 
     @property
+    def state(self) -> State:
+        """State of the rule over the whole flight."""
+        states = {finding.state for finding in self.findings}
+        return next((state for state in ("fail", "open", "ok") if state in states), "unjudged")
+
+    @property
     def closest(self) -> Finding | None:
         """The failed finding that is furthest beyond its limit, or else the finding closest to its limit."""
         return closest_to_limit(self.findings)
+
+    @property
+    def shown(self) -> Finding | None:
+        """The finding that stands for all: an undecided one if none fails, or else the closest to its limit."""
+        return min(undecided_findings(self.findings), key=worst_first_key) if self.state == "open" else self.closest
 
     @property
     def passed_otherwise(self) -> tuple[Finding, ...]:
@@ -60,14 +114,23 @@ class RuleFindings:
         """Text such as "3 of 4 ok": the number of passed findings, and the number of judged findings."""
         return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
 
+    @property
+    def tally_text(self) -> str:
+        """Text such as "2 of 3 fail, 1 not judged" or "3 ok": the numbers of findings, for a cell of a table."""
+        failed_count, unjudged_count = len(self.failed), len(self.findings) - self.judged
+        judged_text = f"{failed_count} of {self.judged} fail" if failed_count else f"{self.judged} ok"
+        parts = [judged_text if self.judged else "", f"{unjudged_count} not judged" if unjudged_count else ""]
+        return ", ".join(filter(None, parts))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Presentation:
     """Verdict as it is shown to readers.
 
-    headline: the answer in one line.
+    headline: the answer and its reasons in one line.
     details: the other lines of the summary.
     state: "ok", "open" (nothing failed, and a part was not judged) or "fail".
+    answer, level, complete, unjudged, deciding: as in `logs.verdict.verdict.Verdict`.
     findings: all findings, in the verdict's order.
     rules: the findings by rule, in the order of `RULE_WORDS`.
     zones: number of airspace zones that apply to the verdict.
@@ -75,10 +138,48 @@ class Presentation:
 
     headline: str
     details: tuple[str, ...]
-    state: str
+    state: State
+    answer: str
+    level: str
+    complete: bool
+    unjudged: str
+    deciding: DecidingParameter | None
     findings: tuple[Finding, ...]
     rules: tuple[RuleFindings, ...]
     zones: int
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """Failed findings, in the verdict's order."""
+        return tuple(finding for finding in self.findings if finding.state == "fail")
+
+    @property
+    def is_only_incomplete(self) -> bool:
+        """True if nothing failed but the completion of the flight."""
+        is_flight = self.state == "fail" and self.level != "plan" and not self.complete
+        return is_flight and all(finding.rule == "completion" for finding in self.failed)
+
+    @property
+    def title(self) -> str:
+        """Answer as a title, with the level or the incompleteness of the flight."""
+        answer = self.answer.capitalize()
+        if self.state == "ok":
+            return answer + ("" if self.level == "flown" else " on paper, not flown")
+        if self.level == "plan":
+            return f"{answer}: no feasible plan"
+        if self.is_only_incomplete:
+            return f"Incomplete, so {self.answer}"
+        return answer + ("" if self.complete or self.state == "open" else ", and incomplete")
+
+    @property
+    def sign(self) -> str:
+        """Sign of the state, or "!" if nothing failed but the completion of the flight."""
+        return "!" if self.is_only_incomplete else STATE_SIGNS[self.state]
+
+    @property
+    def reasons(self) -> str:
+        """Headline without the title or the answer at its beginning."""
+        return text_after(self.headline, (self.title, self.answer))
 
     @property
     def failed_rules(self) -> tuple[RuleFindings, ...]:
@@ -90,6 +191,28 @@ class Presentation:
     def undecided(self) -> tuple[Finding, ...]:
         """The findings that leave the verdict undecided."""
         return undecided_findings(self.findings)
+
+    def remedy_text(self, finding: Finding) -> str:
+        """Return alternative changes of the plan, as text, that would make a failed finding pass.
+
+        The deciding parameter is named at the finding that it decides.  Return "" if no change is known.
+        """
+        if finding.state != "fail":
+            return ""
+        parts, deciding = [finding.suggestion] if finding.suggestions else [], self.deciding
+        if deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place):
+            unit = f"\u00a0{deciding.unit}" if deciding.unit else ""
+            values_text = f"{deciding.name} {deciding.passing:g}{unit} instead of {deciding.current:g}"
+            parts.append(f"the plan as it is, with {values_text}")
+        return "; ".join(parts)
+
+    @property
+    def first_remedied(self) -> Finding | None:
+        """First failed finding with a remedy; a finding on ground contact comes before all others."""
+        worst = [rule.failed[0] for rule in self.failed_rules]
+        # A ground contact ended the flight; the sort keeps the order of the others.
+        worst.sort(key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0)
+        return next((finding for finding in worst if self.remedy_text(finding)), None)
 
     def findings_to_list(self, max_failed_and_undecided: int) -> list[tuple[int, Finding]]:
         """Return the findings to show in a short list, each with its index in `findings`.
@@ -116,14 +239,7 @@ def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
     >>> [[finding.place.index for finding in rule.failed] for rule in findings_by_rule(slopes)]
     [[1, 0]]
     """
-    grouped: dict[str, list[Finding]] = {name: [] for name in RULE_WORDS}
-    overlaps: list[Finding] = []
+    grouped: dict[str, list[Finding]] = {words.title: [] for words in _SHOWN_WORDS}
     for finding in findings:
-        is_overlap = finding.rule == _OVERLAP_WORDS.name and finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
-        (overlaps if is_overlap else grouped[finding.rule]).append(finding)
-    rules = []
-    for name, group in grouped.items():
-        rules.append(RuleFindings(RULE_WORDS[name], tuple(group)))
-        if name == _OVERLAP_WORDS.name:
-            rules.append(RuleFindings(_OVERLAP_WORDS, tuple(overlaps)))
-    return tuple(rule for rule in rules if rule.findings)
+        grouped[finding_words(finding).title].append(finding)
+    return tuple(RuleFindings(words, tuple(grouped[words.title])) for words in _SHOWN_WORDS if grouped[words.title])

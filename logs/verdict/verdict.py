@@ -14,12 +14,12 @@ from logs.verdict.document import (
     level_document,
     parameters_document,
 )
-from logs.verdict.findings import APART_FROM_FLIGHT, Finding, closest_to_limit, undecided_findings
+from logs.verdict.findings import APART_FROM_FLIGHT, Finding, State, closest_to_limit, undecided_findings
 from logs.verdict.junit import junit_text
-from logs.verdict.notebook import verdict_html
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.presentation import Presentation, findings_by_rule
 from world.extras import require_extra
+from world.html_table import html_table
 from world.wording import count_text
 
 
@@ -86,7 +86,7 @@ class Verdict:
         return success if self.flyable else f"not {success}"
 
     @property
-    def state(self) -> str:
+    def state(self) -> State:
         """Answer as a key for colors: "ok", "open" (nothing failed, but a part was not judged) or "fail"."""
         return "ok" if self.flyable else "open" if self.undecided else "fail"
 
@@ -198,6 +198,11 @@ class Verdict:
             headline=headline,
             details=tuple(details),
             state=self.state,
+            answer=self.answer,
+            level=self.level,
+            complete=self.complete,
+            unjudged=self.unjudged,
+            deciding=self.deciding,
             findings=self.findings,
             rules=findings_by_rule(self.findings),
             zones=0 if self.conditions is None else self.conditions.zones,
@@ -211,8 +216,17 @@ class Verdict:
         return junit_text({name: self.present()})
 
     def _repr_html_(self) -> str:
-        """Return the verdict as a table for a notebook."""
-        return verdict_html(self.present())
+        """Return the verdict as a table for a notebook, with a row for each rule and for each failed finding."""
+        shown = self.present()
+        rows: list[tuple[str, ...]] = []
+        for rule in shown.rules:
+            rows.append((rule.words.title, rule.count_text, "", ""))
+            rows += [
+                ("", finding.where, finding.reason, finding.suggestion)
+                for finding in rule.findings
+                if finding.state == "fail"
+            ]
+        return html_table(shown.headline, rows, ("rule", "result", "reason", "would pass"))
 
 
 def verdict_json(verdict: Verdict) -> str:

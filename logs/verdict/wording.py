@@ -416,6 +416,16 @@ def shorten_statement(statement: str) -> str:
     return statement if len(statement) <= _MAX_STATEMENT_LENGTH else statement[: _MAX_STATEMENT_LENGTH - 3] + "..."
 
 
+def text_after(text: str, starts: Sequence[str]) -> str:
+    """Return a text without the first of `starts` at its beginning, and without the punctuation that follows.
+
+    >>> text_after("not flyable: slope on leg 1", ("Not flyable, and incomplete", "not flyable"))
+    'slope on leg 1'
+    """
+    length = next((len(start) for start in starts if text.lower().startswith(start.lower())), 0)
+    return text[length:].lstrip(":; ")
+
+
 def quantity_text(value: float, unit: str) -> str:
     """Return a value with its unit, to three significant figures, and without an exponent even for 1140000 Wh.
 

@@ -110,7 +110,7 @@ _SINGLE_AUTOPILOT_OPTIONS = ("params", "guidance", "autopilot", "plan", "flight"
 
 def _check_for_each_autopilot(args: argparse.Namespace) -> int:
     """Fly a mission by each named autopilot, and return the exit code of the worst verdict."""
-    from planfly.terminal.autopilot_table import autopilot_lines
+    from planfly.terminal.verdict_lines import autopilot_lines
 
     for name in _SINGLE_AUTOPILOT_OPTIONS:
         if (value := getattr(args, name)) not in (None, False):

@@ -4,7 +4,7 @@ import contextlib
 import math
 import signal
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -45,9 +45,9 @@ from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.rule_words import rule_word
+from logs.verdict.presentation import finding_heading, finding_words
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import deciding_text, noun_with_place
+from logs.verdict.wording import deciding_text
 from planfly.flight_options import MissionOptions, load_scenario_with_options, read_named_fences
 from planfly.workflow.open_flight import make_setup, open_flight
 from planfly.workflow.reference_flights import explain_verdict
@@ -342,11 +342,7 @@ def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[Sta
 
     basis: basis of the verdict, such as "flown in GUIDED".
     """
-    failed_findings = [
-        finding
-        for finding in verdict.findings
-        if finding.ok is False and finding.rule not in _RULES_OF_UNFINISHED_PATHS
-    ]
+    failed_findings = [finding for finding in verdict.failed if finding.rule not in _RULES_OF_UNFINISHED_PATHS]
     findings_text = count_text(len(failed_findings), "finding") if failed_findings else "no findings"
     first_text = StatusText(f"verdict ({basis}): {end_reason}; {findings_text} failed until then", INFO)
     return (first_text, *_finding_texts(failed_findings))
@@ -357,33 +353,24 @@ def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
 
     basis: basis of the verdict, such as "flown" or "geometry".
     """
-    failed_findings = [finding for finding in verdict.findings if finding.ok is False]
-    if verdict.flyable:
-        return (StatusText(f"verdict ({basis}): FLYABLE", INFO),)
-    if verdict.undecided:
-        return (StatusText(f"verdict ({basis}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
+    answer = f"verdict ({basis}): {verdict.answer.upper()}"
+    if verdict.state == "ok":
+        return (StatusText(answer, INFO),)
+    if verdict.state == "open":
+        return (StatusText(f"{answer}: {verdict.unjudged}", WARNING),)
     deciding_texts = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
-    return (StatusText(f"verdict ({basis}): NOT FLYABLE", WARNING), *deciding_texts, *_finding_texts(failed_findings))
+    return (StatusText(answer, WARNING), *deciding_texts, *_finding_texts(verdict.failed))
 
 
-def _finding_texts(findings: list[Finding]) -> list[StatusText]:
+def _finding_texts(findings: Sequence[Finding]) -> list[StatusText]:
     """Return a text for each of the first findings, then the number of other findings.
 
-    At most `_MAX_TEXTS_PER_VERDICT` findings are named.
+    At most `_MAX_TEXTS_PER_VERDICT` findings are named.  The place is left out if the reason names it.
     """
-    texts = [
-        StatusText(f"{_finding_heading(finding)}: {finding.reason}", WARNING)
-        for finding in findings[:_MAX_TEXTS_PER_VERDICT]
-    ]
+    texts = []
+    for finding in findings[:_MAX_TEXTS_PER_VERDICT]:
+        heading = finding_words(finding).word if finding.placed else finding_heading(finding)
+        texts.append(StatusText(f"{heading}: {finding.reason}", WARNING))
     if len(findings) > _MAX_TEXTS_PER_VERDICT:
         texts.append(StatusText(f"and {count_text(len(findings) - _MAX_TEXTS_PER_VERDICT, 'more finding')}", WARNING))
     return texts
-
-
-def _finding_heading(finding: Finding) -> str:
-    """Return the rule of a finding as text, with its place.
-
-    The place is left out if the reason of the finding names it.
-    """
-    rule_name = rule_word(finding.rule)
-    return rule_name if finding.placed else noun_with_place(rule_name, finding.place)

@@ -8,10 +8,11 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from logs.verdict.findings import Finding, undecided_findings
+from logs.verdict.findings import Finding
 from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.violated_legs import legs_near_missiles, violated_legs
+from logs.verdict.presentation import finding_words, limit_with_tolerance_text
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import quantity_text
 
@@ -60,9 +61,8 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
     corners: dict[int, State] = {}
     threats: set[int] = set()
     zones: set[int] = set()
-    open_ids = {id(finding) for finding in undecided_findings(findings)}
     for finding in findings:
-        state = finding_state(finding, unjudged=id(finding) in open_ids or _leaves_terrain(finding))
+        state = finding_state(finding, unjudged=finding.state == "open" or _leaves_terrain(finding))
         if state is None:
             continue
         place = finding.place
@@ -127,21 +127,15 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
     >>> finding_state(slope)
     State(state='near', closeness=0.7, text='slope 13.5° (≤ 14.2°)')
     """
+    word = finding_words(finding).word
     if finding.ok is None:
-        return State("open", 0.0, f"{_rule_name(finding)}: {finding.brief or finding.reason}") if unjudged else None
+        return State("open", 0.0, f"{word}: {finding.brief or finding.reason}") if unjudged else None
     if finding.ok is False:
-        return State(
-            "fail", -math.inf if finding.margin is None else finding.margin, f"{_rule_name(finding)}: {finding.brief}"
-        )
+        return State("fail", -math.inf if finding.margin is None else finding.margin, f"{word}: {finding.brief}")
     if finding.margin is None or finding.planned is None:
         return None
     closeness = _closeness(finding)
     return State("near" if closeness < 1.0 else "ok", closeness, _value_text(finding))
-
-
-def _rule_name(finding: Finding) -> str:
-    """Return the name of a finding's rule for the page."""
-    return RULE_WORDS[finding.rule].word
 
 
 def _closeness(finding: Finding, tolerance: float = 0.0) -> float:
@@ -162,11 +156,7 @@ def _value_text(finding: Finding) -> str:
     If the value is beyond the limit but within the tolerance, the limit is followed by the tolerance and its purpose.
     """
     value, limit_text = finding.compared_texts()
-    closeness, tolerance = _closeness(finding), finding.tolerance or 0.0
-    if finding.limit is not None and closeness < 1.0 and _closeness(finding, tolerance) >= 1.0:
-        sign, joint = finding.limit_sign, "less" if finding.at_least else "plus"
-        purpose = RULE_WORDS[finding.rule].tolerance_purpose
-        tolerance_text = quantity_text(tolerance, finding.unit)
-        limit_text = f"{sign} {quantity_text(finding.limit, finding.unit)}, {joint}"
-        limit_text += f" {tolerance_text} for {purpose}" if purpose else f" a tolerance of {tolerance_text}"
-    return f"{_rule_name(finding)} {value}" + (f" ({limit_text})" if limit_text else "")
+    is_only_tolerated = _closeness(finding) < 1.0 <= _closeness(finding, finding.tolerance or 0.0)
+    if finding.limit is not None and is_only_tolerated:
+        limit_text = limit_with_tolerance_text(finding)
+    return f"{finding_words(finding).word} {value}" + (f" ({limit_text})" if limit_text else "")

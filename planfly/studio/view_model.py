@@ -16,7 +16,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import judged_airspace
 from logs.verdict.places import TriedSuggestions
-from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.presentation import finding_words
 from logs.verdict.rules.registry import with_passing_suggestions
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import suggestion_text
@@ -277,18 +277,16 @@ def _state_data(state: State) -> list[str | float | None]:
 
 
 def verdict_page_data(verdict: Verdict) -> Json:
-    """Return page data of a verdict: state, answer, headline, lines, level and count of failures.
-
-    The answer is the same as in the headline, even for a flight that ended early.
-    """
+    """Return page data of a verdict: state, answer, headline, reasons, lines, level and count of failures."""
     presentation = verdict.present()
     return {
         "state": presentation.state,
-        "answer": "not flyable" if verdict.state == "fail" else verdict.answer,
+        "answer": presentation.answer,
         "headline": presentation.headline,
+        "reasons": presentation.reasons,
         "lines": list(presentation.details),
-        "level": verdict.level,
-        "failed": len(verdict.failed),
+        "level": presentation.level,
+        "failed": len(presentation.failed),
     }
 
 
@@ -309,7 +307,8 @@ def _finding_json(number: int, finding: Finding) -> Json:
     """Return page data of a finding, with its suggestions.  number: index of the finding in the verdict."""
     return {
         "number": number,
-        "rule": RULE_WORDS[finding.rule].title,
+        "rule": finding_words(finding).title,
+        "state": finding.state,
         "ok": finding.ok,
         "where": finding.where,
         "kind": finding.place.kind,

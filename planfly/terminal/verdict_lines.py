@@ -1,13 +1,12 @@
-"""Print a verdict on a terminal."""
+"""Format or print a verdict, or the verdicts for several autopilots, as lines for a terminal."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding
-from logs.verdict.presentation import RuleFindings
-from logs.verdict.rule_words import RULE_WORDS, rule_word
+from logs.verdict.conditions import flown_lines
+from logs.verdict.presentation import RuleFindings, finding_heading, findings_by_rule
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
-from logs.verdict.wording import noun_with_place, shorten_statement
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 from planfly.workflow.suggestion_trials import has_geometric_suggestion
 
@@ -49,7 +48,7 @@ def verdict_lines(
     no_change_text = _no_change_text(verdict, suggests_by_geometry)
     lines += [colour_text("          no remedy: ", "hint") + no_change_text] if no_change_text else []
     lines += [
-        f"  open    {noun_with_place(rule_word(finding.rule), finding.place)}: {finding.reason}"
+        f"  open    {finding_heading(finding)}: {finding.reason}"
         for finding in presentation.undecided[: 2 * _MAX_LISTED]
     ]
     # One flight would decide all findings with the same suggestion.
@@ -89,10 +88,7 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     The suggestion is that of the worst finding, or else of another finding.
     """
     worst_finding, *other_findings = rule.failed
-    # A fence item names its rule.
-    place_text = noun_with_place(rule.words.word, worst_finding.place)
-    if worst_finding.where.startswith(f"{rule.words.word} "):
-        place_text = worst_finding.where
+    place_text = finding_heading(worst_finding)
     if other_findings:
         place_text = f"{rule.words.word}: {len(rule.failed)} of {rule.judged} fail; the worst at {worst_finding.where}"
     lines = [colour_text("  failed  ", "bad") + f"{place_text}: {worst_finding.reason}"]
@@ -104,19 +100,10 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
     elif worst_finding.rule == "return" and worst_finding.limit_source == "scenario":
         lines.append(colour_text("          would help: ", "hint") + "planfly returns --suggest looks for a remedy")
     if other_findings:
-        other_places = "; ".join(map(_place_and_value, other_findings[:_MAX_LISTED]))
+        other_places = "; ".join(finding.place_and_value for finding in other_findings[:_MAX_LISTED])
         more_text = f"; {len(other_findings) - _MAX_LISTED} more" if len(other_findings) > _MAX_LISTED else ""
         lines.append(f"          also at {other_places}{more_text}")
     return lines
-
-
-def _place_and_value(finding: Finding) -> str:
-    """Return the place of a failed finding, with its value if it has one, such as "leg 4 (12.3 m)".
-
-    If the value is within its limit, the finding fails for another reason: this reason then replaces the value.
-    """
-    value = finding.compared_texts()[0] if finding.margin is not None else shorten_statement(finding.brief)
-    return finding.where + (f" ({value})" if value else "")
 
 
 def _rule_summary(rule: RuleFindings) -> str:
@@ -140,3 +127,43 @@ def _rule_summary(rule: RuleFindings) -> str:
     source_text = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
     note = f"; {closest.tolerance_note}" if closest.tolerance_note else ""
     return f"{rule.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text}{note})"
+
+
+def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
+    """Return the lines of a table of verdicts, followed by the main lines of each verdict.
+
+    The table has a row for each rule and a column for each autopilot.
+
+    verdicts: verdict for each autopilot, keyed by name, in the order of the columns.
+
+    >>> flies = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
+    >>> fails = Verdict((), flyable=False, complete=True, lines=("not flyable: speed", "NAV_ACC_RAD 10"), level="flown")
+    >>> for line in autopilot_lines({"ardupilot": flies, "px4": fails}):
+    ...     print(line)
+               ardupilot  px4
+      verdict  flyable    not flyable
+    ardupilot: flyable
+    px4: not flyable: speed; NAV_ACC_RAD 10
+    """
+    rows = [("", *verdicts), ("verdict", *(verdict.answer for verdict in verdicts.values()))]
+    # Keyed by title: photo lines and their overlap are shown apart, and have the rule "survey" in common.
+    rules_by_title = [{rule.words.title: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
+    all_findings = [finding for verdict in verdicts.values() for finding in verdict.findings]
+    rows += [
+        (title, *(rules[title].tally_text if title in rules else "" for rules in rules_by_title))
+        for title in [rule.words.title for rule in findings_by_rule(all_findings)]
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = []
+    for title, *cells in rows:
+        padded = [f"{cell:<{width}}" for cell, width in zip(cells, widths[1:], strict=True)]
+        lines.append(f"  {title:<{widths[0]}}  {'  '.join(padded)}".rstrip())
+    for name, verdict in verdicts.items():
+        first, *other_lines = verdict.lines or ("",)
+        # If another parameter value passes, the second line of the verdict names that value.
+        remedy = f"; {other_lines[0]}" if other_lines and not verdict.flyable else ""
+        lines.append(f"{name}: " + colour_text(first, STATE_STYLES[verdict.state]) + remedy)
+        if verdict.conditions is not None:
+            condition_texts = flown_lines(verdict.conditions)
+            lines += [f"  {line}" for line in condition_texts]
+    return lines

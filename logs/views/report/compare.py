@@ -34,7 +34,7 @@ from logs.views.report.page import (
     script_text,
     style_text,
 )
-from logs.views.report.text import NOTHING, format_columns, number, verdict_badge
+from logs.views.report.text import NOTHING, format_columns, number
 from logs.views.scene import SceneView, script_json
 from world.arrays import Floats
 from world.files import write_atomically
@@ -373,10 +373,7 @@ def _page_html(
     """Return the comparison's page with its pictures, charts and scripts."""
     pictures = [(*_PICTURES[name.removesuffix(".png")], picture_data_url(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
-    verdicts = [
-        (name, verdict_badge(verdict), verdict.headline)
-        for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
-    ]
+    verdicts = [(name, verdict.present()) for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)]
     return page_template("compare.html").render(
         names=comparison.names,
         verdicts=verdicts,

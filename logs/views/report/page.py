@@ -31,15 +31,7 @@ from logs.views.failures import failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, make_subject, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
-from logs.views.report.text import (
-    count_sentence,
-    failed_groups,
-    finding_rows,
-    first_remedy,
-    headline_without_answer,
-    rule_rows,
-    verdict_badge,
-)
+from logs.views.report.text import count_sentence, finding_rows, missed_text, rule_row
 from logs.views.scene import script_json
 from world.files import write_atomically
 
@@ -278,25 +270,21 @@ def _page_html(
     """Return the report's page: the template filled with verdict, tables, pictures and facts."""
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.points))
-    rows = finding_rows(verdict.findings, verdict.deciding)
+    shown = verdict.present()
     shown_pictures = report_pictures(subject, page_charts(views), pictures)
-    failing = failed_groups(verdict)
-    lines = verdict.lines or ("",)
-    badge = verdict_badge(verdict)
     return page_template("report.html").render(
         name=setup.scenario.name,
-        badge=badge,
-        headline=headline_without_answer(badge, lines[0]),
-        lines=lines[1:],
+        verdict=shown,
+        missed_text=missed_text,
         flown=track is not None,
-        failing=failing,
-        remedy=first_remedy(verdict),
-        counts=count_sentence(rows),
+        counts=count_sentence(shown.findings),
         flight_line=tables.flight_sentence(setup, track),
-        rules=[row for row in rule_rows(verdict.findings) if row.state != "fail"],
-        findings=rows,
+        rules=[rule_row(rule) for rule in shown.rules if rule.state != "fail"],
+        findings=finding_rows(shown.findings),
         notes=[
-            note for note in tables.mission_notes(setup) if not any(note in line for line in (*verdict.notes, *lines))
+            note
+            for note in tables.mission_notes(setup)
+            if not any(note in line for line in (*verdict.notes, *verdict.lines))
         ],
         map=next((picture for picture in shown_pictures if picture.identifier == "map"), None),
         pictures=[picture for picture in shown_pictures if picture.identifier != "map"],

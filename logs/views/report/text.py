@@ -1,17 +1,15 @@
-"""Format numbers and findings: sensible digits, units, real minus signs, failing rows first."""
+"""Format numbers and tables of findings: sensible digits, units, real minus signs, failing rows first."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import Finding, undecided_findings, worst_first_key
+from logs.verdict.findings import Finding, State
 from logs.verdict.imported.model_comparison import Reflight
-from logs.verdict.places import DecidingParameter
-from logs.verdict.presentation import RuleFindings, findings_by_rule
-from logs.verdict.rule_words import rule_word
-from logs.verdict.verdict import Verdict
-from logs.verdict.wording import quantity_text, suggestions_text
+from logs.verdict.presentation import STATE_SIGNS, STATE_WORDS, RuleFindings, finding_words
+from logs.verdict.wording import quantity_text
 
 NOTHING = "–"
 _UNITS = {"deg": "°", "none": "", "1": ""}
@@ -19,61 +17,37 @@ _UNITS = {"deg": "°", "none": "", "1": ""}
 
 @dataclass(frozen=True, slots=True)
 class FindingRow:
-    """One finding as text.
+    """One finding as a row of a table.
 
-    state: "fail", "pass", "open" (not judged, which leaves the verdict open) or "unjudged".
-    sign: the state as a symbol, for readers who see no colour.
-    missed_by: distance of a failed finding from the values that pass; "" if unknown.
-    remedy: changes that would have made a failed finding pass; "" if unknown.
+    state, sign: the state as a name and as a symbol, for readers who see no colour.
     """
 
-    state: str
+    finding: Finding
+    state: State
     sign: str
     rule: str
-    where: str
     planned: str
     flown: str
     limit: str
-    limit_source: str
     margin: str
     unit: str
     method: str
-    reason: str
-    sentence: str
-    missed_by: str
-    remedy: str
 
 
 @dataclass(frozen=True, slots=True)
 class RuleRow:
     """One rule over the whole flight: numbers of findings by state, and the one closest to its limit."""
 
-    state: str
+    state: State
     sign: str
     rule: str
     counts: str
     where: str
-    planned: str
-    flown: str
-    limit: str
-    margin: str
-    unit: str
-
-
-@dataclass(frozen=True, slots=True)
-class Badge:
-    """Verdict in one word, with a sign before it.
-
-    state: "pass", "fail", "open" (not judged in full) or "unjudged"; it sets the colour.
-    """
-
-    state: str
-    sign: str
-    word: str
-
-
-_SIGNS = {"pass": "✓", "fail": "✗", "open": "?", "unjudged": "–"}
-_WORDS = {"pass": "ok", "fail": "fails", "open": "not judged", "unjudged": "not judged"}
+    planned: str = NOTHING
+    flown: str = NOTHING
+    limit: str = NOTHING
+    margin: str = NOTHING
+    unit: str = ""
 
 
 def number(value: float | None, *, signed: bool = False, digits: int | None = None) -> str:
@@ -113,130 +87,32 @@ def in_unit(value: float | None, unit: str) -> tuple[float | None, str]:
     return value, _UNITS.get(unit, unit)
 
 
-def finding_state(ok: bool | None, *, is_open: bool = False) -> str:
-    """Return the state of a finding, as in `FindingRow`.
-
-    is_open: True if the finding, unjudged, leaves the verdict open.
-    """
-    return ("open" if is_open else "unjudged") if ok is None else "pass" if ok else "fail"
-
-
-def verdict_badge(verdict: Verdict) -> Badge:
-    """Return the verdict in a few words; a verdict whose only failure is completion is "incomplete"."""
-    if verdict.flyable:
-        answer = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
-        return Badge("pass", _SIGNS["pass"], answer)
-    if verdict.level == "plan":
-        return Badge("fail", _SIGNS["fail"], "Not flyable: no feasible plan")
-    if verdict.undecided:
-        return Badge("open", _SIGNS["open"], "Not judged in full")
-    answer = "not flown as planned" if verdict.imported else "not flyable"
-    failed_rules = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
-    if not failed_rules and not verdict.complete:
-        return Badge("fail", "!", f"Incomplete, so {answer}")
-    return Badge("fail", _SIGNS["fail"], answer.capitalize() + ("" if verdict.complete else ", and incomplete"))
-
-
-def headline_without_answer(badge: Badge, headline: str) -> str:
-    """Return the headline without the answer at its beginning, if the badge gives the same answer.
-
-    >>> headline_without_answer(Badge("fail", "✗", "Not flyable"), "not flyable: slope on leg 1")
-    'slope on leg 1'
-    """
-    starts_with_answer = headline.lower().startswith(badge.word.lower())
-    return headline[len(badge.word) :].lstrip(":; ") if starts_with_answer else headline
-
-
-def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
-    """Return all findings as text, in this order: failed, undecided, passed, not judged.
+def finding_rows(findings: Iterable[Finding]) -> list[FindingRow]:
+    """Return all findings as rows, in this order: failed, undecided, passed, not judged.
 
     Within each state, the order of the verdict is kept.
-
-    deciding: deciding parameter of the verdict, for the remedies.
     """
-    order = {"fail": 0, "open": 1, "pass": 2, "unjudged": 3}
-    return sorted((_finding_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
+    order = ("fail", "open", "ok", "unjudged")
+    return sorted(map(_finding_row, findings), key=lambda row: order.index(row.state))
 
 
-@dataclass(frozen=True, slots=True)
-class FailedGroup:
-    """The failed findings of one rule.
-
-    judged: number of judged findings of the rule.  others: places and values of further failures, worst first.
-    """
-
-    rule: str
-    judged: int
-    worst: FindingRow
-    others: tuple[str, ...]
-
-
-def failed_groups(verdict: Verdict) -> list[FailedGroup]:
-    """List the failed rules, in the order of the first line of the verdict."""
-    groups = []
-    for rule in verdict.present().failed_rules:
-        worst, *others = (_finding_row(finding, verdict.deciding) for finding in rule.failed)
-        groups.append(FailedGroup(rule.words.word, rule.judged, worst, tuple(map(_place_and_value, others))))
-    return groups
-
-
-def first_remedy(verdict: Verdict) -> FindingRow | None:
-    """Return the first failed finding with a remedy, or None if none has one.
-
-    A finding on ground contact comes before all others.
-    """
-    worst = [rule.failed[0] for rule in verdict.present().failed_rules]
-    # A ground contact ended the flight; the sort keeps the order of the others.
-    worst.sort(key=lambda finding: finding.rule != "clearance" or finding.flown is None or finding.flown > 0.0)
-    rows = (_finding_row(finding, verdict.deciding) for finding in worst)
-    return next((row for row in rows if row.remedy), None)
-
-
-def _place_and_value(row: FindingRow) -> str:
-    """Return the place and the value of a failed finding as text."""
-    value = row.planned if row.flown == NOTHING else row.flown
-    unit = row.unit if row.unit in ("°", "%") else f" {row.unit}"
-    return row.where if value == NOTHING else f"{row.where} ({value}{unit.rstrip()})"
-
-
-def remedy_text(finding: Finding, deciding: DecidingParameter | None) -> str:
-    r"""Return alternative changes of the plan, as text, that would make a failed finding pass.
-
-    Return "" if none is known.
-
-    deciding: deciding parameter of the verdict; its value is named at the finding that it decides.
-
-    >>> from logs.verdict.findings import make_finding
-    >>> from logs.verdict.places import Place
-    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="")
-    >>> remedy_text(low, DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4)))
-    'the plan as it is, with TECS_HDEM_TCONST 1.2\xa0s instead of 3'
-    """
-    parts = [suggestions_text(finding.suggestions)] if finding.suggestions else []
-    if deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place):
-        unit = f"\u00a0{deciding.unit}" if deciding.unit else ""
-        parts.append(
-            f"the plan as it is, with {deciding.name} {deciding.passing:g}{unit} instead of {deciding.current:g}"
-        )
-    return "; ".join(parts)
-
-
-def count_sentence(rows: list[FindingRow]) -> str:
+def count_sentence(findings: Sequence[Finding]) -> str:
     """Return a sentence on the numbers of findings that pass, fail, and were not judged."""
-    counts = {state: sum(row.state == state for row in rows) for state in _SIGNS}
-    passed_text = f"{counts['pass']} of {counts['pass'] + counts['fail']} judged findings pass"
+    counts = Counter(finding.state for finding in findings)
+    passed_text = f"{counts['ok']} of {counts['ok'] + counts['fail']} judged findings pass"
     failed_text = f", {counts['fail']} {'fails' if counts['fail'] == 1 else 'fail'}" if counts["fail"] else ""
     unjudged = counts["open"] + counts["unjudged"]
     unjudged_text = f"; {unjudged} could not be judged" if unjudged else ""
     return f"{passed_text}{failed_text}{unjudged_text}."
 
 
-def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
-    """Return the row of one finding: its numbers and texts.
+def _sign_and_word(state: State) -> str:
+    """Return a state as its sign and its word."""
+    return f"{STATE_SIGNS[state]} {STATE_WORDS[state]}"
 
-    deciding: as in `finding_rows`.
-    """
-    state = finding_state(finding.ok, is_open=bool(undecided_findings([finding])))
+
+def _finding_row(finding: Finding) -> FindingRow:
+    """Return the row of one finding: its numbers and texts."""
     planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
@@ -245,22 +121,18 @@ def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) ->
     if finding.tolerance and method and finding.limit is not None:
         limit_text, tolerance = (quantity(value, finding.unit) for value in (finding.limit, finding.tolerance))
         method = f"{method}; limit {limit_text} with a tolerance of {tolerance}"
+    limit = number(in_unit(finding.effective_limit, finding.unit)[0], digits=digits)
     return FindingRow(
-        state=state,
-        sign=f"{_SIGNS[state]} {_WORDS[state]}",
-        rule=rule_word(finding.rule),
-        where=finding.where,
+        finding=finding,
+        state=finding.state,
+        sign=_sign_and_word(finding.state),
+        rule=finding_words(finding).word,
         planned=number(planned_value, digits=digits),
         flown=number(flown_value, digits=digits),
-        limit=_limit_text(finding, digits),
-        limit_source=finding.limit_source,
+        limit=limit if limit == NOTHING else f"{finding.limit_sign}\u00a0{limit}",
         margin=number(margin_with_tolerance, signed=True),
         unit=in_unit(None, finding.unit)[1],
         method=method,
-        reason=finding.reason,
-        sentence=_sentence(finding),
-        missed_by=_missed_text(finding),
-        remedy=remedy_text(finding, deciding) if finding.ok is False else "",
     )
 
 
@@ -296,50 +168,22 @@ def _missed_text(finding: Finding) -> str:
     return quantity_text(distance, finding.unit) if finding.unit == "legs" else quantity(distance, finding.unit)
 
 
-def _sentence(finding: Finding) -> str:
-    """Return a finding in words: its reason, or the flown or planned value and its limit."""
-    parts: list[str] = []
-    digits, unit = _needed_decimals(finding), in_unit(None, finding.unit)[1]
-    space = "" if unit in ("", "°", "%") else "\u00a0"
-    if (value := finding.value) is not None:
-        word = "planned" if finding.flown is None or value != finding.flown else "flown"
-        parts.append(f"{word} {number(in_unit(value, finding.unit)[0], digits=digits)}{space}{unit}")
-    if finding.limit is not None:
-        source = f" ({finding.limit_source})" if finding.limit_source else ""
-        parts.append(f"limit {_limit_text(finding, digits)}{space}{unit}{source}")
-    return finding.reason or ", ".join(parts)
+def missed_text(finding: Finding) -> str:
+    """Return the distance of a failed finding from the values that pass; "" if no limit decides it."""
+    if finding.ok is not False or finding.margin is None or finding.effective_limit is None:
+        return ""
+    distance = -finding.margin - (finding.tolerance or 0.0)
+    # A count has no decimals.
+    return quantity_text(distance, finding.unit) if finding.unit == "legs" else quantity(distance, finding.unit)
 
 
-def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
-    """Return a row for each rule with findings, in the order of `RULE_WORDS`.
-
-    A row has the numbers of findings by state, and the finding closest to its limit.
-    """
-    return [_rule_row(rule) for rule in findings_by_rule(findings)]
-
-
-def _rule_row(rule: RuleFindings) -> RuleRow:
-    """Return the row of one rule: the numbers of its findings, and the finding closest to its limit.
-
-    If none fails, an undecided finding is named instead of those that pass.
-    """
-    failed_count, judged_count = len(rule.failed), rule.judged
-    open_findings = undecided_findings(rule.findings)
-    state = "fail" if failed_count else "open" if open_findings else "pass" if judged_count else "unjudged"
-    parts: list[str] = (
-        [f"{failed_count} of {judged_count} fail" if failed_count else f"{judged_count} ok"] if judged_count else []
-    )
-    if judged_count < len(rule.findings):
-        parts.append(f"{len(rule.findings) - judged_count} not judged")
-    sign = f"{_SIGNS[state]} {_WORDS[state]}"
-    rule_name = rule.words.word
-    counts = ", ".join(parts)
-    closest = rule.closest if failed_count or not open_findings else min(open_findings, key=worst_first_key)
-    if closest is None:
-        reason = "" if judged_count else rule.findings[0].reason
-        return RuleRow(state, sign, rule_name, counts, reason, NOTHING, NOTHING, NOTHING, NOTHING, "")
-    row = _finding_row(closest)
-    return RuleRow(state, sign, rule_name, counts, row.where, row.planned, row.flown, row.limit, row.margin, row.unit)
+def rule_row(rule: RuleFindings) -> RuleRow:
+    """Return the row of one rule: the numbers of its findings, and the finding that stands for all."""
+    head = (rule.state, _sign_and_word(rule.state), rule.words.word, rule.tally_text)
+    if rule.shown is None:
+        return RuleRow(*head, "" if rule.judged else rule.findings[0].reason)
+    row = _finding_row(rule.shown)
+    return RuleRow(*head, rule.shown.where, row.planned, row.flown, row.limit, row.margin, row.unit)
 
 
 # ----------------------------------------------------------------------

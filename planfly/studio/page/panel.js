@@ -184,7 +184,7 @@ export class Panel {
     const lines = verdict.lines.slice(0, 6);
     return element("section", { class: "card", "data-state": verdict.state },
       element("h2", {}, `${name}: ${answer}`), element("p", { class: "more" }, more),
-      verdict.state === "ok" ? null : element("p", {}, verdict.headline.replace(new RegExp(`^${verdict.answer}[:;]? *`), "")),
+      verdict.state === "ok" ? null : element("p", {}, verdict.reasons),
       lines.length ? element("details", {}, element("summary", {}, "In full"), ...lines.map((line) => element("p", { class: "line" }, line))) : null);
   }
 
@@ -195,7 +195,7 @@ export class Panel {
       element("span", {}, planned && each.apply ? `${each.text} (${this.flight.early ? "not tried by flight: the flight ended before it" : "by geometry, not flown"})` : each.text)));
     const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
-    return element("li", { "data-state": one.ok === false ? "fail" : one.ok === null ? "open" : "ok" },
+    return element("li", { "data-state": one.state },
       element("p", {}, element("span", { class: "rule" }, one.rule), " ", place), element("p", { class: "reason" }, one.text),
       suggestions.length ? element("ul", { class: "suggestions" }, ...suggestions) : null);
   }

@@ -17,7 +17,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
-from logs.views.report.text import rule_rows, verdict_badge
+from logs.views.report.text import rule_row
 from logs.views.turns import place_values
 from planfly.workflow.tighten_plan import tighten_limits
 from tests.mission_lines import setup_of, wp
@@ -62,16 +62,15 @@ def data_of(verdict: Verdict) -> dict[str, Any]:
 
 def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     """What figures, report and the next round of planning take from a verdict, without words."""
-    rows = [
-        (row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in rule_rows(verdict.findings)
-    ]
+    shown = verdict.present()
+    rows = [(row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in map(rule_row, shown.rules)]
     tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [place_values(verdict.findings, rule) for rule in RULES]
     return [
         failures(verdict, len(setup.route.points)),
         values,
         rows,
-        verdict_badge(verdict),
+        (shown.state, shown.title),
         changes,
         tighter.to_json(),
     ]

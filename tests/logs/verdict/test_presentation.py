@@ -4,11 +4,11 @@ from xml.etree import ElementTree
 
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, make_finding
 from logs.verdict.places import FLIGHT, Place
-from logs.verdict.presentation import findings_by_rule
+from logs.verdict.presentation import finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from logs.verdict.verdict import Verdict
-from logs.views.report.text import failed_groups, rule_rows
+from logs.views.report.text import rule_row
 from planfly.studio.view_model import findings_json
 from planfly.terminal.verdict_lines import verdict_lines
 
@@ -32,6 +32,8 @@ FINDINGS = (
     make_finding("completion", FLIGHT, ok=False, reason="ended early"),
 )
 VERDICT = Verdict(FINDINGS, flyable=False, complete=False, lines=("not flyable", "Start: in the air"), level="flown")
+
+STATES = ((None, ""), (True, ""), (None, UNKNOWN_AIRCRAFT), (False, ""))
 
 
 def test_every_rule_has_words_and_a_judge() -> None:
@@ -76,18 +78,55 @@ def test_every_rendering_shows_the_same_failures_in_the_same_order() -> None:
     lines = verdict_lines(VERDICT, [])
     failing = [line.split()[1] for line in lines if "  failed  " in line]
     assert failing == ["completion:", "slope", "clearance:"]
-    assert [group.rule for group in failed_groups(VERDICT)] == ["completion", "slope", "clearance"]
     assert "1 of 3 ok" in next(line for line in lines if line.startswith("  clearance"))
     page = ElementTree.fromstring(VERDICT._repr_html_())
     cells = [[cell.text or "" for cell in row] for row in page.find("table/tbody") or ()]
     assert ["clearance", "1 of 3 ok", "", ""] in cells
-    assert [row.counts for row in rule_rows(FINDINGS) if row.rule == "clearance"] == ["2 of 3 fail"]
+    rows = [rule_row(rule) for rule in VERDICT.present().rules]
+    assert [row.counts for row in rows if row.rule == "clearance"] == ["2 of 3 fail"]
     listed = [(row["number"], row["ok"]) for row in findings_json(VERDICT, ()) if row["kind"] == "leg"]
     assert listed == [(0, None), (1, False), (2, False), (3, False), (6, True)]
     suite = ElementTree.fromstring(VERDICT.to_junit("m"))[0]
     # Four findings failed, and the verdict.
     assert suite.get("failures") == "5"
     assert suite.get("skipped") == "1"
+
+
+def test_a_place_is_shown_with_the_value_that_fails_or_else_with_the_reason() -> None:
+    """12.34 m to three significant figures; a value within its limit fails for another reason."""
+    low = make_finding("clearance", Place("leg", 4), ok=False, reason="low", flown=12.34, limit=60.0, margin=-47.66)
+    slow = make_finding("speed", Place("leg", 2), ok=False, reason="too slow", flown=16.5, limit=16.0, margin=0.5)
+    assert (low.place_and_value, slow.place_and_value) == ("leg 4 (12.3)", "leg 2 (too slow)")
+
+
+def test_states_of_findings_and_of_their_rule() -> None:
+    slopes = [leg(0, ok=ok, rule="slope", check=check) for ok, check in STATES]
+    assert [finding.state for finding in slopes] == ["unjudged", "ok", "open", "fail"]
+    # The worst state of a rule decides: of one finding, of the first two, of the first three, of all.
+    assert [findings_by_rule(slopes[:k])[0].state for k in (1, 2, 3, 4)] == ["unjudged", "ok", "open", "fail"]
+    assert [findings_by_rule(slopes[:k])[0].tally_text for k in (1, 2, 4)] == [
+        "1 not judged",
+        "1 ok, 1 not judged",
+        "1 of 2 fail, 2 not judged",
+    ]
+
+
+def test_the_reasons_are_the_headline_without_its_answer() -> None:
+    def shown(headline: str, *, complete: bool = True, level: str = "flown") -> tuple[str, str, str]:
+        verdict = Verdict(FINDINGS, flyable=False, complete=complete, lines=(headline,), level=level)
+        return verdict.present().title, verdict.present().sign, verdict.present().reasons
+
+    assert shown("not flyable: slope on leg 1") == ("Not flyable", "✗", "slope on leg 1")
+    assert shown("not flyable: slope", complete=False) == ("Not flyable, and incomplete", "✗", "slope")
+    none = ("Not flyable: no feasible plan", "✗", "slope")
+    assert shown("not flyable: no feasible plan: slope", complete=False, level="plan") == none
+
+
+def test_a_fence_item_is_named_once_in_every_output() -> None:
+    item = make_finding("fence", Place("exclusion", 0, name="fence item 0"), ok=False, reason="5 m inside")
+    verdict = Verdict((item,), flyable=False, complete=True, lines=("not flyable",), level="flown")
+    assert finding_heading(item) == "fence item 0 (exclusion)"
+    assert "  failed  fence item 0 (exclusion): 5 m inside" in verdict_lines(verdict, [])
 
 
 def test_the_overlap_of_photos_is_shown_apart_from_the_photo_lines() -> None:

@@ -202,8 +202,8 @@ def test_verdict_comes_first_then_what_fails() -> None:
     ]
     positions = [text.index(part) for part in order]
     assert positions == sorted(positions)
-    tables = [row for row in page.rows if row[0] in ("fail", "pass", "unjudged") and len(row[1]) == 10]
-    assert [state for state, _ in tables] == ["fail", "pass", "pass", "unjudged"]
+    tables = [row for row in page.rows if row[0] in ("fail", "ok", "unjudged") and len(row[1]) == 10]
+    assert [state for state, _ in tables] == ["fail", "ok", "ok", "unjudged"]
     assert tables[0][1][:9] == ["leg 1", "slope", "✗ fails", "4.00", "11.2", "≤\u00a07.90", "−3.35", "°", "aircraft"]
     assert "no scenario was given" in tables[3][1][9]
     rules = [cells for state, cells in page.rows if state and len(cells) == 9]

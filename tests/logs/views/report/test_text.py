@@ -13,20 +13,18 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import Spread, compare_with_model
 from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, Place
+from logs.verdict.presentation import findings_by_rule
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
-    failed_groups,
     finding_rows,
-    first_remedy,
+    missed_text,
     not_reflown_lines,
     number,
     quantity,
     refly_lines,
-    remedy_text,
-    rule_rows,
+    rule_row,
     trust_line,
-    verdict_badge,
 )
 from tests.logs.views.report.report_data import FINDINGS, finding
 from world.scenario import with_wind
@@ -58,28 +56,26 @@ def test_a_failed_finding_states_by_how_much_it_missed(
     item = replace(
         failed(rule, flown, limit, margin), tolerance=tolerance, unit="legs" if rule == "completion" else "m"
     )
-    assert [row.missed_by for row in finding_rows([item])] == [missed]
-    assert [row.missed_by for row in finding_rows([replace(item, ok=True)])] == [""]
+    assert (missed_text(item), missed_text(replace(item, ok=True))) == (missed, "")
 
 
 def test_tables_call_a_rule_as_the_terminal_does() -> None:
     lost = make_finding(
         "departure", FLIGHT, ok=False, reason="bank 80°", flown=80.0, limit=75.0, margin=-5.0, unit="deg"
     )
-    level = Verdict((lost,), flyable=False, complete=True, lines=("no",), level="flown")
-    assert (
-        rule_rows([lost])[0].rule == finding_rows([lost])[0].rule == failed_groups(level)[0].rule == "loss of control"
-    )
+    (rule,) = findings_by_rule([lost])
+    assert rule_row(rule).rule == finding_rows([lost])[0].rule == rule.words.word == "loss of control"
 
 
 def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
     low = failed("clearance", 52.0, 60.0, -8.0)
-    assert remedy_text(low, DECIDING) == "the plan as it is, with TECS_HDEM_TCONST 1.2\u00a0s instead of 3"
-    assert remedy_text(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5)), DECIDING) == ""
-    assert remedy_text(failed("height", 52.0, 60.0, -8.0), DECIDING) == ""
+    remedy_text = Verdict((low,), False, True, (), "flown", deciding=DECIDING).present().remedy_text
+    assert remedy_text(low) == "the plan as it is, with TECS_HDEM_TCONST 1.2\u00a0s instead of 3"
+    assert remedy_text(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5))) == ""
+    assert remedy_text(failed("height", 52.0, 60.0, -8.0)) == ""
     change = (Change("height", LEG, None, 9.0, "m"),)
-    both = remedy_text(replace(low, suggestions=(change,)), DECIDING)
-    assert both == f"{suggestions_text((change,))}; {remedy_text(low, DECIDING)}"
+    both = remedy_text(replace(low, suggestions=(change,)))
+    assert both == f"{suggestions_text((change,))}; {remedy_text(low)}"
 
 
 @pytest.mark.parametrize(("clearance", "advised"), [(-0.02, "clearance"), (20.0, "slope")])
@@ -89,9 +85,9 @@ def test_the_remedy_of_a_ground_contact_comes_first(clearance: float, advised: s
         replace(failed(rule, flown, limit, flown - limit), suggestions=(changes[rule],))
         for rule, flown, limit in (("slope", -6.0, -4.6), ("clearance", clearance, 30.0))
     )
-    row = first_remedy(Verdict(findings, False, True, (), "flown"))
-    assert row is not None
-    assert row.rule == advised
+    first = Verdict(findings, False, True, (), "flown").present().first_remedied
+    assert first is not None
+    assert first.rule == advised
 
 
 # ----------------------------------------------------------------------
@@ -109,12 +105,12 @@ def test_the_remedy_of_a_ground_contact_comes_first(clearance: float, advised: s
         (False, False, "plan", FINDINGS, "Not flyable: no feasible plan"),
     ],
 )
-def test_badge_states_the_verdict(
+def test_title_states_the_verdict(
     flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], label: str
 ) -> None:
-    badge = verdict_badge(Verdict(findings, flyable, complete, (), level))
-    assert badge.word == label
-    assert badge.state == ("pass" if flyable else "fail")
+    shown = Verdict(findings, flyable, complete, (), level).present()
+    assert shown.title == label
+    assert shown.state == ("ok" if flyable else "fail")
 
 
 @given(st.floats(-1e9, 1e9))
@@ -142,15 +138,15 @@ def test_numbers_are_shown_with_their_units() -> None:
 @given(st.lists(st.tuples(st.sampled_from([True, False, None]), st.floats(-10, 10)), min_size=1, max_size=12))
 def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) -> None:
     findings = [finding("slope", Place("leg", k), ok, margin) for k, (ok, margin) in enumerate(kinds)]
-    (row,) = rule_rows(findings)
+    (row,) = map(rule_row, findings_by_rule(findings))
     judged = [item for item in findings if item.ok is not None]
     failed = [item for item in judged if item.ok is False]
-    assert row.state == ("fail" if failed else "pass" if judged else "unjudged")
+    assert row.state == ("fail" if failed else "ok" if judged else "unjudged")
     if judged:
         worst = min(item.margin or 0.0 for item in (failed or judged))
         assert row.where in [place_text(item.place) for item in findings if item.margin == worst]
     states = [item.state for item in finding_rows(findings)]
-    assert states == sorted(states, key=["fail", "pass", "unjudged"].index)
+    assert states == sorted(states, key=["fail", "ok", "unjudged"].index)
 
 
 LOG = example_log()
@@ -201,5 +197,5 @@ def test_a_verdict_that_leaves_something_open_neither_passes_nor_fails() -> None
         " limits are uncertain",
     )
     levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
-    verdict = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")
-    assert (verdict_badge(verdict).state, verdict_badge(verdict).word) == ("open", "Not judged in full")
+    shown = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1").present()
+    assert (shown.state, shown.title, shown.reasons) == ("open", "Not judged in full", lines[0].partition(": ")[2])
