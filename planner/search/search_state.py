@@ -22,7 +22,7 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
-from planner.seeding.shortening import MAX_MODELS, shorten_path
+from planner.seeding.shortening import MAX_MODELS, resample, shorten_path
 from planner.seeding.side_routes import closest_places
 from planner.seeding.waypoint_fitting import move_all_waypoints
 from world.arrays import Flags, Floats, Ints
@@ -85,6 +85,8 @@ SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
 MAX_MISSING_DISTANCE_M = max(*EXTRA_MARGINS_M, *CORNER_MARGINS_M)
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
+# Shortening by which a path must improve the best path to pass missiles more closely than usual, as a fraction.
+NARROW_GAIN_FRACTION = 0.002
 # Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
 MIN_MOVE_BUDGET = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
@@ -95,10 +97,13 @@ GRACE_PAUSES = 10
 CERTIFICATES_PER_PAUSE = 4
 
 
-def with_narrow_margins(problem: Problem) -> Problem:
-    """Return a problem whose search may pass missiles at little more than the certificate's margin."""
+def with_narrow_margins(problem: Problem, reserve: float = 0.0) -> Problem:
+    """Return a problem whose search may pass missiles at little more than the certificate's margin.
+
+    reserve: additional distance for gusts, m.
+    """
     data = problem.search
-    margin = data.tracking.across + CERTIFIED_KILL_MARGIN_M + NARROW_KILL_MARGIN_M
+    margin = data.tracking.across + CERTIFIED_KILL_MARGIN_M + NARROW_KILL_MARGIN_M + reserve
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
 
 
@@ -325,6 +330,33 @@ class Search:
             if certificate.kill_distance < self.required_distance - MAX_MISSING_DISTANCE_M:
                 break
         self.narrow_places += list(closest_places(data, path, self.required_distance + data.tracking.across))
+        return self._shorten_again(path)
+
+    def _shorten_again(self, path: Floats) -> bool:
+        """Shorten a path (w, 3) without a certificate again, from equal legs and then with narrow margins.
+
+        Keep the result, and return True, if it is finished and clearly shorter than the best safe path. Without a safe
+        path, the search tries narrow margins later.
+        """
+        if not self.has_safe():
+            return False
+        max_length = (1.0 - NARROW_GAIN_FRACTION) * self.length_ratio() * self._straight_length()
+        if path_length(path) >= max_length:
+            return False
+        for problem in (self.problem, with_narrow_margins(self.problem, self.problem.limits.reserve_threats)):
+            if self._evaluation_budget() - self.evaluations < MAX_MODELS:
+                self.budget_exhausted = True
+                return False
+            path, evaluations = shorten_path(problem.search, resample(path, len(path)), pause=self.pause)
+            self.evaluations += evaluations
+            if path_length(path) >= max_length:
+                return False
+            certificate = certify(self.problem, path)
+            if self.meets_goal(certificate):
+                self.shortest = path, certificate
+                if self.improved is not None:
+                    self.improved(path)
+                return True
         return False
 
     def _violates_only_slopes(self, certificate: Certificate) -> bool:

@@ -10,11 +10,12 @@ import planner.search.plan_path as plan_path_module
 import planner.search.seeds as seeds_module
 import planner.seeding.lattice as lattice_module
 from aircraft.path_limits import Limits
+from benchmarks.planning.fresh_instances import random_task
 from benchmarks.planning.wild_instances import wild_scenario
 from planfly.workflow.uav import load_uav
 from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, ProblemArrays, make_problem
-from planner.plan import Certificate
+from planner.plan import Certificate, Objective
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
@@ -289,3 +290,21 @@ def test_it_is_not_looked_for_where_a_straight_frame_holds_a_short_path(
     for name in ("hard-07", "hard-60"):
         scenario = load_scenario(name)
         assert plan_path(scenario, make_limits(scenario), seed=1).safe
+
+
+@pytest.mark.parametrize(
+    ("seed", "reference_ratio", "distance"),
+    [
+        # Routes on the best sides fail with the usual distance of 15 m, but not from equal legs.
+        (200499, 1.01261, 15.0),
+        # The best gap is passed at less than the usual distance.
+        (200750, 1.07272, CERTIFIED_KILL_MARGIN_M),
+    ],
+)
+def test_a_route_that_fails_at_first_is_shortened_again(seed: int, reference_ratio: float, distance: float) -> None:
+    # The ratios are those of benchmarks.planning.reference_search.
+    task = random_task(seed, family="drawn")
+    plan = plan_path(task.scenario, task.problem.limits, seed=1)
+    assert plan.safe
+    assert plan.certificate.kill_distance >= distance
+    assert plan.objectives[Objective.LENGTH_RATIO] <= 1.002 * reference_ratio
