@@ -97,13 +97,10 @@ GRACE_PAUSES = 10
 CERTIFICATES_PER_PAUSE = 4
 
 
-def with_narrow_margins(problem: Problem, reserve: float = 0.0) -> Problem:
-    """Return a problem whose search may pass missiles at little more than the certificate's margin.
-
-    reserve: additional distance for gusts, m.
-    """
+def with_narrow_margins(problem: Problem) -> Problem:
+    """Return a problem whose search may pass missiles at little more than the certificate's margin, gusts included."""
     data = problem.search
-    margin = data.tracking.across + CERTIFIED_KILL_MARGIN_M + NARROW_KILL_MARGIN_M + reserve
+    margin = data.tracking.across + problem.certified.kill_margin + NARROW_KILL_MARGIN_M
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
 
 
@@ -343,7 +340,7 @@ class Search:
         max_length = (1.0 - NARROW_GAIN_FRACTION) * self.length_ratio() * self._straight_length()
         if path_length(path) >= max_length:
             return False
-        for problem in (self.problem, with_narrow_margins(self.problem, self.problem.limits.reserve_threats)):
+        for problem in (self.problem, with_narrow_margins(self.problem)):
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False

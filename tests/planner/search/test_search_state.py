@@ -3,6 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
@@ -29,6 +30,7 @@ from planner.search.search_state import (
     are_violated,
     best_first,
     score_table,
+    with_narrow_margins,
 )
 from planner.seeding import (
     airspace_grids,
@@ -111,6 +113,13 @@ def test_first_safe_path_comes_before_the_best(scenario: Scenario, limits: Limit
     assert first.safe
     assert first.evaluations < whole.evaluations
     assert whole.objectives[0] <= first.objectives[0]
+
+
+def test_narrow_margins_keep_the_reserve_for_gusts(scenario: Scenario, limits: Limits) -> None:
+    gusty = make_problem(scenario, replace(limits, reserve_threats=2.5))
+    # The certificate asks for 10 m and the reserve, and the search for 1 m more.
+    across = gusty.search.tracking.across
+    assert with_narrow_margins(gusty).search.kill_margin == pytest.approx(10.0 + 2.5 + 1.0 + across)
 
 
 def test_budget_ends_a_search(make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]) -> None:
