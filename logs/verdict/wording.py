@@ -162,6 +162,10 @@ def _other_change_text(change: Change) -> str:
         case "home altitude":
             return f"set home to {requested_value:.1f} m AMSL, the ground there, instead of {change.current:.1f} m"
         case "altitude frame":
+            if requested_value == 0.0:
+                return (
+                    "read the altitudes of the items that are too high as above mean sea level (frame 0 instead of 3)"
+                )
             return "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
         case "end loiter":
             return f"end with a loiter: make item {change.place.item} a NAV_LOITER_UNLIM (or add a landing)"

@@ -333,14 +333,14 @@ def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding
         edited.is_changed = True
 
 
-def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
-    """Change the altitude frame of items below ground to "above home", keeping their numbers."""
-    scenario, mission = edited.requirements.setup.scenario, edited.mission
-    below_ground, _ = misread_altitudes(mission, scenario.origin, scenario.terrain)
-    items = list(mission.items)
-    for reading in below_ground:
-        items[reading.item_index] = replace(items[reading.item_index], frame=Frame.GLOBAL_RELATIVE_ALT)
-    if below_ground:
+def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+    """Change the altitude frame of the items that fit the terrain only in the other frame, keeping their numbers."""
+    scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
+    below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground
+    for reading in readings:
+        items[reading.item_index] = replace(items[reading.item_index], frame=frame)
+    if readings:
         edited.mission, edited.is_changed = replace(mission, items=tuple(items)), True
 
 

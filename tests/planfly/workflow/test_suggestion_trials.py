@@ -168,6 +168,32 @@ def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame
     )
 
 
+def test_legs_that_are_low_with_home_on_the_ground_are_raised_in_addition() -> None:
+    """From 60 m above a home at 0 m to 15 m above one at 100 m: 30 m are required, 15 m and 1 m more are added."""
+    judged = judge_mission_geometry(setup_of(wp(0, 500, 15.0), wp(0, 2500, 15.0), home="36.5 -84.2 0"))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    home = "set home to 100.0 m AMSL, the ground there, instead of 0.0 m"
+    assert finding.suggestion.startswith(f"{home} and raise both ends of leg 0, to item 2, by 16 m")
+
+
+def test_legs_that_are_high_because_home_is_above_the_ground_are_offered_homes_altitude() -> None:
+    """The ground is at 100 m: 80 m above a home at 200 m are 180 m above ground, and 120 m are allowed."""
+    lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 200", limits={"max_height_m": 120.0}))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "height"]
+    home = "set home to 100.0 m AMSL, the ground there, instead of 200.0 m"
+    assert finding.suggestion == home
+
+
+def test_heights_above_home_among_altitudes_amsl_are_offered_the_other_frame() -> None:
+    """The ground and home are at 100 m: 180 m above home are 180 m above ground, and 180 m AMSL are 80 m."""
+    lines = [wp(0, 500, 180.0, frame=0), wp(0, 2500, 180.0), wp(2000, 2500, 180.0), wp(4000, 2500, 180.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100", limits={"max_height_m": 120.0}))
+    finding, *_ = [finding for finding in judged.failed if finding.rule == "height"]
+    frames = "read the altitudes of the items that are too high as above mean sea level (frame 0 instead of 3)"
+    assert finding.suggestion == frames
+
+
 @dataclass
 class Flights:
     """Trials whose flight fails by a test's own rule; their geometry passes."""
