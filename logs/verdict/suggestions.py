@@ -33,7 +33,7 @@ from logs.verdict.measures.route_requirements import (
 )
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
-from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Suggestion
+from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Place, Suggestion
 from logs.verdict.tolerances import (
     CALM_WIND_MPS,
     HEIGHT_ERROR_LIMIT_M,
@@ -215,7 +215,7 @@ def suggest_gentler_slope(
 def suggest_gentler_landing(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a waypoint that is lower, or further away, before a landing that is too steep.
+    """Suggest a waypoint that is lower, or further away, before a too steep landing, or to land from the other end.
 
     If the aircraft is not known well enough, suggest a flight that measures its descent.
     """
@@ -235,8 +235,15 @@ def suggest_gentler_landing(
     longer_length = float(math.ceil(height / math.tan(max_slope)))
     lower = Change("descent", requirements.waypoint(leg), None, step, "m")
     further = Change("length", requirements.leg(leg), length, longer_length, "m")
-    return _smallest_first(
-        [(step / height, (lower,)), (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,))]
+    alternatives: list[_SizedSuggestion] = [
+        (step / height, (lower,)),
+        (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,)),
+    ]
+    step_east, step_north = (requirements.points[leg + 1, :2] - requirements.points[leg, :2]).tolist()
+    course = math.atan2(step_east, step_north)
+    return (
+        *_smallest_first(alternatives),
+        *_suggest_landing_against_wind(requirements, finding.place, course, ground),
     )
 
 
@@ -632,6 +639,31 @@ def suggest_better_launch(
         course = take_off.course + math.pi
     current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (take_off.course, course))
     return ((Change("launch course", finding.place, current, wanted, "deg"),), *suggestions)
+
+
+def suggest_other_landing_course(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest to land from the other end of the strip after a failed landing in a tailwind; () for any other."""
+    ground = requirements.ground_phases
+    approach = None if ground is None else ground.procedures.approach
+    if finding.ok is not False or approach is None:
+        return ()
+    return _suggest_landing_against_wind(requirements, finding.place, approach.course, float(approach.point[2]))
+
+
+def _suggest_landing_against_wind(
+    requirements: RouteRequirements, place: Place, course: float, altitude: float
+) -> tuple[Suggestion, ...]:
+    """Suggest to land from the other end if there is a tailwind on the landing course (rad); otherwise return ().
+
+    altitude: altitude of the landing point, m AMSL.
+    """
+    wind_east, wind_north = requirements.setup.scenario.wind.velocity_at(altitude)
+    if wind_east * math.sin(course) + wind_north * math.cos(course) < CALM_WIND_MPS:
+        return ()
+    current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (course, course + math.pi))
+    return ((Change("landing course", place, current, wanted, "deg"),),)
 
 
 def suggest_staying_inside(
