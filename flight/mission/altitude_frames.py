@@ -4,6 +4,7 @@ The altitude frame of an item is one number in a mission file (0 above mean sea 
 moves the item by the altitude of home.  The number of the item then still looks right in a ground station's list.
 """
 
+import math
 import statistics
 from typing import NamedTuple
 
@@ -36,13 +37,14 @@ def misread_altitudes(
 
     The first result has the items that state AMSL, but lie below the ground, and above it if read as heights above
     home. The second result has items that state a height above home. They are higher than the other items by at least
-    the altitude of home, or their mission has a landing point that is in the air, but on the ground if read as AMSL.
+    the altitude of home, or their number is not below that of an item that rightly states AMSL, or their mission has a
+    landing point that is in the air, but on the ground if read as AMSL.
     Both are empty if the ground or the altitude of home is unknown, and if home is near sea level.
     """
     home = mission.home
     if home is None or terrain is None or not home.alt > LANDING_HEIGHT_TOLERANCE_M:
         return (), ()
-    below_ground, above_home = [], []
+    below_ground, above_home, amsl_altitudes = [], [], []
     for k in movable_indices(mission):
         item = mission.items[k]
         east, north = to_map(origin, item.lat_deg, item.lon_deg)
@@ -50,9 +52,11 @@ def misread_altitudes(
         home_height = amsl_height + home.alt
         if item.frame in AMSL and amsl_height < 0.0 <= home_height + _height_tolerance(item):
             below_ground.append(AltitudeReading(k, amsl_height, home_height))
+        elif item.frame in AMSL and amsl_height >= 0.0:
+            amsl_altitudes.append(item.alt)
         elif item.frame in OVER_HOME:
             above_home.append(AltitudeReading(k, home_height, amsl_height))
-    return tuple(below_ground), tuple(_too_high(mission, home.alt, above_home))
+    return tuple(below_ground), tuple(_too_high(mission, home.alt, above_home, min(amsl_altitudes, default=math.inf)))
 
 
 def _height_tolerance(item: MissionItem) -> float:
@@ -63,8 +67,13 @@ def _height_tolerance(item: MissionItem) -> float:
     return LANDING_HEIGHT_TOLERANCE_M if item.command in LANDINGS else 0.0
 
 
-def _too_high(mission: Mission, home_altitude: float, readings: list[AltitudeReading]) -> list[AltitudeReading]:
-    """Return the readings of items above home that are too high by about the altitude of home."""
+def _too_high(
+    mission: Mission, home_altitude: float, readings: list[AltitudeReading], lowest_amsl: float
+) -> list[AltitudeReading]:
+    """Return the readings of items above home that are too high by about the altitude of home.
+
+    lowest_amsl: lowest altitude of the items that rightly state AMSL, m; inf without any.
+    """
     items = [mission.items[reading.item_index] for reading in readings]
     lands_in_the_air = any(
         item.command in LANDINGS and reading.height > LANDING_HEIGHT_TOLERANCE_M >= abs(reading.other_height)
@@ -74,6 +83,7 @@ def _too_high(mission: Mission, home_altitude: float, readings: list[AltitudeRea
     for k, (item, reading) in enumerate(zip(items, readings, strict=True)):
         others = [other.alt for other in items[:k] + items[k + 1 :]]
         is_outlier = bool(others) and item.alt - statistics.median(others) >= home_altitude
-        if (is_outlier or lands_in_the_air) and reading.other_height >= -_height_tolerance(item):
+        is_mixed = item.alt >= lowest_amsl
+        if (is_outlier or is_mixed or lands_in_the_air) and reading.other_height >= -_height_tolerance(item):
             too_high.append(reading)
     return too_high

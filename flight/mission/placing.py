@@ -509,7 +509,8 @@ class _AltitudeConverter:
                 hint = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
                     f"home is at {home.alt:.1f} m AMSL, but the ground there is at {ground:.1f} m: "
-                    f"heights above home are measured from home's altitude{hint}"
+                    "heights above home are measured from home's altitude; for a launch from that ground, set home to"
+                    f" {ground:.1f} m AMSL{hint}"
                 )
             return home.alt
         if math.isnan(ground):

@@ -17,7 +17,7 @@ PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "
 # Kind of a change: the quantity that it changes.
 # - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn",
 #   "radius" that a loiter's item states, "home altitude", "altitude frame" of the items below ground, "end loiter"
-#   instead of the last waypoint, "launch course" and "launch speed" of the scenario.
+#   instead of the last waypoint, "landing course", "launch course" and "launch speed" of the scenario.
 # - Changes by a step: "height" (higher) or "descent" (lower) of a leg or of the path at a zone; "inset" of the path
 #   from the area's edges; "distance" from a missile; "north", "east", "south" or "west" of the path at a zone;
 #   "duration" of the flight.
@@ -34,6 +34,7 @@ ChangeKind = Literal[
     "altitude frame",
     "terrain height",
     "end loiter",
+    "landing course",
     "launch course",
     "launch speed",
     "height",

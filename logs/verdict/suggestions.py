@@ -18,7 +18,7 @@ from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
-from logs.verdict.measures.path_sweeps import path_spheres
+from logs.verdict.measures.path_sweeps import path_clearance, path_spheres
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     available_lengths,
@@ -33,7 +33,7 @@ from logs.verdict.measures.route_requirements import (
 )
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
-from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Suggestion
+from logs.verdict.places import FLIGHT, MISSION, Change, ChangeKind, Place, Suggestion
 from logs.verdict.tolerances import (
     CALM_WIND_MPS,
     HEIGHT_ERROR_LIMIT_M,
@@ -209,13 +209,13 @@ def suggest_gentler_slope(
     # A vertical leg has no length to compare with.
     relative_growth = longer_length / leg_length - 1.0 if leg_length >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
     alternatives.append((relative_growth, (Change("length", place, leg_length, float(math.ceil(longer_length)), "m"),)))
-    return _smallest_first(alternatives)
+    return (*_suggest_other_frame(requirements.setup, Frame.GLOBAL), *_smallest_first(alternatives))
 
 
 def suggest_gentler_landing(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a waypoint that is lower, or further away, before a landing that is too steep.
+    """Suggest a waypoint that is lower, or further away, before a too steep landing, or to land from the other end.
 
     If the aircraft is not known well enough, suggest a flight that measures its descent.
     """
@@ -235,8 +235,15 @@ def suggest_gentler_landing(
     longer_length = float(math.ceil(height / math.tan(max_slope)))
     lower = Change("descent", requirements.waypoint(leg), None, step, "m")
     further = Change("length", requirements.leg(leg), length, longer_length, "m")
-    return _smallest_first(
-        [(step / height, (lower,)), (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,))]
+    alternatives: list[_SizedSuggestion] = [
+        (step / height, (lower,)),
+        (longer_length / max(length, MIN_LEG_LENGTH_M) - 1.0, (further,)),
+    ]
+    step_east, step_north = (requirements.points[leg + 1, :2] - requirements.points[leg, :2]).tolist()
+    course = math.atan2(step_east, step_north)
+    return (
+        *_smallest_first(alternatives),
+        *_suggest_landing_against_wind(requirements, finding.place, course, ground),
     )
 
 
@@ -483,31 +490,77 @@ def home_height(setup: FlightSetup) -> float:
     return home.alt - float(terrain.height(float(east), float(north)))
 
 
+def _suggest_home_on_ground(setup: FlightSetup) -> tuple[Suggestion, ...]:
+    """Suggest the ground's altitude for a home that is far above or below the ground; otherwise return ()."""
+    home, height = setup.mission.home, home_height(setup)
+    # The height is NaN if it is unknown.  Without a home line, the first item was probably taken for home: another
+    # altitude of it mends nothing.
+    is_first_item = any(HOME_LINE_MISSING_TEXT in warning for warning in setup.mission.warnings)
+    if home is None or not abs(height) > HOME_ERROR_M or is_first_item:
+        return ()
+    return ((Change("home altitude", MISSION, home.alt, round(home.alt - height, 1), "m"),),)
+
+
+def _suggest_launch_from_ground(requirements: RouteRequirements) -> tuple[Suggestion, ...]:
+    """Suggest home on the ground and, for legs that are then too low, to raise them; () for a home near the ground."""
+    suggestions, setup = _suggest_home_on_ground(requirements.setup), requirements.setup
+    terrain = setup.scenario.terrain
+    if not suggestions or terrain is None:
+        return ()
+    raised = []
+    for leg in range(requirements.legs):
+        ends = requirements.points[leg : leg + 2] - np.array([0.0, 0.0, home_height(setup)])
+        (height,), _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(ends))
+        shortfall = setup.limits.min_clearance - height + SUGGESTION_LENGTH_MARGIN_M
+        if shortfall > SUGGESTION_LENGTH_MARGIN_M:
+            raised.append(Change("height", requirements.leg(leg), None, _round_to_meter(shortfall), "m"))
+    return ((*suggestions[0], *raised),)
+
+
+def _suggest_other_frame(setup: FlightSetup, frame: Frame) -> tuple[Suggestion, ...]:
+    """Suggest an altitude frame for the items whose altitudes fit the terrain only in it; () without such items.
+
+    frame: GLOBAL_RELATIVE_ALT for items below the ground, GLOBAL for items that are too high above home.
+    """
+    below_ground, too_high = misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)
+    if not (too_high if frame == Frame.GLOBAL else below_ground):
+        return ()
+    current = Frame.GLOBAL_RELATIVE_ALT if frame == Frame.GLOBAL else Frame.GLOBAL
+    return ((Change("altitude frame", MISSION, float(current), float(frame), ""),),)
+
+
+def _suggest_lower_reading(setup: FlightSetup) -> tuple[Suggestion, ...]:
+    """Suggest lower readings of a mission's altitudes: home on the ground below it, or AMSL instead of above home."""
+    home_on_ground = _suggest_home_on_ground(setup) if home_height(setup) > 0.0 else ()
+    return (*home_on_ground, *_suggest_other_frame(setup, Frame.GLOBAL))
+
+
 def suggest_flying_higher(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg higher above the ground.
 
-    Other suggestions come first where they apply: another altitude of home, if home is that far below the ground;
+    Other suggestions come first where they apply: home on the ground, if home is below it or leaves the clearance open;
     heights above home, if items are below the ground but would be above it with heights above home.  Over varied
     ground, following the terrain is also suggested.
     """
+    if finding.place == FLIGHT:
+        return _suggest_launch_from_ground(requirements)
     if finding.limit is None or finding.margin is None:
         return ()
     shortfall = -finding.margin + SUGGESTION_LENGTH_MARGIN_M
     if finding.planned is not None:
         # A flight that ended early did not reach the lowest point.
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
-    home, depth = requirements.setup.mission.home, -home_height(requirements.setup)
-    if home is not None and depth > HOME_ERROR_M and depth >= shortfall - SUGGESTION_LENGTH_MARGIN_M:
-        if any(HOME_LINE_MISSING_TEXT in warning for warning in requirements.setup.mission.warnings):
-            # The first item was probably taken for home: another altitude of it mends nothing.
-            return ()
-        return ((Change("home altitude", MISSION, home.alt, round(home.alt + depth, 1), "m"),),)
-    setup, suggestions = requirements.setup, list[Suggestion]()
-    if misread_altitudes(setup.mission, setup.scenario.origin, setup.scenario.terrain)[0]:
-        frames = float(Frame.GLOBAL), float(Frame.GLOBAL_RELATIVE_ALT)
-        suggestions.append((Change("altitude frame", MISSION, *frames, ""),))
+    setup, depth = requirements.setup, -home_height(requirements.setup)
+    if depth > HOME_ERROR_M:
+        home_on_ground = _suggest_home_on_ground(setup)
+        remaining_shortfall = shortfall - depth
+        if remaining_shortfall <= SUGGESTION_LENGTH_MARGIN_M or not home_on_ground:
+            return home_on_ground
+        raised = Change("height", finding.place, None, _round_to_meter(remaining_shortfall), "m")
+        return ((*home_on_ground[0], raised),)
+    suggestions = list(_suggest_other_frame(setup, Frame.GLOBAL_RELATIVE_ALT))
     if shortfall > SUGGESTION_LENGTH_MARGIN_M:
         suggestions.append((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),))
     following = _follow_ground(requirements, finding)
@@ -551,14 +604,14 @@ def _follow_ground(requirements: RouteRequirements, finding: Finding) -> Suggest
 
 
 def suggest_flying_lower(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
     """Suggest flying a leg lower, below the maximum height above ground."""
     heights = [height for height in (finding.planned, finding.flown) if height is not None]
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
     excess = _round_to_meter(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
-    return ((Change("descent", finding.place, None, excess, "m"),),)
+    return (*_suggest_lower_reading(requirements.setup), (Change("descent", finding.place, None, excess, "m"),))
 
 
 def suggest_better_launch(
@@ -588,13 +641,39 @@ def suggest_better_launch(
     return ((Change("launch course", finding.place, current, wanted, "deg"),), *suggestions)
 
 
-def suggest_staying_inside(
-    _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+def suggest_other_landing_course(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest moving the path further inside the scenario's area."""
+    """Suggest to land from the other end of the strip after a failed landing in a tailwind; () for any other."""
+    ground = requirements.ground_phases
+    approach = None if ground is None else ground.procedures.approach
+    if finding.ok is not False or approach is None:
+        return ()
+    return _suggest_landing_against_wind(requirements, finding.place, approach.course, float(approach.point[2]))
+
+
+def _suggest_landing_against_wind(
+    requirements: RouteRequirements, place: Place, course: float, altitude: float
+) -> tuple[Suggestion, ...]:
+    """Suggest to land from the other end if there is a tailwind on the landing course (rad); otherwise return ().
+
+    altitude: altitude of the landing point, m AMSL.
+    """
+    wind_east, wind_north = requirements.setup.scenario.wind.velocity_at(altitude)
+    if wind_east * math.sin(course) + wind_north * math.cos(course) < CALM_WIND_MPS:
+        return ()
+    current, wanted = (float(round(math.degrees(angle)) % 360) for angle in (course, course + math.pi))
+    return ((Change("landing course", place, current, wanted, "deg"),),)
+
+
+def suggest_staying_inside(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
+) -> tuple[Suggestion, ...]:
+    """Suggest moving the path further inside the scenario's area; first, lower readings of its altitudes."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
-    return ((Change("inset", FLIGHT, None, _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
+    inset = _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M)
+    return (*_suggest_lower_reading(requirements.setup), (Change("inset", FLIGHT, None, inset, "m"),))
 
 
 def suggest_using_less_energy(

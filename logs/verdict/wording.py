@@ -166,9 +166,18 @@ def _other_change_text(change: Change) -> str:
         case "home altitude":
             return f"set home to {requested_value:.1f} m AMSL, the ground there, instead of {change.current:.1f} m"
         case "altitude frame":
+            if requested_value == 0.0:
+                return (
+                    "read the altitudes of the items that are too high as above mean sea level (frame 0 instead of 3)"
+                )
             return "read the altitudes of the items below ground as heights above home (frame 3 instead of 0)"
         case "end loiter":
             return f"end with a loiter: make item {change.place.item} a NAV_LOITER_UNLIM (or add a landing)"
+        case "landing course":
+            return (
+                f"land from the other end, on a course of {requested_value:.0f}° instead of {change.current:.0f}°,"
+                " against the wind"
+            )
         case "launch course":
             return f"launch on a course of {requested_value:.0f}° instead of {change.current:.0f}°, against the wind"
         case "launch speed":
@@ -433,6 +442,19 @@ def quantity_text(value: float, unit: str) -> str:
     ('11.9°', '1140000 Wh')
     """
     return _with_unit(_significant_digits(value, 3), unit)
+
+
+def energy_left_text(energy: float) -> str:
+    """Return the energy left at the end of a flight, or the energy that is missing, in Wh.
+
+    >>> energy_left_text(11.87), energy_left_text(-3.0)
+    ('11.9 Wh left', '3 Wh more than there are')
+    """
+    return (
+        f"{quantity_text(energy, 'Wh')} left"
+        if energy >= 0.0
+        else f"{quantity_text(-energy, 'Wh')} more than there are"
+    )
 
 
 def _with_unit(digits: str, unit: str) -> str:

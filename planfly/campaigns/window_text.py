@@ -4,6 +4,7 @@ import math
 from datetime import datetime
 
 from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.wording import energy_left_text
 from planfly.campaigns.find_window import Departure, WindowResult
 
 # Format of a time of take-off.
@@ -68,7 +69,7 @@ def departure_cells(departure: Departure) -> tuple[str, ...]:
         f"{departure.flyable}/{len(departure.rows)}",
         f"{low:.0%} to {high:.0%}",
         f"{speed:.1f} m/s from {from_deg:.0f}",
-        "not known" if math.isnan(departure.energy_left) else f"{departure.energy_left:.0f} Wh left",
+        "not known" if math.isnan(departure.energy_left) else energy_left_text(departure.energy_left),
         rules_text(departure),
     )
 

@@ -333,14 +333,14 @@ def _set_home_altitude(edited: _EditedMission, change: Change, _finding: Finding
         edited.is_changed = True
 
 
-def _set_altitude_frame(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
-    """Change the altitude frame of items below ground to "above home", keeping their numbers."""
-    scenario, mission = edited.requirements.setup.scenario, edited.mission
-    below_ground, _ = misread_altitudes(mission, scenario.origin, scenario.terrain)
-    items = list(mission.items)
-    for reading in below_ground:
-        items[reading.item_index] = replace(items[reading.item_index], frame=Frame.GLOBAL_RELATIVE_ALT)
-    if below_ground:
+def _set_altitude_frame(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+    """Change the altitude frame of the items that fit the terrain only in the other frame, keeping their numbers."""
+    scenario, mission, frame = edited.requirements.setup.scenario, edited.mission, Frame(int(change.wanted))
+    below_ground, too_high = misread_altitudes(mission, scenario.origin, scenario.terrain)
+    items, readings = list(mission.items), too_high if frame == Frame.GLOBAL else below_ground
+    for reading in readings:
+        items[reading.item_index] = replace(items[reading.item_index], frame=frame)
+    if readings:
         edited.mission, edited.is_changed = replace(mission, items=tuple(items)), True
 
 
@@ -446,6 +446,21 @@ def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> 
     edited.move_items(edited.end_waypoints(legs), change.wanted * np.array([east, north, 0.0]))
 
 
+def _land_from_other_end(edited: _EditedMission, _change: Change, _finding: Finding) -> None:
+    """Turn the items of the last landing sequence by half a turn about the landing point."""
+    mission, movable = edited.mission, movable_indices(edited.mission)
+    landings = [index for index in movable if mission.items[index].command in LANDINGS]
+    waypoints = {edited.item_index(waypoint): waypoint for waypoint in range(edited.route.legs + 1)}
+    if not landings:
+        return
+    positions = edited.context.item_positions(mission)
+    landing_point = positions[movable.index(landings[-1])]
+    for index, position in zip(movable, positions, strict=True):
+        if index in edited.approach_indices and index in waypoints:
+            offset = 2.0 * (landing_point - position)
+            edited.move_items([waypoints[index]], np.array([*offset[:2], 0.0]), along_approach=True)
+
+
 _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] = {
     "length": _lengthen_leg,
     "rise": _reduce_rise,
@@ -456,6 +471,7 @@ _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] 
     "home altitude": _set_home_altitude,
     "altitude frame": _set_altitude_frame,
     "terrain height": _follow_ground,
+    "landing course": _land_from_other_end,
     "end loiter": _end_with_loiter,
     "radius": _change_loiter_radius,
     "inset": _move_inside_area,

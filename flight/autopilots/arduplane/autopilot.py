@@ -360,12 +360,13 @@ class ArduPlane(Autopilot):
         return "terrain" if self.parameters.rtl_follows_terrain else ""
 
     def _unjudged_return_texts(self, mission: ReturnMission) -> tuple[str, ...]:
-        """Return ("return path",) if an RTL follows a return path of the mission, which is not judged; otherwise ().
+        """Return the parts of a mission's RTLs that are not simulated.
 
-        An RTL follows the mission's return path if RTL_AUTOLAND is 4.
+        An RTL follows the mission's return path if RTL_AUTOLAND is 4.  Settings that change every flight change RTLs.
         """
         has_path = not mission.commands.isdisjoint((Command.DO_RETURN_PATH_START, Command.DO_LAND_START))
-        return ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
+        path_parts = ("return path",) if has_path and int(self.parameters.rtl_autoland) == 4 else ()
+        return (*path_parts, *self.describe_unsimulated_settings(MissionParts(), by_program=False))
 
     @property
     def _return_trials(self) -> ReturnTrials:

@@ -17,7 +17,7 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
 )
 from logs.verdict.returns.suggest_returns import Remedy
-from logs.verdict.wording import quantity_text
+from logs.verdict.wording import energy_left_text, quantity_text
 from world.frames import to_geo
 from world.scenario import Scenario
 from world.wording import count_text
@@ -359,9 +359,7 @@ def _range_outcome_text(worst_return: SimulatedReturn, returns: Returns, scenari
             )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: the flight itself is below the required height)"
-    energy_text = (
-        "" if math.isnan(worst_return.energy_left) else f", {quantity_text(worst_return.energy_left, 'Wh')} left"
-    )
+    energy_text = "" if math.isnan(worst_return.energy_left) else f", {energy_left_text(worst_return.energy_left)}"
     sphere_text = (
         ""
         if math.isinf(worst_return.sphere_distance)

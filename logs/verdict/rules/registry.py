@@ -9,6 +9,7 @@ from dataclasses import replace
 from flight.guidance.path import reversals
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import (
+    GROUND_PATH,
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
     Finding,
@@ -254,10 +255,16 @@ def with_suggestions(
     If more than `MAX_SUGGESTED_FINDINGS` findings need suggestions, no finding gets any.
     """
     return_legs = {requirements.leg(i) for i in requirements.setup.route.rtl_legs}
+
+    def is_open(finding: Finding) -> bool:
+        """Return True for an undecided finding on the aircraft or on the altitude of home."""
+        is_on_home = finding.rule == "clearance" and finding.check == GROUND_PATH
+        return finding.ok is None and (finding.check == UNKNOWN_AIRCRAFT or is_on_home)
+
     places = [
         k
         for k, finding in enumerate(findings)
-        if (finding.ok is False or (finding.ok is None and finding.check == UNKNOWN_AIRCRAFT))
+        if (finding.ok is False or is_open(finding))
         and RULES[finding.rule].suggest is not None
         and finding.place not in return_legs
     ]

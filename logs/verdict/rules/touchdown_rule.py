@@ -21,6 +21,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
+from logs.verdict.suggestions import suggest_other_landing_course
 from logs.verdict.tolerances import (
     CONTACT_HEIGHT_M,
     EARLY_TOUCHDOWN_DISTANCE_M,
@@ -303,7 +304,10 @@ def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
         f"touches down {abs(landing.distance_beyond_point):.0f} m {direction} the landing point, "
         f"{abs(landing.lateral_offset):.1f} m to the side"
     ]
-    notes.append(f"comes to rest with {landing.strip_left:.0f} m of the strip left")
+    left = landing.strip_left
+    notes.append(
+        f"comes to rest with {left:.0f} m of the strip left" if left >= 0.0 else f"overruns the strip by {-left:.0f} m"
+    )
     sink_text = (
         f"sinks at {landing.sink:.1f} m/s at touchdown, {landing.ground_sink:.1f} m/s relative to the sloping ground"
     )
@@ -329,4 +333,5 @@ RULE = Rule(
         "ROUNDING_M",
     ),
     judge=touchdown_findings,
+    suggest=suggest_other_landing_course,
 )

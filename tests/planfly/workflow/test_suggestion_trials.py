@@ -13,6 +13,7 @@ from flight.mission.edits import movable_indices, raise_items
 from flight.mission_files.wpl import HOME_LINE_MISSING_TEXT
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, make_finding
+from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Change, ItemMove, Place, RemainingFinding, Suggestion
 from logs.verdict.verdict import Verdict
@@ -32,8 +33,11 @@ from planfly.workflow.suggestion_trials import (
     tried_suggestions,
     with_tried_suggestions,
 )
+from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
 from tests.mission_lines import setup_of, wp
 from tests.planfly.studio.drafts import drawn_session
+from world.airfield import LandingStrip
+from world.wind import Wind
 
 SESSION = drawn_session(5, 12)
 CONTEXT = MissionContext.from_setup(SESSION.judged.setup)
@@ -166,6 +170,47 @@ def test_items_that_state_heights_above_home_as_amsl_are_offered_the_other_frame
     assert not any(
         change.what == "altitude frame" for one in judged.failed for way in one.suggestions for change in way
     )
+
+
+def test_legs_that_are_low_with_home_on_the_ground_are_raised_in_addition() -> None:
+    """From 60 m above a home at 0 m to 15 m above one at 100 m: 30 m are required, 15 m and 1 m more are added."""
+    judged = judge_mission_geometry(setup_of(wp(0, 500, 15.0), wp(0, 2500, 15.0), home="36.5 -84.2 0"))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "clearance"]
+    home = "set home to 100.0 m AMSL, the ground there, instead of 0.0 m"
+    assert finding.suggestion.startswith(f"{home} and raise both ends of leg 0, to item 2, by 16 m")
+
+
+def test_legs_that_are_high_because_home_is_above_the_ground_are_offered_homes_altitude() -> None:
+    """The ground is at 100 m: 80 m above a home at 200 m are 180 m above ground, and 120 m are allowed."""
+    lines = [wp(0, 500, 80.0), wp(0, 2500, 80.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 200", limits={"max_height_m": 120.0}))
+    (finding,) = [finding for finding in judged.failed if finding.rule == "height"]
+    home = "set home to 100.0 m AMSL, the ground there, instead of 200.0 m"
+    assert finding.suggestion == home
+
+
+def test_heights_above_home_among_altitudes_amsl_are_offered_the_other_frame() -> None:
+    """The ground and home are at 100 m: 180 m above home are 180 m above ground, and 180 m AMSL are 80 m."""
+    lines = [wp(0, 500, 180.0, frame=0), wp(0, 2500, 180.0), wp(2000, 2500, 180.0), wp(4000, 2500, 180.0)]
+    judged = judge_mission_geometry(setup_of(*lines, home="36.5 -84.2 100", limits={"max_height_m": 120.0}))
+    finding, *_ = [finding for finding in judged.failed if finding.rule == "height"]
+    frames = "read the altitudes of the items that are too high as above mean sea level (frame 0 instead of 3)"
+    assert finding.suggestion == frames
+
+
+def test_a_landing_that_fails_in_a_tailwind_is_offered_the_other_end_which_was_flown() -> None:
+    """The final to the west begins at 1100 m east, 600 m before the landing point; mirrored, it begins at -100 m."""
+    flown = fly(circuit(None, LandingStrip(500.0, 600.0, length=300.0), wind=(8.0, 90.0)))
+    setup, verdict = flown.setup, judge_flight(flown.setup, flown.track, flown.flight.ended)
+    assert [finding.rule for finding in verdict.failed] == ["touchdown"]
+    judged = JudgedMission(setup.mission, setup, route_requirements(setup), verdict)
+    (passed,) = SuggestionTrials(MissionContext.from_setup(setup), judged).find_passing()
+    assert [change.what for change in passed.suggestion] == ["landing course"]
+    (move,) = passed.suggestion[0].moves
+    assert (move.item, round(move.east), round(move.north), move.up) == (4, -1200, 0, 0.0)
+    # A crosswind is no reason to land from the other end.
+    calm = replace(setup, scenario=replace(setup.scenario, wind=Wind(8.0, 0.0)))
+    assert not judge_flight(calm, flown.track, flown.flight.ended).failed[0].suggestions
 
 
 @dataclass

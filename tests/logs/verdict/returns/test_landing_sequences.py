@@ -230,6 +230,20 @@ def test_mode_autoland_is_not_judged(tmp_path: Path) -> None:
     assert (found.safe, found.undecided) == (False, True)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("ARSPD_TYPE", 0), ("ARSPD_ENABLE", 0), ("ARSPD_USE", 0), ("SOAR_ENABLE", 1), ("ALT_OFFSET", 9)]
+)
+def test_returns_with_settings_that_are_not_simulated_are_never_called_safe(
+    tmp_path: Path, name: str, value: float
+) -> None:
+    """The sensor's throttle is in `_update_throttle_with_airspeed`; without a sensor another function sets it."""
+    found = judged(tmp_path, WAY, RTL_ALTITUDE=600, **{name: value})
+    assert {one.kind for one in found.each} == {"safe"}
+    assert (found.safe, found.undecided) == (False, True)
+    assert headline(found).startswith(f"not judged in full ({name} {value}")
+    assert judged(tmp_path, WAY, RTL_ALTITUDE=600).safe
+
+
 def test_returns_that_follow_the_terrain_are_not_judged(tmp_path: Path) -> None:
     for bits in (1, 16):
         found = judged(tmp_path, TERRAIN_FOLLOW=bits)

@@ -95,6 +95,18 @@ def test_a_mission_that_lands_beside_the_strip_fails(east: float, north: float, 
     assert fault in one.brief
 
 
+def test_an_overrun_states_its_length_and_the_other_end_against_the_wind() -> None:
+    """The strip of 600 m is shortened to end 20 m before the stop, as seen from its center at 500 m east."""
+    flown = flown_circuit()
+    overrun = 500.0 - float(flown.track.position[-1, 0])
+    strip = LandingStrip(500.0, 600.0, length=2.0 * (overrun - 20.0))
+    one = found(flown.setup.in_scenario(replace(flown.setup.scenario, landing=strip)), flown.track, "touchdown")
+    assert "; overruns the strip by 20 m; " in one.reason
+    assert "of the strip left" not in one.reason
+    # The wind of the circuit comes from 60 degrees: a landing to the west has a tailwind.
+    assert one.suggestion == "land from the other end, on a course of 90° instead of 270°, against the wind"
+
+
 def test_a_final_over_unknown_ground_is_not_judged() -> None:
     flown = flown_circuit()
     setup = with_hole(flown.setup, 900.0, 600.0)
