@@ -44,8 +44,7 @@ def launch_findings(
 def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
     """Judge a flown take-off: motor start, height reached and lost, runway, ground clearance and hazards."""
     track = ground.launch
-    path = track_path(track)
-    position, distances = path
+    position, distances = path = track_path(track)
     height_lost = float(position[0, 2] - position[:, 2].min())
     clearance, distance = _climb_clearance(requirements, path)
     trigger = requirements.setup.autopilot.ground.launch_trigger

@@ -200,10 +200,7 @@ def _loiter_finding(
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(
-                f"flown wider, because {parameter_name} is less than the {min_radius:.0f} m that the bank limit"
-                " requires"
-            )
+            facts.append(f"flown wider, because the bank limit requires {min_radius:.0f} m, more than {parameter_name}")
             faults = []
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:

@@ -72,7 +72,7 @@ def test_a_trigger_distance_for_the_required_overlap_is_tried(monkeypatch: pytes
     monkeypatch.setattr(remedies, "Trial", fly)
     [remedy] = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict_of(setup)).remedies
     assert (remedy.kind, remedy.current, remedy.value, remedy.unit) == ("trigger", 75.0, 24.0, "m")
-    assert remedy_text(remedy, 5000.0).startswith("photos every 24 m instead of 75 m: flown, ")
+    assert remedy_text(remedy, 5000.0).startswith("photos every 24 m instead of 75 m; ")
     distances = [item.params[0] for item in remedy.mission.items if item.command == Command.DO_SET_CAM_TRIGG_DIST]
     assert distances == [24.0, 0.0] * 3
 
@@ -101,7 +101,7 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     assert pixels == "ground sampling distance 2.9 to 3.9 cm per pixel (120 m to 160 m above ground)"
     # The worst place is not the lowest: 35 % of 80 m x 23.5 / 16 are 41.1 m.
     elsewhere = OverlapMeasure(CAMERA, **(photos | sides | {"min_height": 80.0}))  # type: ignore[arg-type]
-    assert "lines at most 41 m apart, because the lowest photos are taken 80 m above" in overlap_lines(elsewhere)[1]
+    assert "lines must be at most 41 m apart, because the lowest photos are taken 80 m above" in overlap_lines(elsewhere)[1]
     lost = OverlapMeasure(CAMERA, **photos, **sides, unusable_fraction=0.042)  # type: ignore[arg-type]
     assert overlap_lines(lost)[2] == "overlap not judged on 4 % of the lines' length, where no photo can be used"
     unknown = Camera(CAMERA.across, CAMERA.along, 0.3, 0.2)

@@ -155,7 +155,7 @@ def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.Monk
     assert (both.kind, both.name, both.current, both.value) == ("parameter", "ROLL_LIMIT_DEG", 35.0, 45.0)
     assert both.turn_around == 150.0
     assert remedy_text(both, 3000.0).startswith(
-        "ROLL_LIMIT_DEG 45 instead of 35 (--params), with turn-arounds of 150 m:"
+        "ROLL_LIMIT_DEG 45 instead of 35 (--params), with turn-arounds of 150 m; "
     )
 
 
@@ -350,4 +350,4 @@ def test_gates_with_longer_turn_arounds_are_tried_together(monkeypatch: pytest.M
     found = remedies.find_survey_remedies(setup, uav_of_setup(setup), verdict_of(setup, lambda _: (False, {})))
     [both] = found.remedies
     assert (both.kind, both.turn_around) == ("gates", 125.0)
-    assert "instead of waypoints where the camera is switched, with turn-arounds of 125 m: " in remedy_text(both, 5e3)
+    assert "instead of waypoints where the camera is switched, with turn-arounds of 125 m; " in remedy_text(both, 5e3)
