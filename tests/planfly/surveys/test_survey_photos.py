@@ -101,7 +101,7 @@ def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:
     assert pixels == "ground sampling distance 2.9 to 3.9 cm per pixel (120 m to 160 m above ground)"
     # The worst place is not the lowest: 35 % of 80 m x 23.5 / 16 are 41.1 m.
     elsewhere = OverlapMeasure(CAMERA, **(photos | sides | {"min_height": 80.0}))  # type: ignore[arg-type]
-    assert "lines must be at most 41 m apart, because the lowest photos are taken 80 m above" in overlap_lines(elsewhere)[1]
+    assert "lines must be at most 41 m apart, because the lowest photos are taken 80 m" in overlap_lines(elsewhere)[1]
     lost = OverlapMeasure(CAMERA, **photos, **sides, unusable_fraction=0.042)  # type: ignore[arg-type]
     assert overlap_lines(lost)[2] == "overlap not judged on 4 % of the lines' length, where no photo can be used"
     unknown = Camera(CAMERA.across, CAMERA.along, 0.3, 0.2)
