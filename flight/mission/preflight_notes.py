@@ -15,7 +15,6 @@ from flight.mission.items import Command, Mission
 from flight.mission.placing import return_points
 from flight.mission.return_path import ReturnPoint, ReturnRules
 from flight.mission.route import Route
-from flight.mission.surveys import camera_notes
 from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, strip_slopes
 from world.arrays import Floats
 from world.errors import MissionError
@@ -46,7 +45,7 @@ def preflight_notes(
     parameters: Mapping[str, float],
     assumed_parameters: Mapping[str, float],
 ) -> tuple[str, ...]:
-    """Return notes on a mission's launch, landing, home, cameras, rally points and RTL.
+    """Return notes on a mission's launch, landing, home, rally points and RTL.
 
     rules: RTL rules of the autopilot.
     parameters: parameters of the autopilot that are stated, by name.
@@ -63,7 +62,6 @@ def preflight_notes(
         *_note_tail_winds(route, scenario),
         *_note_distant_home(mission, scenario),
         *_note_misread_altitudes(mission, scenario),
-        *camera_notes(mission, route),
         *_note_rally_points(return_targets[1:], route, scenario, rules),
         *_note_low_return(return_targets[:1], scenario, rules),
         *_note_autoland(mission, scenario, parameters, assumed_parameters),

@@ -8,17 +8,19 @@ straight, or bends like its neighbors, as in QGroundControl's corridor scan.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from aircraft.envelope import ground_speed
 from flight.mission.items import Command, Mission, SurveyPlan, is_navigation
 from flight.mission.route import Route
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
+from world.wind import Wind
 
 # Maximum course difference between a leg and the first leg of its straight run, rad.
 _MAX_RUN_BEND_RAD = math.radians(3.0)
@@ -231,23 +233,48 @@ def survey_plan(mission: Mission, photo_spacing: float) -> SurveyPlan | None:
     return next((plan for plan in mission.survey_plans if plan.photo is None), None)
 
 
-def camera_notes(mission: Mission, route: Route) -> tuple[str, ...]:
-    """Return notes on trigger distances that contradict the camera's settings, or that are too short for it."""
+def _max_ground_speed(
+    route: Route, legs: Sequence[int], wind: Wind, airspeed_factor: Callable[[float], float]
+) -> float:
+    """Return the highest ground speed on legs with the mean wind, m/s; NaN if none of their courses can be held.
+
+    legs: indices of the legs.
+    airspeed_factor: see `camera_notes`.
+    """
+    courses, speeds = leg_courses(route.positions), []
+    for leg in legs:
+        altitude = float(route.positions[leg : leg + 2, 2].mean())
+        tailwind, crosswind = wind.components_on_course(float(courses[leg]), altitude)
+        speeds.append(ground_speed(float(route.leg_airspeeds[leg]) * airspeed_factor(altitude), tailwind, crosswind))
+    return max((speed for speed in speeds if not math.isnan(speed)), default=math.nan)
+
+
+def camera_notes(
+    mission: Mission, route: Route, wind: Wind, airspeed_factor: Callable[[float], float]
+) -> tuple[str, ...]:
+    """Return notes on trigger distances that contradict the camera's settings, or that are too short for it.
+
+    airspeed_factor: function of the altitude, m AMSL, that returns the ratio of the true airspeed to the route's.
+    """
     notes, spacings = [], camera_spacing(mission, route)[:-1]
     for plan in dict.fromkeys(mission.survey_plans):
         photo_spacing = plan.photo or 0.0
-        speeds = route.leg_airspeeds[np.abs(spacings - photo_spacing) <= _PHOTO_SPACING_TOLERANCE_M]
-        if photo_spacing <= 0.0 or not speeds.size:
+        legs = np.flatnonzero(np.abs(spacings - photo_spacing) <= _PHOTO_SPACING_TOLERANCE_M).tolist()
+        if photo_spacing <= 0.0 or not legs:
             continue
         text = f"a survey triggers the camera every {photo_spacing:.4g} m"
         if plan.stated_photo and abs(plan.stated_photo / photo_spacing - 1.0) > _STATED_SPACING_TOLERANCE:
             stated_text = f"{plan.stated_photo:.4g} m (AdjustedFootprintFrontal)"
             notes.append(f"{text}, but the settings of its camera in the file state {stated_text}")
-        seconds = photo_spacing / float(speeds.max())
-        if plan.camera is not None and seconds < plan.camera.interval:
+        if plan.camera is None or plan.camera.interval <= 0.0:
+            continue
+        speed = _max_ground_speed(route, legs, wind, airspeed_factor)
+        # The speed is NaN if it is unknown.
+        if photo_spacing < plan.camera.interval * speed:
             notes.append(
                 f"the camera takes one photo per {plan.camera.interval:g} s; the trigger distance of"
-                f" {photo_spacing:.4g} m requires one every {seconds:.2f} s at {float(speeds.max()):.1f} m/s"
+                f" {photo_spacing:.4g} m requires one every {photo_spacing / speed:.2f} s at {speed:.1f} m/s over the"
+                " ground"
             )
     return tuple(notes)
 

@@ -12,7 +12,7 @@ from logs.verdict.presentation import Presentation, finding_words
 class JunitCase(NamedTuple):
     """Test case of a JUnit file.
 
-    classname: "planfly" for an answer, "planfly.RULE" for a rule.
+    classname: "planfly" for an answer, "planfly.RULE" for a rule; in the file, the name of the suite follows "planfly".
     message: reason of a result other than "passed".
     text: further text.
     """
@@ -50,18 +50,23 @@ def suites_text(suites: Iterable[JunitSuite]) -> str:
             errors=str(counts["error"]),
             skipped=str(counts["skipped"]),
         )
-        element.extend(map(_case_element, suite.cases))
+        element.extend(_case_element(case, suite.name) for case in suite.cases)
         if suite.output:
             ElementTree.SubElement(element, "system-out").text = _without_control_characters(suite.output, keep="\n")
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _case_element(case: JunitCase) -> ElementTree.Element:
-    """Make the XML element of a test case."""
+def _case_element(case: JunitCase, suite_name: str) -> ElementTree.Element:
+    """Make the XML element of a test case.
+
+    The class states the suite, because many programs tell cases apart by class and name only.  They split a class at
+    its dots, so that a dot in the name of a file is replaced.
+    """
+    package, *rule = case.classname.split(".")
     element = ElementTree.Element(
         "testcase",
-        classname=_without_control_characters(case.classname),
+        classname=_without_control_characters(".".join([package, suite_name.replace(".", "_"), *rule])),
         name=_without_control_characters(case.name),
     )
     text = _without_control_characters(case.text, keep="\n") or None

@@ -4,7 +4,7 @@ import contextlib
 import json
 import shlex
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -19,7 +19,7 @@ from planfly.api.flying import check_program
 from planfly.arguments import check_arguments
 from planfly.flight_options import RunOptions, load_scenario_with_options, option_defaults
 from planfly.kernel_units.unit_kernels import GLIDING, PLANNING_AND_FLYING
-from planfly.rtl.return_summary import return_summary
+from planfly.rtl.return_summary import ReturnSummary, return_summary
 from planfly.runtime.first_start import api_function
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow.flight_limits import FlightLimits, computing_time_key, length_and_duration_text
@@ -52,7 +52,7 @@ class Round:
     folder: the folder of its files.
     notes: notes on the scenario's zones and the mission's route.
     has_log: True if a flight log was written.
-    returns_line: returns from a few points of the flight, in one line; "" if nothing was flown.
+    return_summary: returns from a few points of the flight; empty if nothing was flown.
     engine: flight model that flew, and the reason; "" if nothing was flown.
     """
 
@@ -63,8 +63,13 @@ class Round:
     folder: Path
     notes: tuple[str, ...] = ()
     has_log: bool = False
-    returns_line: str = ""
+    return_summary: ReturnSummary = field(default_factory=ReturnSummary)
     engine: str = ""
+
+    @property
+    def returns_line(self) -> str:
+        """Returns from a few points of the flight, in one line; "" if nothing was flown."""
+        return self.return_summary.line
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +306,7 @@ def _record_round(task: _RunTask, plan: Plan, number: int) -> Round:
         folder=folder,
         notes=notes,
         has_log=has_log,
-        returns_line=summary.line,
+        return_summary=summary,
         engine=flight.engine,
     )
 

@@ -47,6 +47,7 @@ from planfly.surveys.survey_text import (
     overlap_faults,
     overlap_lines,
     remedy_text,
+    slow_camera_text,
     survey_text,
     usable_segments_text,
 )
@@ -110,6 +111,7 @@ class SurveyResult:
     def headline(self) -> str:
         """Summary of all photo lines and of overlaps that are too small, in one line."""
         faults = [fault for overlap in self.overlaps for fault in overlap_faults(overlap).values()]
+        faults += [slow_camera_text(overlap) for overlap in self.overlaps if overlap and overlap.is_camera_limited]
         return "; ".join([lines_headline([line for lines in self.lines for line in lines]), *dict.fromkeys(faults)])
 
     @property
@@ -122,14 +124,17 @@ class SurveyResult:
         """Lines that describe each survey and its photo lines."""
         texts = []
         if self.photos:
-            texts.append(f"{count_text(self.photos, 'photo')} while the camera is on, {self.line_photos} on the lines")
+            on_lines = "all of them" if self.line_photos == self.photos else f"{self.line_photos:,}"
+            texts.append(f"{count_text(self.photos, 'photo')} while the camera is on, {on_lines} on the lines")
         for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
             photos = count_line_photos(lines)
             photos_text = f", {count_text(photos, 'photo')} on them" if photos and len(self.surveys) > 1 else ""
             is_flown = any(line is not None for line in lines)
             texts += [f"{survey_text(survey)}{photos_text}", *overlap_lines(overlap, is_flown=is_flown)]
             texts += [line_text(number, line) for number, line in enumerate(lines, 1)]
-        texts += [f"note: {note}" for note in camera_notes(self.setup.mission, self.setup.route)]
+        factor = self.setup.autopilot.speeds.true_airspeed_factor
+        notes = camera_notes(self.setup.mission, self.setup.demanded_route, self.setup.scenario.wind, factor)
+        texts += [f"note: {note}" for note in notes]
         return (*texts, self.circles) if self.circles else tuple(texts)
 
     @property

@@ -25,7 +25,7 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_returns_line, print_warnings
+from planfly.terminal.results import print_warnings
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -99,8 +99,7 @@ def check(args: argparse.Namespace) -> int:
     write_json_if_requested(args, lambda: _verdict_answer(result.verdict, returns, code))
     write_junit_if_requested(args, {args.what: result.verdict})
     print_warnings([result.loss] if result.loss else [])
-    print_verdict(result.verdict, result.setup.notes, result.setup)
-    print_returns_line(returns.line)
+    print_verdict(result.verdict, result.setup.notes, result.setup, returns)
     return code
 
 

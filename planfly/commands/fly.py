@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_engine, print_returns_line, print_warnings
+from planfly.terminal.results import print_engine, print_warnings
 from planfly.workflow.output_paths import FLY_LOG
 
 if TYPE_CHECKING:
@@ -57,8 +57,7 @@ def fly(args: argparse.Namespace) -> int:
     log = args.log if is_log_named else FLY_LOG
     flight = call_api(planfly.fly, args, log=log, overwrite=args.overwrite or not is_log_named)
     print_warnings(flight.setup.scenario.notes)
-    print_verdict(flight.verdict, flight.setup.notes, flight.setup)
-    print_returns_line(flight.returns_line)
+    print_verdict(flight.verdict, flight.setup.notes, flight.setup, flight.return_summary)
     if flight.log is None:
         print("log       none: nothing was flown")
     else:

@@ -19,7 +19,7 @@ from planfly.terminal.options import (
     call_api,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
-from planfly.terminal.results import print_engine, print_returns_line
+from planfly.terminal.results import print_engine
 
 if TYPE_CHECKING:
     from planfly import Plan, Round, RunResult
@@ -111,8 +111,7 @@ def _print_round(finished_round: "Round") -> None:
     """Print the verdict on a round, the line on returns, the flight model, and the written files."""
     from planfly.terminal.verdict_lines import print_verdict
 
-    print_verdict(finished_round.verdict, finished_round.notes)
-    print_returns_line(finished_round.returns_line)
+    print_verdict(finished_round.verdict, finished_round.notes, returns=finished_round.return_summary)
     print_engine(finished_round.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
     if finished_round.flown:

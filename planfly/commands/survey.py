@@ -48,8 +48,8 @@ def add_survey_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--suggest",
         action="store_true",
-        help="look for a change that makes all lines usable: the distance between photos, turn-arounds, the order or "
-        "course of the lines, a parameter or the airspeed; each change is flown",
+        help="look for a change that makes all lines usable: the distance between photos, the height, turn-arounds, "
+        "the order or course of the lines, a parameter or the airspeed; each change is flown",
     )
     add_world_options(parser)
     add_aircraft_and_wind_options(parser)

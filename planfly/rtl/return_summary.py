@@ -45,6 +45,12 @@ class ReturnSummary:
     starts: ReturnStarts | None = None
     returns: Returns | None = None
 
+    @property
+    def has_failures(self) -> bool:
+        """True if a return is unsafe."""
+        returns = self.returns
+        return returns is not None and bool(returns.each) and not (returns.safe or returns.undecided)
+
     def data_for_pictures(self) -> DrawnReturns | None:
         """Return the data for pictures of returns and glides, or None without judged returns.
 

@@ -9,6 +9,7 @@ from typing import Literal, TypeGuard
 
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parts import Candidate
+from flight.mission.edits import movable_indices, raise_items
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, fixed_layout_reason, min_turn_around, with_layout
@@ -28,7 +29,7 @@ from planfly.workflow.uav import Uav, load_uav
 from world.errors import PlanflyError
 from world.scenario import with_flight
 
-RemedyKind = Literal["trigger", "side", "turn-around", "gates", "every", "course", "parameter", "airspeed"]
+RemedyKind = Literal["trigger", "height", "side", "turn-around", "gates", "every", "course", "parameter", "airspeed"]
 
 # Turn-around distances that are tried, m.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
@@ -49,8 +50,8 @@ class SurveyRemedy:
     """Change with which a survey was flown and passed.
 
     kind: kind of the change.  name: name of the changed parameter; "" for other kinds.
-    current, value: distance between photos or turn-around distance in m, interleave stride (fly every n-th line),
-    course in degrees, value of the parameter, or airspeed in m/s.
+    current, value: distance between photos, added height or turn-around distance in m, interleave stride (fly every
+    n-th line), course in degrees, value of the parameter, or airspeed in m/s.
     unit: unit of `current` and `value`.
     verdict: verdict on the flight.
     mission: the mission as it was flown.
@@ -133,6 +134,7 @@ def find_survey_remedies(
     gates = trials.try_gates()
     candidates = [
         trials.try_photo_spacing(),
+        trials.try_height(),
         trials.try_other_side(),
         longer_turn_around,
         gates or (None if longer_turn_around else trials.find_gates_and_turn_around()),
@@ -319,6 +321,22 @@ class _Trials:
         current, shortest = min(distances, key=lambda pair: pair[1])
         flight = self._fly_trial(mission, self._uav, f"photos every {shortest:g} m")
         return SurveyRemedy("trigger", "", current, shortest, "m", *flight) if self._is_remedy(flight) else None
+
+    def try_height(self) -> SurveyRemedy | None:
+        """Try the lowest height, in whole m, at which the photos that are flown have the required overlaps.
+
+        Returns None if no overlap fails, or if the flight does not pass.
+        """
+        climb = max((math.ceil(missing_height(measure)) for measure in self._overlaps), default=0)
+        if climb <= 0:
+            return None
+        mission = self._setup.mission
+        survey_items = {
+            int(self._setup.route.items[i]) for survey in self._surveys for i in range(survey.first, survey.last + 1)
+        }
+        indices = [index for index in movable_indices(mission) if mission.items[index].seq in survey_items]
+        flight = self._fly_trial(raise_items(mission, indices, float(climb)), self._uav, f"lines {climb} m higher")
+        return SurveyRemedy("height", "", 0.0, float(climb), "m", *flight) if self._is_remedy(flight) else None
 
     def find_turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around distance that passes, or None.
@@ -618,6 +636,21 @@ class _Trials:
                 change = _GROUND_SPEED_RATIO * needed_speed - ground_speed
                 speeds.append(self._uav.airspeed + change / autopilot.speeds.true_airspeed_factor(altitude))
         return min(speeds)
+
+
+def missing_height(measure: OverlapMeasure) -> float:
+    """Return the height that the lowest photos need for the required overlaps, m; 0 if nothing is missing.
+
+    The distances between photos and between lines stay as flown.
+    """
+    camera, missing = measure.camera, 0.0
+    for overlap, required, distance, width, height in (
+        (measure.front, camera.front, measure.photo_spacing, camera.along, measure.height),
+        (measure.side, camera.side, measure.line_spacing, camera.across, measure.side_height),
+    ):
+        if overlap is not None and required is not None and overlap < required - PHOTO_OVERLAP_FRACTION:
+            missing = max(missing, distance / (width * (1.0 - required)) - height)
+    return missing
 
 
 def _with_gates(setup: FlightSetup, surveys: Sequence[Survey]) -> Mission:

@@ -140,6 +140,14 @@ def overlap_faults(measure: OverlapMeasure | None) -> dict[str, str]:
     }
 
 
+def slow_camera_text(measure: OverlapMeasure) -> str:
+    """Describe the distance between the photos of a camera that is too slow for the stated distance."""
+    return (
+        f"the camera is too slow for the distance between photos: one every {measure.camera.interval:g} s, or"
+        f" {measure.photo_spacing:.0f} m"
+    )
+
+
 def count_line_photos(lines: Sequence[LineMeasure | None]) -> int:
     """Return the number of photos taken on lines; 0 if the distance between photos is not stated.
 
@@ -194,6 +202,8 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             )
         case "trigger":
             change = f"photos every {remedy.value:g} m instead of {remedy.current:.4g} m"
+        case "height":
+            change = f"lines {remedy.value:.0f} m higher"
         case "every":
             first_line_text = (
                 f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""
@@ -210,7 +220,6 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
             change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{option_text}"
     if remedy.kind in ("gates", "parameter", "airspeed") and not math.isnan(remedy.turn_around):
         change += f", with turn-arounds of {remedy.turn_around:.0f} m"
-    return (
-        f"{change}; all lines could be used in a trial flight, whose path is {remedy.length / 1000.0:.1f} km long"
-        f" instead of {length / 1000.0:.1f} km"
-    )
+    new_length, old_length = (f"{value / 1000.0:.1f} km" for value in (remedy.length, length))
+    length_text = "as long as before" if new_length == old_length else f"{new_length} long instead of {old_length}"
+    return f"{change}; all lines could be used in a trial flight, and the path is {length_text}"

@@ -10,12 +10,6 @@ if TYPE_CHECKING:
     from logs.recording.reader import FlightLog
 
 
-def print_returns_line(line: str) -> None:
-    """Print the line on returns to launch, unless the line is empty."""
-    if line:
-        print(f"returns   {line}; more: planfly returns")
-
-
 def print_engine(engine: str) -> None:
     """Print which flight model flew and why, unless nothing was flown."""
     if engine:

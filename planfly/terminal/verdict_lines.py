@@ -7,6 +7,7 @@ from logs.verdict.conditions import flown_lines
 from logs.verdict.presentation import RuleFindings, finding_heading, findings_by_rule
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
+from planfly.rtl.return_summary import ReturnSummary
 from planfly.terminal.command_parser import STATE_STYLES, colour_text
 from planfly.workflow.suggestion_trials import has_geometric_suggestion
 
@@ -18,12 +19,23 @@ _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "missio
 _TITLE_WIDTH = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
-def print_verdict(verdict: Verdict, notes: Iterable[str], setup: FlightSetup | None = None) -> None:
+def print_verdict(
+    verdict: Verdict,
+    notes: Iterable[str],
+    setup: FlightSetup | None = None,
+    returns: ReturnSummary | None = None,
+) -> None:
     """Print a verdict: summary, failed rules, and the finding closest to its limit for each rule.
 
     setup: setup of the judged flight, used to look for suggestions on its planned route; None without a flight.
+    returns: returns from a few points of the flight.  Unsafe returns of a flyable mission follow the first line.
     """
-    print("\n".join(verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))))
+    lines = verdict_lines(verdict, notes, lambda: setup is not None and has_geometric_suggestion(setup))
+    if returns is not None and returns.line:
+        is_warning = verdict.flyable and returns.has_failures
+        text = f"returns   {returns.line}{'; no return is required' if is_warning else ''}; more: planfly returns"
+        lines.insert(1 if is_warning else len(lines), colour_text(text, "warning") if is_warning else text)
+    print("\n".join(lines))
 
 
 def never_suggests() -> bool:

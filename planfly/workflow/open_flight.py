@@ -17,6 +17,7 @@ from flight.mission.itinerary import stated_loiter
 from flight.mission.placing import PlacedMission, home_point, place_stops
 from flight.mission.preflight_notes import preflight_notes
 from flight.mission.route import Route, route_through_stops, with_end_courses
+from flight.mission.surveys import camera_notes
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from planfly.flight_options import (
@@ -227,6 +228,7 @@ def make_setup(
     )
     notes = autopilot.checks.parameter_notes
     notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
+    notes += camera_notes(mission, route, scenario.wind, autopilot.speeds.true_airspeed_factor)
     notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
     notes += _item_count_notes(mission, autopilot.checks.dialect)
     envelope, stated_battery = limits.envelope, scenario.flight.battery_wh

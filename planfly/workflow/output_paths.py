@@ -47,7 +47,7 @@ SURVEY_FILES = (
     "survey.png",
     *(
         f"{remedy}.{kind}"
-        for remedy in ("trigger", "side", "turn-around", "gates", "every", "course", "parameter", "airspeed")
+        for remedy in ("trigger", "height", "side", "turn-around", "gates", "every", "course", "parameter", "airspeed")
         for kind in ("waypoints", "plan")
     ),
     "parameter.param",

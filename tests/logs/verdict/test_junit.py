@@ -36,10 +36,10 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
     made = cases(junit_text({"a & b.waypoints": verdict(*found, flyable=False, line="not flyable: slope")}))
     assert len(made) == 4
     failed, passed, unknown, answer = (
-        made["planfly.slope", "leg 1, to item 3"],
-        made["planfly.slope", "leg 1, to item 3 (2)"],
-        made["planfly.clearance", "flight"],
-        made["planfly", "verdict"],
+        made["planfly.a & b_waypoints.slope", "leg 1, to item 3"],
+        made["planfly.a & b_waypoints.slope", "leg 1, to item 3 (2)"],
+        made["planfly.a & b_waypoints.clearance", "flight"],
+        made["planfly.a & b_waypoints", "verdict"],
     )
     assert failed[0].get("message") == 'slope: climbs 9° & more than <8°> on "leg" [2J'
     assert len(passed) == 0
@@ -50,7 +50,7 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
 def test_a_failure_has_the_words_of_the_terminal_and_its_class_those_of_data() -> None:
     lost = make_finding("departure", FLIGHT, ok=False, reason="bank 80° at 3.0 s")
     made = cases(junit_text({"m": verdict(lost, flyable=False, line="no")}))
-    assert made["planfly.departure", "flight"][0].get("message") == "loss of control: bank 80° at 3.0 s"
+    assert made["planfly.m.departure", "flight"][0].get("message") == "loss of control: bank 80° at 3.0 s"
 
 
 @pytest.mark.parametrize(("flyable", "failures"), [(True, 0), (False, 1)])
@@ -64,3 +64,14 @@ def test_each_of_several_verdicts_is_a_suite() -> None:
     text = junit_text({"m by a": verdict(flyable=True, line="flyable"), "m by b": verdict(flyable=False, line="no")})
     suites = {suite.get("name"): suite.get("failures") for suite in ElementTree.fromstring(text)}
     assert suites == {"m by a": "0", "m by b": "1"}
+
+
+def test_cases_of_two_missions_have_different_classes() -> None:
+    made = verdict(make_finding("slope", FLIGHT, ok=True, reason=""), flyable=True, line="flyable")
+    root = ElementTree.fromstring(junit_text({"north/a.plan": made, "south/a.plan": made}))
+    assert [case.get("classname") for case in root.iter("testcase")] == [
+        "planfly.north/a_plan",
+        "planfly.north/a_plan.slope",
+        "planfly.south/a_plan",
+        "planfly.south/a_plan.slope",
+    ]

@@ -109,7 +109,7 @@ def test_the_answer_and_the_cases_of_continuous_integration_have_the_exit_code(
         assert (document["exit_code"], document["answer"]) == (code, answer)
         assert "exit_code" not in json.loads((out / "summary.json").read_text())
         ((case, output),) = ElementTree.parse(xml).getroot()
-        assert (case.get("classname"), case.get("name")) == ("planfly", "verdict")
+        assert (case.get("classname"), case.get("name")) == (f"planfly.{line[1].replace('.', '_')}", "verdict")
         assert [child.tag for child in case if child.tag != "system-out"] == ([result] if result else [])
         assert output.text is not None
         assert output.text.startswith(f"P >= {target}")

@@ -136,5 +136,6 @@ def test_an_open_item_is_named_in_the_headline_the_json_and_the_junit_of_check_a
         ]
         cases = ElementTree.parse(files[1]).getroot().iter("testcase")
         said = {case.get("classname"): [child.tag for child in case] for case in cases if len(case)}
-        assert said["planfly"] == ["failure"]
-        assert said["planfly.mission"] == ["skipped"]
+        suite = f"planfly.{str(path).replace('.', '_')}"
+        assert said[suite] == ["failure"]
+        assert said[f"{suite}.mission"] == ["skipped"]

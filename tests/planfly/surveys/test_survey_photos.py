@@ -1,6 +1,7 @@
 """Photos of a survey by their numbers: too far apart, too fast for the camera, their pixels, and their count."""
 
 import itertools
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,11 +21,12 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
-from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text
+from planfly.surveys.survey_text import count_line_photos, overlap_lines, remedy_text, slow_camera_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.uav import uav_of_setup
 from tests.mission_lines import mission, setup_of, wp
 from tests.synthetic import fly_path
+from world.wind import Wind
 
 # 23.5 mm by 15.6 mm behind 16 mm, 75 % and 65 % required, one photo per second, 6000 pixels across.
 CAMERA = Camera(23.5 / 16.0, 15.6 / 16.0, 0.75, 0.65, 1.0, 6000.0)
@@ -78,16 +80,67 @@ def test_a_trigger_distance_for_the_required_overlap_is_tried(monkeypatch: pytes
 
 
 def test_a_camera_that_cannot_follow_and_settings_that_contradict_the_items_are_noted(tmp_path: Path) -> None:
-    """10 m at 18 m/s, the cruise of an x8, are 0.56 s."""
+    """The cruise of an x8 is 18 m/s of equivalent airspeed, 18.35 m/s of true airspeed at 400 m by ISO 2533."""
+    true_speed = 18.0 / math.sqrt((1.0 - 2.25577e-5 * 400.0) ** 4.25588)
     setup = setup_with(tmp_path, survey_of(10.0, stated_photo=29.25))
-    assert camera_notes(setup.mission, setup.route) == (
-        "a survey triggers the camera every 10 m, but the settings of its camera in the file state 29.25 m"
-        " (AdjustedFootprintFrontal)",
-        "the camera takes one photo per 1 s; the trigger distance of 10 m requires one every 0.56 s at 18.0 m/s",
-    )
-    # One percent is rounding, and 20 m take more than a second.
+    factor = setup.autopilot.speeds.true_airspeed_factor
+    for speed in (0.0, 5.0):
+        # Every other line is flown with the wind from the south.
+        ground_speed = true_speed + speed
+        assert camera_notes(setup.mission, setup.route, Wind(speed, math.pi), factor) == (
+            "a survey triggers the camera every 10 m, but the settings of its camera in the file state 29.25 m"
+            " (AdjustedFootprintFrontal)",
+            f"the camera takes one photo per 1 s; the trigger distance of 10 m requires one every"
+            f" {10.0 / ground_speed:.2f} s at {ground_speed:.1f} m/s over the ground",
+        )
+    # One percent is rounding, and 20 m take more than a second in calm air, but not with the wind.
     setup = setup_with(tmp_path, survey_of(20.0, stated_photo=20.2))
-    assert camera_notes(setup.mission, setup.route) == ()
+    assert camera_notes(setup.mission, setup.route, Wind(0.0, 0.0), factor) == ()
+    assert len(camera_notes(setup.mission, setup.route, Wind(5.0, math.pi), factor)) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "height"),
+    [
+        ({"front": 0.2, "photo_spacing": 39.0, "height": 50.0}, 110.0),
+        ({"side": 0.3, "line_spacing": 47.0, "side_height": 45.0}, 46.4),
+        ({"front": 0.7 + 0.05, "photo_spacing": 39.0, "height": 160.0}, 0.0),
+    ],
+)
+def test_the_height_that_overlaps_need_follows_from_the_width_of_a_photo(
+    changes: dict[str, float], height: float
+) -> None:
+    """A photo is 15.6 / 16 of its height long: 39 m at 75 % overlap need 160 m; 23.5 / 16 wide: 47 m at 65 % 91.4 m."""
+    measure = replace(OverlapMeasure(CAMERA), **changes)
+    assert remedies.missing_height(measure) == pytest.approx(height, abs=0.05)
+
+
+def test_higher_lines_are_tried_and_a_slow_camera_is_in_the_first_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """39 m between photos, by the camera's speed, need 160 m: 60 m more, with all waypoints of the lines."""
+    setup = setup_with(tmp_path, survey_of(20.0))
+    slow = replace(OverlapMeasure(CAMERA), front=0.6, line=0, photo_spacing=39.0, height=100.0, is_camera_limited=True)
+
+    def fly(flown: FlightSetup, *_: Any) -> Any:
+        [survey] = judged_surveys(flown)
+        ok = flown.route.positions[survey.first, 2] == setup.route.positions[survey.first, 2] + 60.0
+        lines = [make_finding("survey", Place("leg", line.first), ok=ok, reason="") for line in survey.lines]
+        return SimpleNamespace(
+            setup=flown, flight_verdict=Verdict((*lines,), flyable=ok, complete=True, lines=("",), level="flown")
+        )
+
+    monkeypatch.setattr(remedies, "Trial", fly)
+    found = remedies.find_survey_remedies(
+        setup, uav_of_setup(setup), fly(setup).flight_verdict, overlaps=[slow]
+    ).remedies
+    assert [(remedy.kind, remedy.value) for remedy in found] == [("height", 60.0)]
+    length = found[0].length
+    assert remedy_text(found[0], length) == (
+        "lines 60 m higher: flown, and all lines can be used; the path is as long as before"
+    )
+    assert remedy_text(found[0], length + 100.0).endswith(f" km long instead of {length / 1000.0 + 0.1:.1f} km")
+    assert slow_camera_text(slow).endswith("one every 1 s, or 39 m")
 
 
 def test_what_an_overlap_needs_and_what_a_pixel_shows_are_stated() -> None:

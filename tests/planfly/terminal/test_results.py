@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,7 @@ from logs.verdict.places import FLIGHT, Change, Place
 from logs.verdict.verdict import Verdict
 from planfly.cli import main
 from planfly.commands.registry import build_parser
+from planfly.rtl.return_summary import ReturnSummary
 from planfly.terminal.command_parser import error_text
 from planfly.terminal.results import print_warnings
 from planfly.terminal.verdict_lines import print_verdict
@@ -160,3 +163,38 @@ def test_warnings_do_not_mix_with_results(capsys: pytest.CaptureFixture[str]) ->
 )
 def test_keywords_are_options(error: PlanflyError, line: str) -> None:
     assert error_text(error, build_parser().commands["replay"]).startswith(line)
+
+
+# ----------------------------------------------------------------------
+# The line on returns.
+
+ANSWER_LINES = {"flyable": ("flyable", "Start: in the air"), "not": ("not flyable: slope", "Start: in the air")}
+
+
+@pytest.mark.parametrize(
+    ("answer", "safe", "undecided", "row"),
+    [
+        ("flyable", False, False, 1),
+        ("flyable", True, False, -1),
+        ("flyable", False, True, -1),
+        ("not", False, False, -1),
+    ],
+)
+def test_unsafe_returns_of_a_flyable_mission_follow_its_first_line(
+    answer: str, safe: bool, undecided: bool, row: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    returns: Any = SimpleNamespace(safe=safe, undecided=undecided, each=(None,))
+    summary = ReturnSummary("all 3 returns violate town", returns=returns)
+    verdict = Verdict((), flyable=answer == "flyable", complete=True, lines=ANSWER_LINES[answer], level="geometric")
+    print_verdict(verdict, ["a note"], returns=summary)
+    lines = capsys.readouterr().out.splitlines()
+    (place,) = [number for number, line in enumerate(lines) if line.startswith("returns")]
+    assert place == row % len(lines)
+    required = "; no return is required" if row == 1 else ""
+    assert lines[place] == f"returns   all 3 returns violate town{required}; more: planfly returns"
+
+
+def test_a_mission_without_a_home_has_no_line_on_returns(capsys: pytest.CaptureFixture[str]) -> None:
+    verdict = Verdict((), flyable=True, complete=True, lines=("flyable",), level="geometric")
+    print_verdict(verdict, [], returns=ReturnSummary())
+    assert "returns" not in capsys.readouterr().out
